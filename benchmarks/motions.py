@@ -20,7 +20,7 @@ from analysis.mechanisms import mechanism_of
 from analysis.periodic import Drive, OrbitError, natural_frequency, orbit_of, orbits_of, scale_of
 from analysis.periodic.finder import passages
 from analysis.periodic.flows import PLAIN
-from analysis.periodic.orbit_kernels import NO_SOURCE, period
+from analysis.periodic.orbit_kernels import period
 from analysis.periodic.orbits import section_of
 from analysis.periodic.starts import starts_of
 from analysis.units import RAD_S_PER_RPM
@@ -60,7 +60,7 @@ def ends_of(parameters, drive):
     for start in (guess, *starts_of(parameters, drive, guess, STARTS, 5)):
         z, last, carry = start.copy(), np.full((MOST + 1, 2), np.inf), np.array([0.1, 0.0])
         for _ in range(TURNS):
-            if period(section, NO_SOURCE, flow.period, z, carry) != 0:
+            if period(section, flow.period, z, carry) != 0:
                 break
             last = np.vstack([z, last[:-1]])
         else:

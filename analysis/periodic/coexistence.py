@@ -24,7 +24,6 @@ from .finder import Orbits, orbits_of, passages
 from .floquet import TOLERANCE, multipliers
 from .flows import GAP, PLAIN, VARIATIONAL
 from .grids import axes_of, code_of, kept_rows, name_of
-from .orbit_kernels import NO_SOURCE
 from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, require_turns, section_of
 from .planes import Operation, Plane
 from .rows import row_of
@@ -188,7 +187,6 @@ def _motions_of(guesses: NDArray[np.float64], row: Sequence[Operation]) -> NDArr
     section, *points = row_of(parameters, drives, guesses[0], VARIATIONAL, PLAIN)
     coexistence_kernels.solve_all(
         section,
-        NO_SOURCE,
         tuple(points),
         period,
         MOST_ITERATIONS,
@@ -370,5 +368,5 @@ def _ends(
     starts[:, 0], starts[:, flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
     section = section_of(parameters, drive, known[0], PLAIN, tolerance=_TOLERANCE)
-    coexistence_kernels.basins_of(section, NO_SOURCE, flow.period, _NEAR, _TURNS, starts, known, ends)
+    coexistence_kernels.basins_of(section, flow.period, _NEAR, _TURNS, starts, known, ends)
     return ends.astype(float)

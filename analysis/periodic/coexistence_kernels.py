@@ -6,7 +6,6 @@ import numpy as np
 from numba import float64, int64, types
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, inner, kernel
-from ..run.sources import SOURCE
 from .orbit_kernels import DONE, SECTION, advance, deflated, difference, magnitude, make_room, newton, numbered
 from .starts import SAME
 
@@ -26,12 +25,12 @@ def _is_known(start, known, scale, away):
 
 @kernel(
     types.void(
-        SECTION, SOURCE, types.UniTuple(MATRIX, 3), float64, int64, float64, VECTOR, MATRIX, types.UniTuple(CUBE, 3),
+        SECTION, types.UniTuple(MATRIX, 3), float64, int64, float64, VECTOR, MATRIX, types.UniTuple(CUBE, 3),
         int64[::1],
     ),
     purpose="grids of coexisting motions",
 )  # fmt: skip
-def solve_all(section, source, rows, end, most, loose, angles, guesses, found, counts):
+def solve_all(section, rows, end, most, loose, angles, guesses, found, counts):
     """All orbits of each of a row of mechanisms, as far as they are found: see `solve_row` for what is not said here.
 
     Each point's orbits are sought from those of the point before, then from every guess with the known ones divided out.
@@ -62,9 +61,9 @@ def solve_all(section, source, rows, end, most, loose, angles, guesses, found, c
                     copy(starts[row - 1, place], start)
                 else:
                     copy(guesses[place - before], start)
-                    if deflated(wide, source, end, most, 1.0, start, starts[row, :count], z, room, carry) != DONE:
+                    if deflated(wide, end, most, 1.0, start, starts[row, :count], z, room, carry) != DONE:
                         break
-                if newton(own, source, end, most, start, z, room, carry, report) != DONE:
+                if newton(own, end, most, start, z, room, carry, report) != DONE:
                     break
                 if _is_known(start, starts[row, :count], own.scale, single):
                     break
@@ -74,7 +73,7 @@ def solve_all(section, source, rows, end, most, loose, angles, guesses, found, c
                 angle, carry[0] = 0.0, 0.1
                 for i in range(angles.shape[0]):
                     if angles[i] > angle:
-                        advance(own, source, angle, angles[i], single, plain, carry)
+                        advance(own, angle, angles[i], single, plain, carry)
                         angle = angles[i]
                     swings[row, count, i] = single[0]
                 count += 1
@@ -88,10 +87,10 @@ LOST, UNSETTLED = -1, -2
 
 
 @kernel(
-    types.void(SECTION, SOURCE, float64, float64, int64, MATRIX, MATRIX, int64[::1]),
+    types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]),
     purpose="basins of attraction",
 )
-def basins_of(section, source, turn, near, most, starts, known, ends):
+def basins_of(section, turn, near, most, starts, known, ends):
     """Which of the known motions each start ends in, followed turn by turn.
 
     Parameters
@@ -119,6 +118,6 @@ def basins_of(section, source, turn, near, most, starts, known, ends):
                     ends[row] = k
             if ends[row] >= 0:
                 break
-            if advance(section, source, 0.0, turn, z, room, carry) != DONE:
+            if advance(section, 0.0, turn, z, room, carry) != DONE:
                 ends[row] = LOST
                 break

@@ -21,7 +21,6 @@ from linkwork.limits import LIMIT_SINE
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ..numerics.gauss import gauss
-from ..run.sources import SOURCE
 from .flows import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
 from .orbit_kernels import (
     DIVERGED,
@@ -370,7 +369,7 @@ def close(section, angles, y, w, desk, room):
 
 
 @part
-def spread(section, source, angles, start, y, w, room):
+def spread(section, angles, start, y, w, room):
     """Beginnings y and slopes w of the elements of a period from its start, by the integrator."""
     n = start.shape[0]
     z, out = start.copy(), np.empty(n)
@@ -380,7 +379,7 @@ def spread(section, source, angles, start, y, w, room):
         copy(z, y[e])
         for s in range(NODES + 1):
             following = angles[e] + C[s] * h if s < NODES else angles[e + 1]
-            status = advance(section, source, angle, following, z, room, carry)
+            status = advance(section, angle, following, z, room, carry)
             if status != DONE:
                 return status
             angle = following
@@ -393,7 +392,6 @@ def spread(section, source, angles, start, y, w, room):
 @kernel(
     int64(
         SECTION,
-        SOURCE,
         VECTOR,
         int64[::1],
         MATRIX,
@@ -404,7 +402,7 @@ def spread(section, source, angles, start, y, w, room):
     ),
     purpose="the collocation of periodic motions",
 )
-def walk(section, source, angles, firsts, starts, change, known, neighbour, found):
+def walk(section, angles, firsts, starts, change, known, neighbour, found):
     """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
 
     Parameters
@@ -445,7 +443,7 @@ def walk(section, source, angles, firsts, starts, change, known, neighbour, foun
         identity(whole)
         along[:] = 0.0
         if not known:
-            status = spread(section, source, angles[first : last + 1], start, y[first:last], w[first:last], room)
+            status = spread(section, angles[first : last + 1], start, y[first:last], w[first:last], room)
             if status != DONE:
                 return status
             moves[first:last] = 0.0

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
-from ..run.sources import SOURCE, Source
 from ..run.stepping import NODES, STAGES, Flow, attempt, following, interpolant, interpolate, shorter, stage
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
@@ -70,17 +69,6 @@ class Section(NamedTuple):
 
 SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
 
-#: Inputs of a run that are not asked for: what drives an orbit is constant.
-NO_SOURCE = Source(
-    np.array([0.0, 1.0]),
-    np.zeros((1, 0, 4)),
-    np.zeros((0, 4)),
-    np.zeros((0, 2), dtype=np.int64),
-    np.zeros(6),
-    np.zeros(3, dtype=np.int64),
-    np.zeros((0, 2), dtype=np.int64),
-)
-
 
 @part
 def numbered(section, drive, p, scale, tolerance):
@@ -116,7 +104,7 @@ def _clearance(section, angle, z, room):
 
 
 @inner
-def _take(section, source, equation, angle, end, slowest, z, room, carry):
+def _take(section, equation, angle, end, slowest, z, room, carry):
     """A good step from z, its rates in room.k[0], as far as to ``end``: the status and the angle there; z there is room.y."""
     n = section.scale.shape[0]
     flow = Flow(equation, section.modes, section.p, room.sizes)
@@ -157,7 +145,7 @@ def _enter(section, equation, angle, z, room):
 
 
 @inner
-def advance(section, source, begin, end, z, room, carry):
+def advance(section, begin, end, z, room, carry):
     """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
     n = section.scale.shape[0]
     size = z.shape[0]
@@ -165,7 +153,7 @@ def advance(section, source, begin, end, z, room, carry):
     angle = begin
     status, slowest = _enter(section, equation, angle, z, room)
     while status == DONE and angle < end:
-        status, angle = _take(section, source, equation, angle, end, slowest, z, room, carry)
+        status, angle = _take(section, equation, angle, end, slowest, z, room, carry)
         if status == DONE:
             copy(room.y, z)
             if angle < end:
@@ -184,15 +172,13 @@ def _begin(n, start, z):
             z[n + i * n + i] = 1.0
 
 
-@kernel(int64(SECTION, SOURCE, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
-def period(section, source, end, z, carry):
+@kernel(int64(SECTION, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
+def period(section, end, z, carry):
     """Integrate y and as many columns of derivatives as ``z`` has room for from crank angle 0 to ``end``.
 
     Parameters
     ----------
     section : Section
-    source : Source
-        `NO_SOURCE`.
     end : float
         Crank angle at the end (rad): the turns of a period times that of one.
     z : ndarray, shape (n (1 + columns),)
@@ -208,7 +194,7 @@ def period(section, source, end, z, carry):
     n = section.scale.shape[0]
     room = make_room(section, z.shape[0] // n - 1)
     _begin(n, z.copy(), z)
-    return advance(section, source, 0.0, end, z, room, carry)
+    return advance(section, 0.0, end, z, room, carry)
 
 
 @inner
@@ -238,7 +224,7 @@ def magnitude(correction, scale):
 
 
 @part
-def newton(section, source, end, most, start, z, room, carry, report):
+def newton(section, end, most, start, z, room, carry, report):
     """Newton's method for y(end) = y(0); see `solve`.
 
     A correction is taken in part where the next one, found with the same matrix, would not be smaller (Deuflhard's natural
@@ -257,7 +243,7 @@ def newton(section, source, end, most, start, z, room, carry, report):
     for iteration in range(most):
         while True:
             _begin(n, trial, z)
-            status = advance(section, source, 0.0, end, z, room, carry)
+            status = advance(section, 0.0, end, z, room, carry)
             if iteration == 0 and status != DONE:
                 return status
             if status == DONE:
@@ -322,8 +308,8 @@ def solve_small(a, b):
     return True
 
 
-@kernel(int64(SECTION, SOURCE, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
-def solve(section, source, end, most, start, z, report):
+@kernel(int64(SECTION, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
+def solve(section, end, most, start, z, report):
     """Periodic orbit by Newton's method with step control on the map over a period.
 
     Parameters
@@ -341,13 +327,13 @@ def solve(section, source, end, most, start, z, report):
     """
     room = make_room(section, section.scale.shape[0])
     carry = np.array([0.1, 0.0])
-    status = newton(section, source, end, most, start, z, room, carry, report)
+    status = newton(section, end, most, start, z, room, carry, report)
     report[2] = carry[1]
     return status
 
 
 @part
-def deflated(section, source, end, most, reach, start, known, z, room, carry):
+def deflated(section, end, most, reach, start, known, z, room, carry):
     """See `search`."""
     scale = section.scale
     n = scale.shape[0]
@@ -358,7 +344,7 @@ def deflated(section, source, end, most, reach, start, known, z, room, carry):
         fraction = 1.0
         while True:
             _begin(n, trial, z)
-            status = advance(section, source, 0.0, end, z, room, carry)
+            status = advance(section, 0.0, end, z, room, carry)
             if status == DONE:
                 break
             fraction *= 0.5
@@ -403,10 +389,10 @@ def deflated(section, source, end, most, reach, start, known, z, room, carry):
 
 
 @kernel(
-    int64(SECTION, SOURCE, float64, int64, float64, VECTOR, MATRIX, VECTOR),
+    int64(SECTION, float64, int64, float64, VECTOR, MATRIX, VECTOR),
     purpose="the search for coexisting motions",
 )
-def search(section, source, end, most, reach, start, known, z):
+def search(section, end, most, reach, start, known, z):
     """Newton's method for a periodic orbit that is none of the known ones: each of these is divided out.
 
     The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known ones are no zeros any more
@@ -429,17 +415,17 @@ def search(section, source, end, most, reach, start, known, z):
     The others as for `period`. Returns a `Status`.
     """
     room = make_room(section, section.scale.shape[0])
-    return deflated(section, source, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
+    return deflated(section, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
 
 
-@kernel(int64(SECTION, SOURCE, float64, float64, int64, VECTOR), purpose="the settling of motions")
-def settle(section, source, turn, change, most, start):
+@kernel(int64(SECTION, float64, float64, int64, VECTOR), purpose="the settling of motions")
+def settle(section, turn, change, most, start):
     """Follow the motion from ``start``, which is overwritten, turn by turn until one changes y by less than ``change``."""
     room = make_room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
     for _ in range(most):
-        status = advance(section, source, 0.0, turn, z, room, carry)
+        status = advance(section, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
         difference(z, start, start)
@@ -450,8 +436,8 @@ def settle(section, source, turn, change, most, start):
     return DONE
 
 
-@kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
-def sample(section, source, stations, starts, angles, rows):
+@kernel(int64(SECTION, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
+def sample(section, stations, starts, angles, rows):
     """States of a run and channels, shape (m, states + inputs), at increasing crank angles, by the integrator's interpolant.
 
     Parameters
@@ -475,7 +461,7 @@ def sample(section, source, stations, starts, angles, rows):
             done += 1
         while status == DONE and angle < end:
             before = angle
-            status, angle = _take(section, source, equation, angle, end, slowest, z, room, carry)
+            status, angle = _take(section, equation, angle, end, slowest, z, room, carry)
             h = angle - before
             evaluate(equation, angle, room.y, section.modes, section.drive, section.p, k[STAGES])
             if angles[done] <= angle:
@@ -497,8 +483,8 @@ def sample(section, source, stations, starts, angles, rows):
     return DONE
 
 
-@kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
-def segments(section, source, angles, starts, rows):
+@kernel(int64(SECTION, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
+def segments(section, angles, starts, rows):
     """Integrate y with its derivatives over each of the pieces of a period: see `period`.
 
     Parameters
@@ -514,7 +500,7 @@ def segments(section, source, angles, starts, rows):
     carry = np.array([0.1, 0.0])
     for piece in range(starts.shape[0]):
         _begin(starts.shape[1], starts[piece], rows[piece])
-        status = advance(section, source, angles[piece], angles[piece + 1], rows[piece], room, carry)
+        status = advance(section, angles[piece], angles[piece + 1], rows[piece], room, carry)
         if status != DONE:
             return status
     return DONE

@@ -25,7 +25,7 @@ from . import orbit_kernels
 from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
-from .orbit_kernels import NO_SOURCE, Section, Status
+from .orbit_kernels import Section, Status
 from .starts import scale_in, starts_of
 from .turns import Turn, times_of
 
@@ -197,7 +197,7 @@ class PeriodicOrbit(Shown):
         stations, starts = (np.zeros(1), self.start[None, :].copy())
         if self.stations is not None:
             stations, starts = self.stations.angles[:-1].copy(), self.stations.starts
-        status = orbit_kernels.sample(section, NO_SOURCE, stations, starts, angles, rows)
+        status = orbit_kernels.sample(section, stations, starts, angles, rows)
         if status != Status.DONE:
             raise failure(status, flow, self.start)
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
@@ -353,9 +353,7 @@ def settle_from(
     """Where the motion goes by itself from ``start``, until a turn changes y by less than ``change``, or for so many turns."""
     settled = start.copy()
     section = section_of(parameters, drive, start, PLAIN, tolerance=tolerance)
-    status = orbit_kernels.settle(
-        section, NO_SOURCE, drive.flow(mechanism_of(parameters)).period, change, turns, settled
-    )
+    status = orbit_kernels.settle(section, drive.flow(mechanism_of(parameters)).period, change, turns, settled)
     return Status(status), settled
 
 
@@ -377,7 +375,6 @@ def approach(
     flow, start = drive.flow(mechanism_of(parameters)), place.copy()
     status = orbit_kernels.search(
         section_of(parameters, drive, place, VARIATIONAL, tolerance=SEARCH_TOLERANCE),
-        NO_SOURCE,
         flow.period * turns,
         SEARCH_ITERATIONS,
         REACH,
@@ -456,7 +453,7 @@ def _newton(parameters: Parameters, drive: Drive, turns: int, guess: NDArray[np.
     n, start = flow.size, guess.copy()
     z, report = np.empty(n * (1 + n)), np.zeros(3)
     section = section_of(parameters, drive, guess, VARIATIONAL)
-    status = orbit_kernels.solve(section, NO_SOURCE, flow.period * turns, MOST_ITERATIONS, start, z, report)
+    status = orbit_kernels.solve(section, flow.period * turns, MOST_ITERATIONS, start, z, report)
     if status != Status.DONE:
         raise failure(status, flow, start, report[0], int(report[1]))
     return PeriodicOrbit(
@@ -508,7 +505,7 @@ def period_from(
     z = np.zeros(n * (2 + n))
     z[:n] = start
     section = section_of(parameters, drive, start, DIRECTIONAL, direction=direction, along=along)
-    status = orbit_kernels.period(section, NO_SOURCE, flow.period * turns, z, np.array([0.1, 0.0]))
+    status = orbit_kernels.period(section, flow.period * turns, z, np.array([0.1, 0.0]))
     if status != Status.DONE:
         raise failure(status, flow, start)
     return Period(z[:n] - start, z[n : n + n * n].reshape(n, n).T.copy(), z[n + n * n :].copy())
@@ -546,7 +543,7 @@ def pieces_from(
     k, n = starts.shape
     rows = np.zeros((k, n * (2 + n)))
     section = section_of(parameters, drive, starts[0], DIRECTIONAL, direction=direction, along=along)
-    status = orbit_kernels.segments(section, NO_SOURCE, angles, np.ascontiguousarray(starts), rows)
+    status = orbit_kernels.segments(section, angles, np.ascontiguousarray(starts), rows)
     if status != Status.DONE:
         raise failure(status, drive.flow(mechanism_of(parameters)), starts[0])
     matrices = rows[:, n : n + n * n].reshape(k, n, n).transpose(0, 2, 1)

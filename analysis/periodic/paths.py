@@ -11,7 +11,7 @@ from ..mechanisms import Parameters, mechanism_of
 from . import collocation
 from .drives import Drive
 from .flows import DIRECTIONAL, PLAIN, VARIATIONAL, Flow
-from .orbit_kernels import NO_SOURCE, Section, Status
+from .orbit_kernels import Section, Status
 from .orbits import Direction, failure, pieces_from, section_of
 
 #: Calls without collocation after one in which no number of elements sufficed.
@@ -88,7 +88,6 @@ class PeriodPath:
             tails = np.zeros(len(self._mesh) - 1)
             status = collocation.walk(
                 section,
-                NO_SOURCE,
                 self._mesh,
                 self._firsts,
                 np.ascontiguousarray(starts),

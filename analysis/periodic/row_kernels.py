@@ -11,7 +11,6 @@ import numpy as np
 from numba import boolean, float64, int64, types
 
 from ..numerics.codegen import MATRIX, copy, inner, kernel, part
-from ..run.sources import SOURCE
 from .collocation import NODES, close, make_desk, spread
 from .orbit_kernels import DIVERGED, DONE, NO_STEP, SECTION, deflated, make_room, newton, numbered
 
@@ -27,14 +26,14 @@ PASSED = len(_NEXT)
 
 
 @part
-def settle_on(section, source, end, turns, level, start, angles, path, desk, room):
+def settle_on(section, end, turns, level, start, angles, path, desk, room):
     """Begin with the fewest elements that suffice, from the given level of `COUNTS` on; the level, -1 if there is none."""
     y, w = path
     while level < len(COUNTS):
         m = COUNTS[level] * turns
         for e in range(m + 1):
             angles[e] = end * e / m
-        if spread(section, source, angles, start, y[:m], w[:m], room) != DONE:
+        if spread(section, angles, start, y[:m], w[:m], room) != DONE:
             return -1
         status = close(section, angles, y[:m], w[:m], desk, room)
         if status == DONE:
@@ -46,10 +45,10 @@ def settle_on(section, source, end, turns, level, start, angles, path, desk, roo
 
 
 @part
-def from_guess(own, wide, source, end, most, start, z, room, carry, report):
+def from_guess(own, wide, end, most, start, z, room, carry, report):
     """Newton's method from far, at first to the tolerance of a search."""
-    status = newton(wide, source, end, most, start, z, room, carry, report)
-    return newton(own, source, end, most, start, z, room, carry, report) if status == DONE else status
+    status = newton(wide, end, most, start, z, room, carry, report)
+    return newton(own, end, most, start, z, room, carry, report) if status == DONE else status
 
 
 @inner
@@ -69,7 +68,7 @@ def make_way(size, path):
 
 
 @part
-def from_left(section, source, rows, end, turns, most, loose, smooth, guess, found):
+def from_left(section, rows, end, turns, most, loose, smooth, guess, found):
     """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
     (parameters, drives, scales), (starts, monodromies, status) = rows, found
     n = guess.shape[0]
@@ -97,7 +96,7 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
             if what == NO_STEP:
                 # more elements; the start is good enough to go on from
                 copy(y[0, 0], start)
-                more = settle_on(own, source, end, turns, level + 1, start, angles, (y[0], w[0]), desk, room)
+                more = settle_on(own, end, turns, level + 1, start, angles, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
                 what = DONE if more >= 0 else NO_STEP
         by_collocation = what == DONE
@@ -110,11 +109,11 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
             elif passed == 1:
                 copy(starts[row - 1], start)
             if passed:
-                what = newton(own, source, end, most, start, z, room, carry, report)
+                what = newton(own, end, most, start, z, room, carry, report)
             if what != DONE:
                 copy(guess, start)
                 wide = numbered(section, drives[row], parameters[row], scales[row], loose)
-                what = from_guess(own, wide, source, end, most, start, z, room, carry, report)
+                what = from_guess(own, wide, end, most, start, z, room, carry, report)
         status[row] = what
         if what != DONE:
             passed = 0
@@ -130,7 +129,7 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
             copy(z[n:], monodromies[row])
             pause -= 1
             if smooth and not section.torque and pause < 0:
-                more = settle_on(own, source, end, turns, level, start, angles, (y[0], w[0]), desk, room)
+                more = settle_on(own, end, turns, level, start, angles, (y[0], w[0]), desk, room)
                 level, by_collocation = max(more, 0), more >= 0
                 if not by_collocation:
                     pause = _PAUSE
@@ -147,7 +146,7 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
 
 
 @part
-def from_right(section, source, rows, end, most, found):
+def from_right(section, rows, end, most, found):
     """What was not found from the left may be found from the right."""
     (parameters, drives, scales), (starts, monodromies, status) = rows, found
     n = starts.shape[1]
@@ -156,14 +155,14 @@ def from_right(section, source, rows, end, most, found):
         if status[row] != DONE and status[row + 1] == DONE:
             own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
             start = starts[row + 1].copy()
-            if newton(own, source, end, most, start, z, make_room(own, n), carry, report) == DONE:
+            if newton(own, end, most, start, z, make_room(own, n), carry, report) == DONE:
                 status[row] = DONE
                 copy(start, starts[row])
                 copy(z[n:], monodromies[row])
 
 
 @part
-def from_others(section, source, rows, end, most, loose, guesses, found):
+def from_others(section, rows, end, most, loose, guesses, found):
     """What was not found from a neighbour is sought from the guesses but the first, once it is found from the left again."""
     (parameters, drives, scales), (starts, monodromies, status) = rows, found
     n = starts.shape[1]
@@ -178,8 +177,8 @@ def from_others(section, source, rows, end, most, loose, guesses, found):
         for guess in range(0 if row > 0 and status[row - 1] == DONE else 1, guesses.shape[0]):
             start = guesses[guess].copy() if guess else starts[row - 1].copy()
             if (
-                deflated(wide, source, end, most, 1.0, start, none, z, room, carry) == DONE
-                and newton(own, source, end, most, start, z, room, carry, report) == DONE
+                deflated(wide, end, most, 1.0, start, none, z, room, carry) == DONE
+                and newton(own, end, most, start, z, room, carry, report) == DONE
             ):
                 status[row] = DONE
                 copy(start, starts[row])
@@ -190,7 +189,6 @@ def from_others(section, source, rows, end, most, loose, guesses, found):
 @kernel(
     types.void(
         SECTION,
-        SOURCE,
         types.UniTuple(MATRIX, 3),
         float64,
         int64,
@@ -202,7 +200,7 @@ def from_others(section, source, rows, end, most, loose, guesses, found):
     ),
     purpose="grids of periodic motions",
 )
-def solve_row(section, source, rows, end, turns, most, loose, smooth, guesses, found):
+def solve_row(section, rows, end, turns, most, loose, smooth, guesses, found):
     """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
 
     By collocation from the PASSED orbits before, as far as it goes; where it does not, by shooting.
@@ -224,11 +222,11 @@ def solve_row(section, source, rows, end, turns, most, loose, smooth, guesses, f
         Starts, y at crank angle 0, and monodromy matrices by columns, written where the status is DONE; the `Status` of each,
         int64.
     """
-    from_left(section, source, rows, end, turns, most, loose, smooth, guesses[0].copy(), found)
-    from_right(section, source, rows, end, most, found)
+    from_left(section, rows, end, turns, most, loose, smooth, guesses[0].copy(), found)
+    from_right(section, rows, end, most, found)
     missing = False
     for what in found[2]:
         missing |= what != DONE
     if missing:
-        from_others(section, source, rows, end, most, loose, guesses, found)
-        from_right(section, source, rows, end, most, found)
+        from_others(section, rows, end, most, loose, guesses, found)
+        from_right(section, rows, end, most, found)

@@ -15,7 +15,7 @@ from . import row_kernels
 from .drives import Drive
 from .floquet import multipliers
 from .flows import PLAIN, VARIATIONAL
-from .orbit_kernels import NO_SOURCE, Section, Status
+from .orbit_kernels import Section, Status
 from .orbits import INTEGRATOR_TOLERANCE, MOST_ITERATIONS, SEARCH_TOLERANCE, guess_of, section_of
 from .starts import is_smooth, scale_of
 
@@ -90,7 +90,6 @@ def largest_multipliers(
     status = np.zeros(len(rows), dtype=np.int64)
     row_kernels.solve_row(
         section,
-        NO_SOURCE,
         tuple(points),
         flow.period * turns,
         turns,

@@ -28,7 +28,7 @@ from ..run import expressions
 from ..run.compiled import rows
 from . import orbit_kernels
 from .flows import PLAIN, STATE, Flow
-from .orbit_kernels import NO_SOURCE, Status
+from .orbit_kernels import Status
 from .orbits import PeriodicOrbit, failure, section_of
 from .starts import scale_of
 
@@ -138,7 +138,7 @@ class Variations:
             stations, starts = orbit.stations.angles[:-1].copy(), orbit.stations.starts
         found = np.empty((self.angles.size, flow.mechanism.size + flow.inputs))
         section = section_of(orbit.parameters, orbit.drive, orbit.start, PLAIN, STATE)
-        status = orbit_kernels.sample(section, NO_SOURCE, stations, starts, self.angles.ravel(), found)
+        status = orbit_kernels.sample(section, stations, starts, self.angles.ravel(), found)
         if status != Status.DONE:
             raise failure(status, flow, orbit.start)
         return found[:, flow.places].reshape(*self.angles.shape, flow.size)
