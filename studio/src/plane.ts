@@ -70,7 +70,10 @@ export class Plane {
         [value, y[0]],
         [value, y[1]],
       ]);
-      c.fillText(String(Number(value.toPrecision(6))), this.px(value), height - MARGIN.bottom + 15);
+      const text = String(Number(value.toPrecision(6)));
+      // the last one stays inside
+      const most = width - c.measureText(text).width / 2;
+      c.fillText(text, Math.min(this.px(value), most), height - MARGIN.bottom + 15);
     }
     c.textAlign = "right";
     for (const value of ticks(y, Math.max(3, room[1] / 45))) {
@@ -126,8 +129,8 @@ export class Plane {
   /** A rectangle with slanting lines in it: it can be told apart without its colour. */
   hatch([left, right]: Interval, [low, high]: Interval, gap: number): void {
     const c = this.context;
-    const [x, y] = [this.px(left), this.py(high)];
-    const [width, height] = [this.px(right) - x, this.py(low) - y];
+    const [x, y] = [Math.round(this.px(left)), Math.round(this.py(high))];
+    const [width, height] = [Math.round(this.px(right)) - x, Math.round(this.py(low)) - y];
     c.save();
     c.beginPath();
     c.rect(x, y, width, height);
