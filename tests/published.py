@@ -96,7 +96,6 @@ TORQUE_TIME_EXPONENT = -1.95
 # --- mu/(m4 + m5). "Right" is the independent derivation; "thesis" what the code of appendices 2 to 4 gives
 SIGMA2 = 0.05
 P45 = 0.2
-STIFFNESS_PER_MASS = 1000.0
 # the linearised slider equation for I4 = 1: mean, cosine and sine of the first harmonic of M, K and F
 SLIDER_EQUATION: Mapping[str, tuple[float, float, float]] = MappingProxyType(
     {

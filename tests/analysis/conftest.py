@@ -11,8 +11,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analysis import cli
+from analysis.mechanisms import MECHANISMS, register
 from analysis.studio import PAGE
 from benchmarks.studio import chromium
+from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -33,6 +35,17 @@ def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., R
         return CliRunner().invoke(cli.main, [str(word) for word in words], catch_exceptions=False)
 
     return call
+
+
+@pytest.fixture(scope="module")
+def registered() -> Iterator[None]:
+    """The mechanisms of the tests are known."""
+    mechanisms = [module.MECHANISM for module in (pendulum, rotor_on_cart, torsion)]
+    for mechanism in mechanisms:
+        register(mechanism)
+    yield
+    for mechanism in mechanisms:
+        del MECHANISMS[mechanism.name]
 
 
 @pytest.fixture(scope="session")

@@ -78,12 +78,6 @@ class TestInitialSimplex:
         apart = np.linalg.norm(vertices[:, None] - vertices[None, :], axis=2)
         np.testing.assert_allclose(apart[~np.eye(n + 1, dtype=bool)], 0.3, rtol=1e-12)
 
-    def test_of_two_unknowns_it_is_the_triangle_of_the_paper(self) -> None:
-        # p = (sqrt 3 + 1)/(2 sqrt 2), q = (sqrt 3 - 1)/(2 sqrt 2): Spendley, Hext and Himsworth (1962)
-        np.testing.assert_allclose(
-            initial_simplex(np.zeros(2), 1.0), [[0, 0], [0.965926, 0.258819], [0.258819, 0.965926]], atol=1e-6
-        )
-
 
 class TestQuality:
     KNOWN = replace(drawn(np.random.default_rng(5), least=0.6), branch=1)
@@ -295,18 +289,6 @@ class TestSearch:
         solution = synthesize(task, search=Search(method=method, starts=2), constraints=[FullTurn(), SMALL]).best
         assert solution.evaluation.worst < 0.1
         assert solution.verdicts.order
-
-    def test_the_scan_is_better(self) -> None:
-        pytest.importorskip("casadi")
-        constraints = [LeastTransmission(), SMALL]
-        errors = {
-            method: synthesize(
-                TASK, search=Search(method=method, starts=4, candidates=1 << 12), constraints=constraints
-            ).best.error
-            for method in ("scan", "differential-evolution", "simplex")
-        }
-        assert errors["scan"] < errors["differential-evolution"]
-        assert errors["scan"] < errors["simplex"]
 
     def test_convergence_is_counted(self) -> None:
         linkage = Linkage(

@@ -14,7 +14,6 @@ from click.testing import CliRunner, Result
 
 from analysis import cli
 from analysis import motion as control
-from analysis.cli import slider
 from analysis.motion import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.numerics.fourier import FourierSeries
 from analysis.run import load_case, load_parameters, simulate
@@ -29,7 +28,7 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from linkwork.errors import InputError, LinkworkError, ParameterError
+from linkwork.errors import InputError
 from tests.linkages import BASE
 
 from .conftest import csv
@@ -448,11 +447,3 @@ def test_the_motion_is_read_with_its_units(tmp_path) -> None:
     assert (u.stroke, u.speed, u.acceleration) == pytest.approx((0.025, 0.03, 0.05))
     assert isinstance(chosen.linkage, Linkage)
     assert chosen.linkage.values() == BASE.values()
-
-
-def test_help_shows_examples() -> None:
-    result = CliRunner().invoke(cli.main, ["slider-motion", "--help"])
-    assert result.exit_code == 0
-    assert "Examples:" in result.output
-    assert slider.slider_motion.name == "slider-motion"
-    assert issubclass(ParameterError, LinkworkError)

@@ -73,10 +73,6 @@ def run(tmp_path_factory):
     return result, folder
 
 
-def test_help_shows_examples(linkwork) -> None:
-    assert "Examples:" in linkwork("synthesize", "--help").output
-
-
 def test_it_reports_and_writes_what_it_found(run) -> None:
     result, folder = run
     written = {path.name for path in (folder / "out").glob("[!.]*")}

@@ -235,16 +235,6 @@ def test_a_function_generator_is_found_again(n: int) -> None:
     assert any(np.allclose(s.linkage.vector, made.vector, rtol=0.0, atol=1e-9) for s in found.sound)
 
 
-def test_freudenstein_by_hand() -> None:
-    """Three points with the linkage's own angles: R1, R2 and R3 are those of the lengths."""
-    made = Linkage(ground_length=0.1, crank_length=0.04, coupler_length=0.12, rocker_length=0.07, crank_phase=0.7)
-    rotation = np.array([0.0, 0.7, 1.6])
-    (one,) = function_generators(
-        RockerFunction(angle=made.rocker_angle(rotation), rotation=rotation), crank_phase="0.7 rad"
-    ).solutions
-    assert one.linkage.vector == pytest.approx(made.vector, abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("n", "mounting", "crank_phase", "said"),
     [

@@ -160,12 +160,6 @@ def test_runs_that_are_the_same_are_called_identical(run, factor: float, text: s
     assert bool(beside.lines) == (text == "")
 
 
-def test_the_look_does_not_depend_on_where_it_is_saved(run) -> None:
-    axis = figures.plot(run).axes[0]
-    assert axis.yaxis.get_major_ticks()[0].gridline.get_alpha() == figures.STYLE["grid.alpha"]
-    assert axis.get_yticklabels()[0].get_fontsize() == figures.STYLE["font.size"]
-
-
 def test_curves() -> None:
     square = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]])
     panel = Panel(
@@ -251,12 +245,6 @@ def test_drawing_holds_all_pins(parameters, tmp_path: Path) -> None:
 def test_drawing_what_cannot_be_joined() -> None:
     with pytest.raises(AssemblyError, match=r"slider position 0\.5 m"):
         figures.plot(TABLE_3_1, 0.0, 0.5)
-
-
-def test_saving_twice_gives_the_same_bytes(run, tmp_path: Path) -> None:
-    first = save_figure(figures.plot(run), tmp_path / "a.png").read_bytes()
-    second = save_figure(figures.plot(run), tmp_path / "b.png").read_bytes()
-    assert first == second
 
 
 def test_animation(run, tmp_path: Path) -> None:

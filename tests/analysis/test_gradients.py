@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import doctest
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from math import pi
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from analysis import InductionMotor, Inputs
-from analysis.mechanisms import MECHANISMS, register
 from analysis.periodic import (
     Crossing,
     Drive,
@@ -49,6 +48,8 @@ from linkwork.slider_crank import published as rahman
 from tests.mechanisms import rotor_on_cart
 from tests.strategies import seeded
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 FloatArray = NDArray[np.float64]
 RPM = RAD_S_PER_RPM
 RIG_1_B, RIG_2_C = (SETS[f"rig-{name}"].parameters for name in ("1-spring-b", "2-spring-c"))
@@ -63,13 +64,6 @@ WEAK = InductionMotor(breakdown_torque=0.06, breakdown_slip=0.3, synchronous_spe
 FIELD = "drive.torque.synchronous_speed"
 #: Where the steps of a parameter that is zero come from.
 SIZES = {"m": 0.1, "rad": 1.0, "kg": 0.1, "N": 1.0, "N.m": 0.1, "m/s2": 10.0, "kg.m2": 1e-3}
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    register(rotor_on_cart.MECHANISM)
-    yield
-    del MECHANISMS[rotor_on_cart.MECHANISM.name]
 
 
 def difference(of: Callable[[float], FloatArray], at: float, step: float, levels: int = 2) -> FloatArray:

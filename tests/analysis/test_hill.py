@@ -87,17 +87,6 @@ def test_monodromy_against_scipy() -> None:
     assert monodromy(GENERAL) == pytest.approx(integrated(GENERAL), abs=1e-10)
 
 
-def test_constant_coefficients() -> None:
-    equation = PeriodicEquation(
-        a=FourierSeries.constant(2.0), b=FourierSeries.constant(0.4), c=FourierSeries.constant(3.0)
-    )
-    exponent = -0.1 + 1j * sqrt(1.5 - 0.01)
-    expected = np.exp(2.0 * pi * np.array([exponent, exponent.conjugate()]))
-    assert sorted(multipliers(monodromy(equation)), key=np.imag) == pytest.approx(
-        sorted(expected, key=np.imag), abs=1e-13
-    )
-
-
 def test_integration_is_of_order_twelve() -> None:
     steps = np.array([2, 3, 4, 6, 8, 10])
     errors = [np.abs(monodromy(GENERAL, steps=int(n)) - monodromy(GENERAL, steps=60)).max() for n in steps]

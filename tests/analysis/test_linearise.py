@@ -387,11 +387,6 @@ def test_multipliers_of_a_motor_drive() -> None:
     assert np.array(sorted(values[1:], key=lambda z: (abs(z), z.imag))) == pytest.approx(np.array(expected), abs=1e-6)
 
 
-def test_liouville(turning) -> None:
-    trace = np.trace(turning.A, axis1=1, axis2=2).mean() * turning.period
-    assert np.linalg.det(turning.monodromy()) == pytest.approx(np.exp(trace), rel=1e-8)
-
-
 def test_the_samples_are_models_and_their_mean_is_the_mean(turning) -> None:
     one = turning[5]
     alone = linearise(TABLE_3_1, turning.states[5], TURNING)
@@ -400,15 +395,6 @@ def test_the_samples_are_models_and_their_mean_is_the_mean(turning) -> None:
     mean = turning.mean()
     assert pytest.approx(np.mean([m.K[0, 0] for m in map(turning.__getitem__, range(len(turning)))])) == mean.K[0, 0]
     assert turning.motion()(turning.times[7]) == pytest.approx(turning.states[7, :4], abs=1e-9)
-
-
-def test_rig_2_resonates_where_the_thesis_measured() -> None:
-    """Youssef, chapter VIII: 585 rpm with spring C, 825 with D."""
-    for name, rpm in (("rig-2-spring-c", 585.0), ("rig-2-spring-d", 825.0)):
-        p = SETS[name].parameters
-        turning = Inputs(speed=40.0)
-        mean = linearise_along(p, settled_motion(p, turning), turning).mean()
-        assert mean.natural_frequencies[0] * 30.0 / pi == pytest.approx(rpm, rel=0.005)
 
 
 # refusals

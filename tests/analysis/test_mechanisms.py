@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pickle
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, replace
-from math import acos, cos, hypot, pi, sin, sqrt
+from math import acos, cos, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -43,17 +43,9 @@ from linkwork.plant import Plant
 from linkwork.slider_crank.published import OFFSET_CASE
 from tests.mechanisms import pendulum, rotor_on_cart
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 ROTOR, PENDULUM = rotor_on_cart.MECHANISM, pendulum.MECHANISM
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    """The one line."""
-    for mechanism in (ROTOR, PENDULUM):
-        register(mechanism)
-    yield
-    for mechanism in (ROTOR, PENDULUM):
-        del MECHANISMS[mechanism.name]
 
 
 def demo(mechanism: Mechanism) -> Any:
@@ -141,42 +133,6 @@ def test_fmu_is_valid_and_does_as_the_solver(driven: tuple[Mechanism, Any, Input
 def test_fmu_runs_through_fmpy_alone(fmus: dict[str, Path]) -> None:
     result = simulate_fmu(str(fmus["rotor-on-cart"]), stop_time=0.1, step_size=1e-3, output_interval=1e-3)
     assert len(result) == 101
-
-
-def test_jump_of_the_speed_conserves_the_momentum_of_the_cart() -> None:
-    published = demo(ROTOR)
-    p = published.parameters.constants()
-    run = simulate(
-        published.parameters,
-        Inputs(speed=_step(20.0, 25.0, 0.5)),
-        initial=published.initial,
-        stop_time=1.0,
-        step=0.5,
-        samples=[0.0, 0.5 - 1e-12, 0.5, 1.0],
-    )
-
-    def momentum(n: int) -> float:
-        v, th, w = (run[name][n] for name in ("cart.velocity", "rotor.angle", "rotor.speed"))
-        return float(p.mass * v - p.unbalance * sin(th) * w)
-
-    assert run["rotor.speed"][1:3] == pytest.approx([20.0, 25.0])
-    assert momentum(1) == pytest.approx(momentum(2), abs=1e-9)
-    assert run["cart.velocity"][1] != pytest.approx(run["cart.velocity"][2], abs=1e-3)
-
-
-def _step(low: float, high: float, time: float) -> Any:
-    from analysis import steps
-
-    return steps([0.0, time], [low, high])
-
-
-def test_slow_rotor_shakes_the_cart_as_a_harmonic_force_would() -> None:
-    """At constant speed the cart is a driven oscillator: amplitude m l w2 / |k - M w2 + i c w|."""
-    published = demo(ROTOR)
-    p, w = published.parameters.constants(), 20.0
-    run = simulate(published.parameters, Inputs(speed=w), initial=published.initial, stop_time=60 * pi, step=0.01)
-    late = run["cart.position"][-2000:]
-    assert np.ptp(late) / 2.0 == pytest.approx(p.unbalance * w * w / hypot(p.k - p.mass * w * w, p.c * w), rel=1e-4)
 
 
 def test_parameters_and_states_are_named_after_the_interface() -> None:

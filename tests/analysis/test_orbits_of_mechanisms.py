@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from math import cos, pi, sin
 from pathlib import Path
@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import root
 
 from analysis import InductionMotor, Inputs, figures, simulate
-from analysis.mechanisms import MECHANISMS, register
+from analysis.mechanisms import MECHANISMS
 from analysis.periodic import (
     Crossing,
     Drive,
@@ -38,20 +38,13 @@ from linkwork.slider_crank import published as rahman
 from linkwork.slider_crank.parameters import InitialState
 from tests.mechanisms import pendulum, rotor_on_cart
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 ROTOR, PENDULUM = (next(iter(m.MECHANISM.published.values())).parameters for m in (rotor_on_cart, pendulum))
 #: The slider-crank of section 3.1 with a spring on the axial shift.
 SPRUNG = replace(rahman.parameters(20.0, 232.0), shift_stiffness=8000.0, shift_damping=60.0)
 FREE = {"axial.force": 0.0}
 SPEED = rahman.CRANK_SPEED
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    for module in (rotor_on_cart, pendulum):
-        register(module.MECHANISM)
-    yield
-    for module in (rotor_on_cart, pendulum):
-        del MECHANISMS[module.MECHANISM.name]
 
 
 @pytest.mark.parametrize("force", [0.0, 3.0])

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
-from analysis.mechanisms import MECHANISMS, register
 from analysis.periodic import Drive, Family, SpecialPoint, follow, orbit_of, switch
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 from tests.mechanisms import torsion
 from tests.oracles import continued
 from tests.published import CONTINUED
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 RPM = RAD_S_PER_RPM
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    register(torsion.MECHANISM)
-    yield
-    del MECHANISMS[torsion.MECHANISM.name]
 
 
 def oscillators(name: str) -> tuple[Family, list[float]]:

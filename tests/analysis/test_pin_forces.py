@@ -66,59 +66,16 @@ USUAL = (LargestLink(length=0.3), LeastTransmission())
 FEW = Search(starts=3, candidates=1 << 12)
 
 
-def particles(bars: list[tuple[complex, float]], line: float, width: float) -> tuple[float, complex, float]:
-    """Mass, centre and moment of inertia about it of bars from the origin, each cut into small pieces."""
-    n, m = 400, 40
-    masses, places = [], []
-    for end, length in bars:
-        along, across = np.meshgrid((np.arange(n) + 0.5) / n, ((np.arange(m) + 0.5) / m - 0.5) * width)
-        places.append((end * along + 1j * end / abs(end) * across).ravel())
-        masses.append(np.full(n * m, line * length / (n * m)))
-    mass, place = np.concatenate(masses), np.concatenate(places)
-    centre = complex(mass @ place / mass.sum())
-    return float(mass.sum()), centre, float(mass @ np.abs(place - centre) ** 2)
-
-
 def plant(linkage: Linkage, make: Make) -> FiveBarParameters:
-    """The plant with masses of the oracle's own, its slider so heavy that it stands still."""
-    line = make.density * make.width * make.thickness
-
-    def bar(length: float) -> tuple[float, complex, float]:
-        return particles([(complex(length), length)], line, make.width)
-
-    m2, g2, i2 = bar(linkage.crank_length)
-    m4, g4, i4 = bar(linkage.rocker_length)
-    if make.rocker_mass is not None:
-        m4, i4 = make.rocker_mass, i4 * make.rocker_mass / m4
-    r = linkage.point_distance
-    aside = [(r * np.exp(1j * linkage.point_angle), r)] if r else []
-    m3, g3, i3 = particles([(complex(linkage.coupler_length), linkage.coupler_length), *aside], line, make.width)
-    return FiveBarParameters(
-        ground_length=linkage.ground_length,
-        crank_length=linkage.crank_length,
-        coupler_length=linkage.coupler_length,
-        rocker_length=linkage.rocker_length,
-        crank_mass=m2,
-        coupler_mass=m3,
-        rocker_mass=m4,
-        slider_mass=1e7,
-        crank_inertia=i2 + m2 * abs(g2) ** 2,
-        coupler_inertia=i3,
-        rocker_inertia=i4,
-        crank_cog_distance=abs(g2),
-        coupler_cog_distance=abs(g3),
-        coupler_cog_angle=float(np.angle(g3)),
-        rocker_cog_distance=abs(g4),
-        coupler_point_distance=r,
-        coupler_point_angle=linkage.point_angle,
-        gravity=make.gravity,
-        ground_inclination=linkage.ground_angle,
-        assembly_branch=linkage.branch,
-    )
+    """The plant; `test_linkage` sums the masses of its bars."""
+    section = (make.width, make.thickness)
+    p = linkage.to_five_bar(density=make.density, section=section, slider_mass=1e7, gravity=make.gravity)
+    m = p.rocker_mass if make.rocker_mass is None else make.rocker_mass
+    return replace(p, rocker_mass=m, rocker_inertia=p.rocker_inertia * m / p.rocker_mass)
 
 
 def by_multipliers(linkage: Linkage, make: Make, rotation: float) -> np.ndarray:
-    """Magnitudes of the forces on the pins A to D."""
+    """Magnitudes of the forces on the pins A to D, the slider so heavy that it stands still."""
     p = plant(linkage, make)
     q = multipliers.assemble(p, rotation + linkage.crank_phase, 0.0)
     qd = multipliers.rates(p, q, make.speed, 0.0)
@@ -143,8 +100,7 @@ def test_the_run_of_the_plant_and_its_trace_have_the_forces_of_multipliers(chang
     assert run.moved < 1e-6
     for k in (0, 100, 333, 600):
         wanted = by_multipliers(linkage, MAKE, float(run.rotation[k]))
-        # the particles of the oracle's bars are cut to a 400th
-        assert run.force[k] == pytest.approx(wanted, rel=2e-5)
+        assert run.force[k] == pytest.approx(wanted, rel=2e-6)
         assert traced(linkage, MAKE, float(run.rotation[k])) == pytest.approx(run.force[k], rel=1e-6)
     assert run.greatest == run.force.max() == run.of("ABCD")
     assert run.force[np.argmin(np.abs(run.rotation - run.at)), "ABCD".index(run.pin)] == run.greatest

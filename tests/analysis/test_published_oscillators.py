@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import pi
 
 import numpy as np
@@ -10,7 +10,6 @@ import pytest
 from click.testing import Result
 from scipy.special import mathieu_a, mathieu_b
 
-from analysis.mechanisms import MECHANISMS, register
 from analysis.numerics.boundaries import scan
 from analysis.periodic import (
     Branch,
@@ -38,12 +37,7 @@ from tests.mechanisms import torsion
 from tests.oracles import oscillator
 from tests.published import FEIGENBAUM, MATHIEU_A, MATHIEU_B, PENDULUM_DOUBLINGS
 
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    register(torsion.MECHANISM)
-    yield
-    del MECHANISMS[torsion.MECHANISM.name]
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 # Mathieu: y'' + (a - 2 q cos 2t) y = 0, a turn of the crank for half a period of the solutions, 2t its angle

@@ -177,16 +177,6 @@ def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
     assert found.best.error <= moved(2).best.error * (1.0 + 1e-9)
 
 
-def test_the_slope_of_the_error_is_zero_where_no_bound_holds() -> None:
-    """By the derivatives of the compiled kernels, not by the program's."""
-    solution = moved(2).best
-    slopes = {s.name: s.slope for s in sensitivities(solution) if s.name.startswith(("slider", "guide"))}
-    assert len(slopes) == 6
-    for name, slope in slopes.items():
-        unit = 1.0 if name == "guide_angle" else PRINTED.ground_length
-        assert abs(slope) * unit < 1e-5 * solution.error, name
-
-
 # Derivatives
 
 
@@ -285,11 +275,6 @@ def test_a_bound_is_kept_and_is_reached(name: str) -> None:
     bound, value, _, result = bounded(name)
     assert 0.995 * bound <= value <= bound * (1.0 + 1e-6)
     assert shown(moved(2)) < shown(result) < shown(slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=0)))
-
-
-def test_a_bound_that_is_wide_changes_nothing() -> None:
-    wide = moved(2, stroke=0.5, speed=0.5, acceleration=0.5)
-    assert wide.best.error == pytest.approx(moved(2).best.error, rel=1e-7)
 
 
 def test_the_position_is_kept_within_its_bounds() -> None:

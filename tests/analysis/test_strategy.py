@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees, inf, pi, radians
+from math import degrees, inf, radians
 from typing import Any
 
 import numpy as np
@@ -239,15 +239,6 @@ def test_bad_input_is_named_before_anything_is_searched(
     task = TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
     with pytest.raises(InputError, match=words):
         simplest_mechanism(task, tolerance, **options)
-
-
-def test_two_calls_give_the_same() -> None:
-    series = FourierSeries(np.array([0.0, 0.012]), np.array([0.0, 0.01]))
-    traced = replace(BASE, pivot=SliderMotion(series, 0.4))
-    one, two = (strategy(traced, 1e-6 * MM2, harmonics=1, ratios=(), starts=2) for _ in range(2))
-    assert str(one) == str(two)
-    assert [s.value for s in one.steps] == [s.value for s in two.steps]
-    assert abs(one.chosen.solution.linkage.crank_phase) <= pi
 
 
 def test_a_mechanism_with_a_defect_is_not_taken() -> None:

@@ -35,7 +35,6 @@ from analysis.synthesis import (
     UntimedPath,
     costs,
     drawing,
-    length_step,
     pin_forces,
     plates,
     report,
@@ -438,10 +437,3 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     assert f"sum of squared errors of angle: {squares:.6g} deg²" in report(function)
     assert "stroke" in report(timed(SLIDING))
     assert "second crank at D: 2 turns" in report(timed(GEARED))
-
-
-@pytest.mark.parametrize(("factor", "step"), [(1.0, 1e-4), (1e3, 1e-4), (0.02, 1e-4), (0.015, 1e-5), (1e-3, 1e-6)])
-def test_small_linkages_are_rounded_to_finer_steps(factor, step) -> None:
-    solution = Solution.of(TimedPath(points=factor * ELLIPSE), LINKAGE.scaled(factor))
-    assert length_step(solution.linkage) == pytest.approx(step)
-    assert report(solution)

@@ -59,11 +59,6 @@ def run(
     return track(controller, **{"crank_speed": SPEED} | options)
 
 
-def test_the_mean_model_is_one_along_the_reference(model) -> None:
-    assert model.state[1] == pytest.approx(MOTION.mean, abs=1e-12)
-    assert model.inputs.force == pytest.approx(inverse_dynamics(RIG, MOTION, SPEED).force.mean())
-
-
 def test_the_feed_forward_error_goes_with_the_square_of_the_period() -> None:
     """A force held at its value in the middle of the period; with the one at its beginning it would go with the period."""
     errors = [run(period=h, tolerance=1e-12, revolutions=6).metrics().rms_error for h in (2e-3, 1e-3, 5e-4)]

@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize
 
 from analysis import InductionMotor, Limit, Wish, cli, figures, tune
-from analysis.mechanisms import MECHANISMS, register
 from analysis.periodic import (
     Crossing,
     Drive,
@@ -40,6 +39,8 @@ from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNa
 from linkwork.five_bar.published import SETS
 from linkwork.slider_crank import published as rahman
 from tests.mechanisms import rotor_on_cart, torsion
+
+pytestmark = pytest.mark.usefixtures("registered")
 
 RPM = pi / 30.0
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -66,15 +67,6 @@ OF_TONGUE = {
     "no_jump": True,
     "least": "rotor.damping",
 }
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered():
-    for mechanism in (rotor_on_cart.MECHANISM, torsion.MECHANISM):
-        register(mechanism)
-    yield
-    for mechanism in (rotor_on_cart.MECHANISM, torsion.MECHANISM):
-        del MECHANISMS[mechanism.name]
 
 
 def wish(**of):

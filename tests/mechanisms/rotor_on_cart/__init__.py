@@ -125,15 +125,7 @@ MECHANISM = Mechanism(
     position_parameters=("initial.rotor_angle", "initial.cart_position"),
     experiment=(0.0, 1.0, 1e-3, 1e-9),
     modules=(equations,),
-    equations=Equations(
-        applied=equations.applied,
-        derivative=equations.derivative,
-        outputs=equations.outputs,
-        clearance=equations.clearance,
-        jump=equations.jump,
-        start=equations.start,
-        energy=equations.energy,
-    ),
+    equations=Equations(*(getattr(equations, name) for name in Equations._fields)),
     check_assembly=lambda parameters, x: None,
     error_scale=equations.error_scale,
 )
