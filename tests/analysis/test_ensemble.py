@@ -296,7 +296,7 @@ def test_an_interrupt_is_heard_and_keeps_what_was_done(n_jobs: int | None, tmp_p
         EnsembleInterrupted, match=r"interrupted with 2 of 8 runs done; whole batches are kept in "
     ) as caught:
         simulate_many([TABLE_3_1] * 8, inputs, n_jobs=n_jobs, **options)
-    assert perf_counter() - begun < 3.0
+    assert perf_counter() - begun < 10.0
     many = caught.value.ensemble
     assert many.status.tolist() == [0, 0] + [-1] * 6
     assert many.counts[:2].tolist() == [101, 101]
