@@ -166,6 +166,41 @@ def test_what_is_not_the_page_is_refused(
     assert server.worker.look() == {"state": "idle"}
 
 
+HEAD = "Host: 127.0.0.1:{port}\r\nX-Linkwork-Token: {token}\r\nConnection: close\r\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        pytest.param("\0\1\2\r\n\r\n", 400, id="no request"),
+        pytest.param("HELLO\r\n\r\n", 400, id="no version"),
+        pytest.param("GET /\r\n\r\n", 421, id="no head"),
+        pytest.param(f"GET /\xff\xfe HTTP/1.1\r\n{HEAD}\r\n", 400, id="no place"),
+        pytest.param(f"GET /job HTTP/1.1\r\n{HEAD}Host: evil.example\r\n\r\n", 421, id="two hosts"),
+        pytest.param(f"GET /job HTTP/1.1\r\n{HEAD}X-Linkwork-Token: guessed\r\n\r\n", 401, id="two tokens"),
+        pytest.param(
+            "GET /job HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nX_Linkwork_Token: {token}\r\n\r\n", 401, id="underscores"
+        ),
+        pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: -5\r\n\r\n", 400, id="negative length"),
+        pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: 99999999999\r\n\r\n", 413, id="length of a liar"),
+        pytest.param(f"POST /job HTTP/1.1\r\n{HEAD}Transfer-Encoding: chunked\r\n\r\nzz\r\n", 400, id="no chunk"),
+        pytest.param(
+            f"POST /job HTTP/1.1\r\n{HEAD}Content-Length: 9\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+            415,
+            id="two lengths",
+        ),
+    ],
+)
+def test_what_is_no_request_is_refused(server: Server, text: str, status: int) -> None:
+    filled = text.replace("{port}", str(server.port)).replace("{token}", server.application.token)
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+        connection.sendall(filled.encode("latin-1"))
+        answer = connection.recv(4096).decode("latin-1")
+    assert re.match(rf"HTTP/1\.[01] {status} ", answer)
+    assert server.application.token not in answer
+    assert _job(server) == (200, {"state": "idle"})
+
+
 def test_a_connection_that_says_nothing_holds_up_nobody(server: Server) -> None:
     with socket.create_connection(("127.0.0.1", server.port)) as slow:
         slow.sendall(b"POST /job HTTP/1.1\r\nContent-Length: 400000\r\n\r\n{")
