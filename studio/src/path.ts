@@ -2,15 +2,13 @@
 
 import type { Rows } from "./core";
 import { button, type Child, line, make, number, part, tick, Wrong } from "./elements";
-import { pointsOf, textOf } from "./points";
+import { pointsOf, soundPath, textOf } from "./points";
 import { resampled, type Sketch } from "./sketch";
 import { jointAt, type Mechanism, outputAt, rowLength } from "./tables";
 import type { Point } from "./view";
 
 /** Points of a path that is taken from the mechanism. */
 const POINTS = 72;
-/** Of a path, at least. */
-const LEAST = 3;
 
 export interface PathForm {
   mechanism: Mechanism;
@@ -24,7 +22,8 @@ export interface PathForm {
   wrong: (found: Wrong | undefined) => void;
 }
 
-export function pathPart(form: PathForm): HTMLElement {
+/** The path as it is drawn and written: what stands in the form, and what is wanted of Python. */
+function drawing(form: PathForm): { rows: Child[]; target: () => object } {
   const { mechanism, sketch } = form;
   const svg = document.getElementById("picture")!;
   const draw = button("Draw a path on the picture", () => sketch.listen(!sketch.listening));
@@ -57,23 +56,18 @@ export function pathPart(form: PathForm): HTMLElement {
   const target = (): object => {
     if (wrong) throw wrong;
     const { closed } = sketch;
-    const ends = [sketch.points[0], sketch.points[sketch.points.length - 1]];
-    // a closed path that was written with its first point again at the end
-    const again = closed && sketch.points.length > LEAST && ends[0].join() === ends[1].join();
-    const all = again ? sketch.points.slice(0, -1) : sketch.points;
-    const count = all.length;
-    if (count === 0)
-      throw new Wrong("Draw a path first, or take that of the mechanism: there is none yet", draw);
-    if (count < LEAST)
-      throw new Wrong(
-        `The path has ${count} point${count === 1 ? "" : "s"}: it needs at least ${LEAST}`,
-        points,
-      );
-    const same = all.findIndex((point, n) => n > 0 && point.join() === all[n - 1].join());
-    if (same > 0)
-      throw new Wrong(`Points ${same} and ${same + 1} of the path are the same: take one away`, points);
-    return { points: all, closed };
+    return { points: soundPath(sketch.points, closed), closed };
   };
+  const take = button("Take the path of the mechanism", () => {
+    const found = ownPath(mechanism, form.rows());
+    if (found) sketch.put(found, true);
+  });
+  const written = make("details", {}, make("summary", { textContent: "Its points" }), points);
+  return { rows: [line(draw, take, closed), written], target };
+}
+
+export function pathPart(form: PathForm): HTMLElement {
+  const { rows, target } = drawing(form);
   const [angle, leastAngle] = number("transmission angle at least", "deg", 40, { least: 0, below: 90 });
   const [longest, longestLink] = number("longest link", "mm", "", { above: 0, missing: Infinity });
   const [harmonics, count] = number("harmonics", "", 2, { least: 1, whole: true });
@@ -99,18 +93,14 @@ export function pathPart(form: PathForm): HTMLElement {
     ...length("stroke", greatest()),
     harmonics: count(),
   }));
-  const moves = mechanism.given.some((given) => given.name === "initial.slider_position");
-  const take = button("Take the path of the mechanism", () => {
-    const found = ownPath(mechanism, form.rows());
-    if (found) sketch.put(found, true);
-  });
-  const rows: Child[] = [
-    line(draw, take, closed),
-    make("details", {}, make("summary", { textContent: "Its points" }), points),
+  const moves = form.mechanism.given.some((given) => given.name === "initial.slider_position");
+  return part(
+    "A path",
+    ...rows,
     line(linkages, ...kinds.map(({ box }) => box[0])),
     line(angle, longest),
-  ];
-  return part("A path", ...rows, ...(moves ? [line(slider, harmonics, stroke)] : []));
+    ...(moves ? [line(slider, harmonics, stroke)] : []),
+  );
 }
 
 /** The path of the mechanism's own point, to be changed by its points. */

@@ -19,3 +19,19 @@ export function pointsOf(text: string): Point[] {
 
 export const textOf = (points: Point[]): string =>
   points.map((point) => point.map((value) => digits(1e3 * value, 7)).join(" ")).join("\n");
+
+/** Of a path, at least. */
+const LEAST = 3;
+
+/** The points of a path that can be searched for; of a closed one that ends with its first point again without that. */
+export function soundPath(points: Point[], closed: boolean): Point[] {
+  const same = (n: number, m: number): boolean => points[n].join() === points[m].join();
+  const all = closed && points.length > LEAST && same(0, points.length - 1) ? points.slice(0, -1) : points;
+  const count = all.length;
+  if (count === 0) throw new Wrong("Draw a path first, or take that of the mechanism: there is none yet");
+  if (count < LEAST)
+    throw new Wrong(`The path has ${count} point${count === 1 ? "" : "s"}: it needs at least ${LEAST}`);
+  const again = all.findIndex((_, n) => n > 0 && same(n, n - 1));
+  if (again > 0) throw new Wrong(`Points ${again} and ${again + 1} of the path are the same: take one away`);
+  return all;
+}

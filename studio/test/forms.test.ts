@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { numberOf, Wrong } from "../src/elements";
-import { pointsOf, textOf } from "../src/points";
+import { pointsOf, soundPath, textOf } from "../src/points";
 
 test("a field says what is wrong with its number, and what would be right", () => {
   assert.equal(numberOf(" 2.5 ", "stroke", "mm", { above: 0 }), 2.5);
@@ -32,4 +32,17 @@ test("points are read line by line, and the first line that is none is named", (
   // written and read again they are the same, to a nanometre
   const points = pointsOf("123.4567 -0.25");
   assert.deepEqual(pointsOf(textOf(points)), points);
+});
+
+test("a path has points that differ, and a closed one does not end where it began", () => {
+  const points = pointsOf("0 0\n1 0\n1 1\n0 0");
+  assert.deepEqual(soundPath(points, true), points.slice(0, 3));
+  assert.deepEqual(soundPath(points, false), points);
+  const cases: [string, RegExp][] = [
+    ["", /Draw a path first/],
+    ["1 1", /has 1 point: it needs at least 3/],
+    ["0 0\n1 0", /has 2 points/],
+    ["0 0\n1 0\n1 0\n0 1", /Points 2 and 3 of the path are the same/],
+  ];
+  for (const [text, message] of cases) assert.throws(() => soundPath(pointsOf(text), true), message);
 });
