@@ -98,7 +98,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
     title = f"{case.title}, tuned"
     changed = state_of(replace(case, title=title, parameters=tuned.parameters))
     words = f"Verified: {tuned.verification}." if tuned.met else " ".join(f"{sentence}." for sentence in tuned.missed)
-    table = {"headings": ["", "before", "after", ""], "rows": rows}
+    table = {"headings": ["what", "before", "after", "change"], "rows": rows}
     return {"words": words, "table": table, "states": [changed], "met": tuned.met}
 
 

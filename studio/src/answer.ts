@@ -51,8 +51,8 @@ export function tableOf(answer: Answer, wanted: Point[], last?: (row: number) =>
   const head = made.createTHead().insertRow();
   // under a picture there is room for buttons, which a phone shows first
   const atEnd = last && !answer.pictures;
-  for (const text of [...headings, ...(atEnd ? [""] : [])])
-    head.append(make("th", { textContent: text, scope: "col" }));
+  for (const text of headings) head.append(make("th", { textContent: text, scope: "col" }));
+  if (atEnd) head.insertCell();
   const body = made.createTBody();
   rows.forEach((cells, n) => {
     const row = body.insertRow();

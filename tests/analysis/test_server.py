@@ -378,6 +378,7 @@ def test_linkages_of_every_kind_are_drawn_and_go_on_from_their_files() -> None:
     np.testing.assert_array_equal(task.task.path.points, ELLIPSE)
     assert task.constraints == (LeastTransmission(),)
     assert list(task.search.kinds or ()) == wanted["kinds"]
+    assert all(found["table"]["headings"])
     verdicts = [row[5] for row in found["table"]["rows"]]
     for state, files, verdict in zip(found["states"], found["table"]["files"], verdicts, strict=True):
         if state is not None:
@@ -740,6 +741,8 @@ def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> Non
     page.click("text=Change least")
     page.wait_for_selector("text=Take it over")
     before = _values(page)["slider.stiffness"]
+    # a reader of the screen says what a column is of
+    assert page.locator("#python th").all_inner_texts() == ["what", "before", "after", "change"]
     page.click("text=Take it over")
     _wait(page, "window.studio.state.title.endsWith('tuned')")
     # as a search for the stiffness at which the maximum is there finds it, in the tests of the tuning
