@@ -281,13 +281,13 @@ class Encoded:
         A signal whose rate counts, a commanded speed, has to be so by its rate: its value counts at the beginning of an
         interval only.
         """
-        moving = self.source.coefficients[:, :, 1:].copy()
-        moving[:, self.source.places[:, 1] >= 0, 0] = 0.0
-        return bool(
-            len(self.source.harmonics) == 0
-            and self.source.law[3] == 0.0
-            and not any(chain.from_iterable(self.functions))
-            and np.all(moving == 0.0)
+        slopes, bends = self.source.coefficients[:, :, 1], self.source.coefficients[:, :, 2:]
+        return not (
+            len(self.source.harmonics)
+            or self.source.law[3]
+            or any(chain.from_iterable(self.functions))
+            or bends.any()
+            or slopes[:, self.source.places[:, 1] < 0].any()
         )
 
     def value_name(self, channel: int) -> str:
