@@ -1,7 +1,5 @@
-"""Areas and distances between curves, and the flatness of straight parts.
-
-Published linkages: A. H. Youssef's thesis, chapter VI, in the convention of its appendix 5. The coupler curves are written
-here from the formula, without the package's kinematics.
+"""Areas and distances between curves, and the flatness of straight parts; of published linkages see
+`test_published_synthesis`.
 """
 
 from __future__ import annotations
@@ -29,29 +27,6 @@ from linkwork.errors import InputError
 
 FloatArray = NDArray[np.float64]
 
-# X0, Y0, l1, l2, l3, l4, r (cm), a1, th20, a2 (deg); X0 of path a printed as 154.85, l4 of path b as 183.443
-PATH_A = (15.485, -62.54, 80.216, 5.03, 139.25, 129.46, 77.75, -93.22, 100.41, 113.83)
-PATH_B = (-49.13, 144.98, 142.576, 8.18, 152.743, 184.443, 147.38, -3.062, -31.19, -136.04)
-# the packaging machine (mm); no th20 is printed
-PACKAGING = (94.53, -48.55, 137.54, 36.05, 134.05, 40.06, 435.15, 116.73, 0.0, 345.01)
-# appendix 5, offset by (51, 350); the third x and the sixth are uncertain in the scan
-TEN_POINTS = np.array(
-    [(164, 8), (164, 0), (160, 0), (50, 0), (10, 0), (0, 31), (0, 61), (45, 61), (92, 61), (128, 34.5)]
-) + np.array([51.0, 350.0])
-
-
-def coupler_curve(linkage: tuple[float, ...], n: int, side: int = 1) -> FloatArray:
-    """P over a turn of the crank at n equal steps, C to the left (+1) or right of B->D, by intersecting two circles."""
-    x0, y0, l1, l2, l3, l4, r, *angles = linkage
-    a1, th20, a2 = np.radians(angles)
-    th2 = th20 + np.linspace(0.0, 2.0 * pi, n, endpoint=False)
-    b = l2 * np.exp(1j * th2)
-    bd = l1 - b
-    along = (l3**2 - l4**2 + np.abs(bd) ** 2) / (2.0 * np.abs(bd))
-    bc = (along + 1j * side * np.sqrt(l3**2 - along**2)) * bd / np.abs(bd)
-    p = x0 + 1j * y0 + (b + r * bc / np.abs(bc) * np.exp(1j * a2)) * np.exp(1j * a1)
-    return np.column_stack([p.real, p.imag])
-
 
 def circle(radius: float, n: int = 720, centre: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
     t = np.linspace(0.0, 2.0 * pi, n, endpoint=False)
@@ -69,35 +44,6 @@ def open_target(*points: tuple[float, float]) -> TargetPath:
 
 def closed_target(points: FloatArray) -> TargetPath:
     return TargetPath(points=points, closed=True)
-
-
-# Published numbers
-
-
-@pytest.mark.parametrize(
-    ("linkage", "axis", "area"), [(PATH_A, 10, 3.11), (PATH_B, 15, 12.61)], ids=["path a", "path b"]
-)
-def test_area_of_the_printed_linkages(linkage: tuple[float, ...], axis: float, area: float) -> None:
-    """Path generation of chapter VI, 360 points of each curve, cm2: printed 2.3 and 12.6."""
-    target = path_from_formula(f"20 + {axis}*cos(t)", "15 + 5*sin(t)", n=360)
-    assert area_between(coupler_curve(linkage, 360), target) == pytest.approx(area, abs=5e-3)
-    # the other assembly is another curve
-    assert area_between(coupler_curve(linkage, 360, side=-1), target) > 100.0
-
-
-def test_packaging_machine() -> None:
-    """Travel 175.8 and flatness 6.99 within 120 deg, area 1444: 5 deg steps, C to the right of B->D, the ten points closed."""
-    curve = coupler_curve(PACKAGING, 72, side=-1)
-    target = closed_target(TEN_POINTS)
-    assert area_between(curve, target) == pytest.approx(1444.0, abs=0.5)
-    part = straightest_part(curve, 25, direction=0.0, least_travel=140.0)
-    assert part.start == 15  # th2 from 75 to 195 deg
-    assert part.travel == pytest.approx(175.8, abs=0.05)
-    assert part.flatness == pytest.approx(6.99, abs=5e-3)
-    # the sixth point read as (10, 31) does not give the area
-    other = TEN_POINTS.copy()
-    other[5, 0] = 61.0
-    assert area_between(curve, closed_target(other)) > 1700.0
 
 
 # Area

@@ -272,19 +272,8 @@ def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
 
 
 def test_the_command(tmp_path: Path) -> None:
-    arguments = [
-        "basins",
-        "--published",
-        "rig-1-spring-b",
-        "--speed",
-        "1000 rpm",
-        "--points",
-        "4",
-        "--html",
-        "--out",
-        str(tmp_path),
-    ]
-    done = CliRunner().invoke(main, arguments)
+    arguments = ["basins", "--published", "rig-1-spring-b", "--speed", "1000 rpm", "--points", "4", "--html"]
+    done = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "two methods found the same motions" in done.output
     assert "of 16 starts end" in done.output

@@ -147,10 +147,6 @@ def test_work_over_a_period_is_what_is_dissipated(orbit: PeriodicOrbit) -> None:
     assert turn["drive.applied_torque"].mean() == pytest.approx(lost, rel=1e-7)
 
 
-def test_loop_stays_closed(orbit: PeriodicOrbit) -> None:
-    assert np.abs(orbit.turn()["closure.residual"]).max() < 1e-14
-
-
 def test_turn_is_that_of_a_run() -> None:
     orbit = find_orbit(GENERAL, torque=MOTOR)
     turn = orbit.turn(1024)

@@ -29,19 +29,19 @@ def compiled(folder: Path, name: str, description: str, platform: str) -> Path:
 
     library = folder / f"{name}{ENDING}"
     headers = Path(fmpy.__file__).parent / "c-code"
-    compiler = [
+    options = ["-shared", "-fPIC", "-O1", "-std=c11", "-Wall", "-fno-sanitize=all"]
+    command = [
         sys.executable,
         "-m",
         "ziglang",
         "cc",
-        "-shared",
-        "-fPIC",
-        "-O1",
-        "-std=c11",
-        "-Wall",
-        "-fno-sanitize=all",
+        *options,
+        f"-I{headers}",
+        SOURCES / f"{name}.c",
+        "-o",
+        library,
+        "-lm",
     ]
-    command = [*compiler, f"-I{headers}", SOURCES / f"{name}.c", "-o", library, "-lm"]
     made = subprocess.run(command, capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
     path = folder / f"{name}.fmu"

@@ -24,7 +24,6 @@ from analysis.synthesis import (
     RockerFunction,
     Search,
     Synthesis,
-    TimedPath,
     UntimedPath,
     area_between,
     evaluate,
@@ -270,18 +269,6 @@ def test_error_against_transmission_angle(name: str) -> None:
     last = found.solutions[-1]
     assert last is not None
     assert last.linkage.least_transmission == pytest.approx(angles[-1], abs=1e-4)
-
-
-def test_targets() -> None:
-    for name, axis in TIMED.items():
-        task = PROBLEMS[name].task
-        assert isinstance(task, TimedPath)
-        x, y = 100.0 * np.asarray(task.points).T
-        assert ((x - 20.0) / axis) ** 2 + ((y - 15.0) / 5.0) ** 2 == pytest.approx(np.ones(72))
-        assert (x[0], y[18]) == pytest.approx((20.0 + axis, 20.0))
-    task = PROBLEMS["rocker"].task
-    assert isinstance(task, RockerFunction)
-    assert np.degrees(np.asarray(task.angle)[[0, 12, 36]]) == pytest.approx([70.0, 120.0, 170.0])
 
 
 def test_what_the_thesis_bounds() -> None:

@@ -118,18 +118,7 @@ def run_host(
     plan += [f"o {at[name]}" for name in outputs]
     if resources is None:
         resources = (fmu.folder / "resources").as_uri() + ("/" if fmu.fmi == 3 else "")
-    arguments = [
-        str(fmu.library),
-        fmu.fmi,
-        interface,
-        fmu.token,
-        resources,
-        fmu.states,
-        steps,
-        step,
-        instances,
-        threads,
-    ]
+    arguments = [fmu.library, fmu.fmi, interface, fmu.token, resources, fmu.states, steps, step, instances, threads]
     with tempfile.TemporaryDirectory(prefix="linkwork-host-") as folder:
         done = subprocess.run(
             [*emulator, str(host), *map(str, arguments)],
