@@ -225,7 +225,8 @@ class Refinement:
         across = (slopes * normal[:, :, None]).sum(axis=0)[:, self.free]
         size, directions = np.linalg.eigh(np.einsum("ni,nj->ij", across, across) / CURVE)
         stretch = np.zeros((slopes.shape[2], len(self.free)))
-        stretch[self.free] = directions / np.sqrt(np.maximum(size, 0.0) + STIFF * size.max())
+        # of a point that nothing moves, such as the crank pin, all directions are as good
+        stretch[self.free] = directions / np.sqrt(np.maximum(size, 0.0) + STIFF * (size.max() or 1.0))
         return stretch
 
     def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:

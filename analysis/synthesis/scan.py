@@ -55,7 +55,7 @@ APART = 0.08
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidates:
-    """Rows of candidates: quality (m,), vectors of the eleven unknowns (m, 11), rotations (m, n) or None, their branch.
+    """Rows of candidates: quality (m,), finite where placed, eleven unknowns (m, 11), rotations (m, n) or None, their branch.
 
     With a second crank its length and phase, ``pivot`` (m, 2).
     """
@@ -281,7 +281,7 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
     q = np.zeros((len(shapes), 11))
     q[:, 2:6] = size[:, None] * links[:, :4]
     q[:, 8], q[:, 10] = phase, offset
-    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=None, branch=branch)
+    return Candidates(quality=quality, q=q, rotation=None, branch=branch)
 
 
 def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
@@ -305,7 +305,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
     q[:, 1] = -normal.origin.imag / normal.unit - side * size * links[:, 0]
     q[:, 2:6] = size[:, None] * links[:, :4]
     q[:, 6], q[:, 7], q[:, 8] = size * links[:, 2], 0.5 * pi * side, phase
-    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=None, branch=branch)
+    return Candidates(quality=quality, q=q, rotation=None, branch=branch)
 
 
 def _timed(
@@ -360,8 +360,9 @@ def _timed(
             offset,
         ]
     )
-    quality = np.nan_to_num((w * error).sum(axis=1), nan=inf)
-    return Candidates(quality=quality, q=q, rotation=None if random is None else rotation, branch=branch)
+    return Candidates(
+        quality=(w * error).sum(axis=1), q=q, rotation=None if random is None else rotation, branch=branch
+    )
 
 
 def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
@@ -440,7 +441,7 @@ def _closed_paths(
     quality = np.full(len(curves), inf)
     quality[chosen] = misfit[chosen] * normal.weights.sum() / EVEN
     q = _vectors(links, bounded, scale, place, point)
-    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=rotations, branch=branch)
+    return Candidates(quality=quality, q=q, rotation=rotations, branch=branch)
 
 
 def _open_paths(
@@ -479,7 +480,7 @@ def _open_paths(
             place = (normal.weights * (normal.points - scales[0] * piece)).sum() / normal.weights.sum()
         quality[i] = (normal.weights * np.abs(place + scales[0] * piece - normal.points) ** 2).sum()
         q[i] = _vectors(links[i : i + 1], bounded, scales, np.array([place]), point[i : i + 1])[0]
-    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=rotations, branch=branch)
+    return Candidates(quality=quality, q=q, rotation=rotations, branch=branch)
 
 
 def _bounded(

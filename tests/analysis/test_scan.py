@@ -252,6 +252,15 @@ class TestStarts:
             linkage = linkage_of(start, normal)
             assert evaluate(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
 
+    @pytest.mark.parametrize("closed", [True, False])
+    def test_more_than_could_be_placed_are_those_that_were(self, closed: bool) -> None:
+        path = TargetPath(points=KNOWN.path(turn(36))[: None if closed else 12], closed=closed)
+        normal, limits = stated(UntimedPath(path=path), LargestLink(length=2.0))
+        starts = scan(normal, limits, seed=1, candidates=4096, starts=4096)
+        assert 0 < len(starts) < 1000
+        assert max(s.quality for s in starts) < 1e6
+        assert all(np.isfinite(s.rotation).all() for s in starts if s.rotation is not None)
+
     def test_the_same_seed_gives_the_same_and_another_others(self) -> None:
         normal, limits = stated(TimedPath(points=KNOWN.path(turn(18))), LeastTransmission())
         a, b, c = (scan(normal, limits, seed=seed, candidates=4096, starts=5) for seed in (1, 1, 2))

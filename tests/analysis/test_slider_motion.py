@@ -473,6 +473,13 @@ def test_a_linkage_scaled_and_moved_gets_the_same_motion() -> None:
     assert there.error == pytest.approx(1e6 * here.error, rel=1e-5)
 
 
+def test_the_path_of_the_crank_pin_is_left_as_it_is() -> None:
+    pin = Linkage(ground_length=0.16, crank_length=0.05, coupler_length=0.15, rocker_length=0.15, point_distance=0.0)
+    task = UntimedPath(path=TargetPath(points=pin.path(turn(24)) * [0.9, 1.0], closed=True))
+    moved = slider_motion(task, pin, SliderUnknown(harmonics=1, stroke=0.02), search=Search(starts=2))
+    assert moved.best.error == pytest.approx(evaluate(task, pin).error)
+
+
 def test_what_cannot_be_joined_is_infeasible() -> None:
     unknown = SliderUnknown(harmonics=1, position=(0.5, 0.6), guide_angle=(0.0, 0.0))
     with pytest.raises(InfeasibleError, match="no linkage keeps all bounds and constraints"):
