@@ -8,11 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from build_fmu import FMUS
 
 from .mechanisms import pendulum, rotor_on_cart
+
+# a drawn example has no time limit: the first of a run loads libraries, and machines are loaded
+settings.register_profile("unhurried", settings.default, deadline=None)
+settings.load_profile("unhurried")
 
 #: The units of work that tests are sent to workers in, by their names: a file, whose tests share results, and each page of the
 #: documentation.
