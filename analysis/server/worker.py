@@ -182,8 +182,7 @@ class _Terminal(io.TextIOBase):
         if text.startswith(_NOTE):
             self.teller.last = -inf
             self.teller(text.removeprefix(_NOTE).strip().removesuffix(" ..."), 0.0)
-        written = sys.__stderr__.write(text) if sys.__stderr__ else len(text)
-        return written
+        return sys.__stderr__.write(text) if sys.__stderr__ else len(text)
 
 
 def _answer(do: Any, kind: str, request: Mapping[str, Any], teller: _Teller) -> dict[str, Any]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from linkwork.errors import InputError, ParameterError
 
 from ..files import unknown_name
+from ..mechanisms import Kind as Kind
 from ..units import Amount, in_si
 from .constraints import (
     SECOND_LENGTH,
@@ -35,7 +36,6 @@ from .linkage import Linkage, SecondCrank
 from .starts import CrankUnknown
 from .tasks import Normal, RockerFunction, SliderFunction, Task
 
-Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]
 #: Ratios of the gears of a five-bar that are tried.
 GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
 

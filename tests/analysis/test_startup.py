@@ -19,6 +19,7 @@ HEAVY = ("numba", "matplotlib", "scipy", "casadi", "pint", "joblib", "fmpy", "co
     [
         "import analysis",
         "import analysis.figures",
+        "import analysis.server",
         "from analysis.cli import main; main(['--version'], standalone_mode=False)",
         "from analysis.cli import main; main(['--help'], standalone_mode=False)",
     ],
