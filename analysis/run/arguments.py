@@ -84,8 +84,7 @@ def takes_options(kind: type) -> Callable[[_Function], _Function]:
     """
 
     def decorate(function: _Function) -> _Function:
-        known = (*signature(function).parameters, *kind.__annotations__)
-        known = tuple(name for name in known if name != "options")
+        known = tuple(name for name in (*signature(function).parameters, *kind.__annotations__) if name != "options")
 
         @wraps(function)
         def checked(*arguments: Any, **options: Any) -> Any:

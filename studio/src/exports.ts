@@ -3,9 +3,7 @@
 import type { Orbit, Rows } from "./core";
 import { dxfText } from "./dxf";
 import type { Drawn } from "./picture";
-import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables } from "./tables";
-
-const value = (given: Given, state: State): number => state.values[given.name] ?? given.start;
+import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables, valueOf } from "./tables";
 
 /** A number as TOML and Python read it, with every digit. */
 function written(number: number): string {
@@ -17,7 +15,7 @@ function written(number: number): string {
 export function caseText(m: Mechanism, state: State, duration: number): string {
   const lines = [`mechanism = ${JSON.stringify(m.name)}`, `title = ${JSON.stringify(state.title)}`];
   const modes = m.given.filter((g) => g.arguments);
-  const chosen = modes.map((mode) => mode.arguments![value(mode, state)]);
+  const chosen = modes.map((mode) => mode.arguments![valueOf(mode, state.values)]);
   const inputs = m.given.filter((g) => g.argument !== undefined);
   const forced = new Set(inputs.filter((g) => g.kind === "force").map((g) => g.argument!));
   // a rate at the start is that of a freedom that a force drives
@@ -27,15 +25,15 @@ export function caseText(m: Mechanism, state: State, duration: number): string {
   });
   const idle = new Set(m.freedoms.flatMap(({ initial }, n) => (free[n] ? [] : [initial[1]])));
   const motor = m.given.filter((g) => g.kind === "motor");
-  const law = motor.map((g) => `${g.file!} = ${written(value(g, state))}`).join(", ");
+  const law = motor.map((g) => `${g.file!} = ${written(valueOf(g, state.values))}`).join(", ");
   // what acts: a motor beside the torque that is given
   const acting = (g: Given, now: number): string =>
-    g.argument === motor[0]?.argument && value(motor[0], state) !== 0
+    g.argument === motor[0]?.argument && valueOf(motor[0], state.values) !== 0
       ? `[${written(now)}, { kind = "induction-motor", ${law} }]`
       : written(now);
   for (const given of m.given) {
     if (given.kind === "motor") continue;
-    const now = value(given, state);
+    const now = valueOf(given, state.values);
     if (given.arguments) {
       const flag = chosen[modes.indexOf(given)];
       if (!inputs.some((g) => g.argument === flag)) lines.push(`${given.name.split(".")[0]}.${flag} = true`);
@@ -80,7 +78,7 @@ export function parameterText(m: Mechanism, state: State): string {
   // a motor of the page has no value reference: it is none of the FMU's
   const known = m.given.filter((given) => given.reference >= 0);
   const lines = known.map((given) => {
-    const now = value(given, state);
+    const now = valueOf(given, state.values);
     const written = given.choices ? `<ssv:Integer value="${now}"/>` : `<ssv:Real value="${now}"/>`;
     return `    <ssv:Parameter name="${escaped(given.name)}">${written}</ssv:Parameter>`;
   });

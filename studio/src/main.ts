@@ -22,6 +22,7 @@ import {
   type Source,
   type State,
   type Tables,
+  valueOf,
 } from "./tables";
 import { called, capital, motionInWords, roundingOf } from "./words";
 import { Views } from "./views";
@@ -204,7 +205,7 @@ class Studio {
   }
 
   private value(given: Given): number {
-    return this.state.values[given.name] ?? given.start;
+    return valueOf(given, this.state.values);
   }
 
   private answered(answer: Answer, newest: boolean): void {

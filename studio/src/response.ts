@@ -3,8 +3,8 @@
 import { amplitudeAt, type Arc, arcsOf, type Avoided, type Interval, jumpsOf, rangesToAvoid } from "./avoid";
 import type { Found, Point } from "./explore";
 import { type Go, Search } from "./search";
-import { type Context, driving, swinging, valueOf } from "./varied";
-import type { Given } from "./tables";
+import { type Context, driving, swinging } from "./varied";
+import { type Given, valueOf } from "./tables";
 import { called, digits, shown } from "./words";
 
 const HEIGHT = 260;

@@ -3,8 +3,8 @@
 import type { Exploration, Found } from "./explore";
 import { Explorer } from "./explorer";
 import { Plane } from "./plane";
-import { type Given, type Mechanism, type Range, type Values, givenOf } from "./tables";
-import { type Context, valueOf, variables } from "./varied";
+import { type Given, type Mechanism, type Range, type Values, givenOf, valueOf } from "./tables";
+import { type Context, variables } from "./varied";
 import { called, digits } from "./words";
 
 /** How long all must stay as it is before a search begins anew (ms). */

@@ -2,8 +2,8 @@
 
 import { type Cell, type Found, middle } from "./explore";
 import { type Go, Search } from "./search";
-import { type Context, driving, valueOf } from "./varied";
-import type { Given } from "./tables";
+import { type Context, driving } from "./varied";
+import { type Given, valueOf } from "./tables";
 import { called, multiplierInWords, shown, verdictInWords } from "./words";
 
 const HEIGHT = 300;

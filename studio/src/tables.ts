@@ -146,9 +146,12 @@ export const rowLength = (m: Mechanism): number =>
 export const outputAt = (m: Mechanism, output: number): number => 1 + m.states + output;
 export const jointAt = (m: Mechanism, joint: number): number => 1 + m.states + m.outputs.length + 3 * joint;
 
+/** A value, or what it starts from where a state leaves it out. */
+export const valueOf = (given: Given, values: Values): number => values[given.name] ?? given.start;
+
 /** All that is given, by value reference, with the start values of what a state leaves out. */
 export function givenOf(m: Mechanism, values: Values): [number, number][] {
-  return [m.tolerance, ...m.given.map((g): [number, number] => [g.reference, values[g.name] ?? g.start])];
+  return [m.tolerance, ...m.given.map((g): [number, number] => [g.reference, valueOf(g, values)])];
 }
 
 const isNumber = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);

@@ -1,7 +1,7 @@
 /** What can vary of a mechanism under the values that it has, and what swings then. */
 
 import type { Orbit } from "./core";
-import type { Given, Mechanism, Output, Values } from "./tables";
+import { type Given, type Mechanism, type Output, type Values, valueOf } from "./tables";
 
 export interface Context {
   mechanism: Mechanism;
@@ -9,8 +9,6 @@ export interface Context {
   orbit: Orbit;
   natural: number;
 }
-
-export const valueOf = (given: Given, values: Values): number => values[given.name] ?? given.start;
 
 /** What can vary: real parameters, and inputs that act. */
 export function variables({ mechanism, values }: Context): Given[] {

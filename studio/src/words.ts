@@ -1,7 +1,7 @@
 /** Numbers and verdicts in words. */
 
 import type { Orbit, Rows } from "./core";
-import { type Given, type Mechanism, type Output, outputAt, rowLength, type Values } from "./tables";
+import { type Given, type Mechanism, type Output, outputAt, rowLength, type Values, valueOf } from "./tables";
 
 /** A number as people read it, with so many digits. */
 export function digits(value: number, count = 4): string {
@@ -76,14 +76,15 @@ export function plainly(sentence: string, m?: Mechanism): string {
 
 /** Where the crank is driven by a torque, whether there is one: of an input or of a motor. */
 export function isDriven(m: Mechanism, values: Values): boolean {
-  const value = (given: Given): number => values[given.name] ?? given.start;
   const mode = m.given.find((given) => m.crank >= 0 && given.reference === m.freedoms[m.crank].mode);
-  const chosen = mode?.arguments?.[value(mode)];
+  const chosen = mode?.arguments?.[valueOf(mode, values)];
   const torques = m.given.filter((given) => given.argument === chosen);
   const forced = torques.some((given) => given.kind === "force");
   return (
     !forced ||
-    torques.some((given) => value(given) !== 0 && (given.kind === "force" || given.reference === -1))
+    torques.some(
+      (given) => valueOf(given, values) !== 0 && (given.kind === "force" || given.reference === -1),
+    )
   );
 }
 
