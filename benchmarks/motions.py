@@ -18,11 +18,11 @@ import numpy as np
 
 from analysis.mechanisms import mechanism_of
 from analysis.periodic import Drive, OrbitError, natural_frequency, orbit_of, orbits_of, scale_of
-from analysis.periodic.finder import passages
-from analysis.periodic.flows import PLAIN
-from analysis.periodic.orbit_kernels import period
-from analysis.periodic.orbits import section_of
-from analysis.periodic.starts import starts_of
+from analysis.periodic.motion.discretisation import section_of
+from analysis.periodic.motion.drive import starts_of
+from analysis.periodic.motion.flow import PLAIN
+from analysis.periodic.motion.kernels import period
+from analysis.periodic.motion.search import passages
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import LinkworkError
 from linkwork.five_bar.published import SETS

@@ -82,7 +82,7 @@ def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, A
 
 def nothing(_: int) -> None:
     """Work that makes the workers import what they need."""
-    import analysis.periodic.grids
+    import analysis.periodic.chart.grid
     import analysis.run.compiled
     import analysis.slider_crank
     import analysis.synthesis  # noqa: F401

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis import figures
 from analysis.numerics.continuation import ContinuationError
 from analysis.periodic import Branch, Crossing, Drive, Family, OrbitError, Stability, find_orbit, follow, switch
-from analysis.periodic.branches import _of_a_turn
+from analysis.periodic.response.branch import _of_a_turn
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1

@@ -16,16 +16,16 @@ from analysis.periodic import (
     Family,
     Stability,
     StabilityChart,
-    charts,
     default_range,
     find_orbit,
     follow,
-    grids,
     natural_frequency,
     orbit_of,
     points_to_confirm,
     stability_chart,
 )
+from analysis.periodic.chart import chart as charts
+from analysis.periodic.chart import grid as grids
 from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1

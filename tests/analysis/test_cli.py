@@ -19,7 +19,9 @@ from analysis import Inputs, cli, export
 from analysis.export.description import KINDS, description
 from analysis.files import tables
 from analysis.mechanisms import FIVE_BAR
-from analysis.periodic import charts, find_orbit, find_orbits, grids
+from analysis.periodic import find_orbit, find_orbits
+from analysis.periodic.chart import chart as charts
+from analysis.periodic.chart import grid as grids
 from analysis.run import save_parameters
 from build_fmu import FMUS
 from linkwork.five_bar.published import SETS, TABLE_3_1

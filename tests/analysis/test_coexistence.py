@@ -24,7 +24,6 @@ from analysis.periodic import (
     GridInterrupted,
     Stability,
     basins,
-    charts,
     coexistence,
     find_orbits,
     frequency_response,
@@ -33,13 +32,14 @@ from analysis.periodic import (
     stability_chart,
     with_isolas,
 )
-from analysis.periodic.lines import branches_on
+from analysis.periodic.chart import chart as charts
+from analysis.periodic.chart.boundary import branches_on
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
 #: The module, whose name in the package is that of its function.
-coexistences = import_module("analysis.periodic.coexistence")
+coexistences = import_module("analysis.periodic.chart.coexistence")
 RIG_1_B = SETS["rig-1-spring-b"].parameters
 SPEED = 1000.0 * RAD_S_PER_RPM
 

@@ -10,10 +10,9 @@ import pytest
 
 from analysis import find_orbit
 from analysis.periodic import Drive, orbit_of
-from analysis.periodic.families import Family
-from analysis.periodic.orbits import pieces_from
-from analysis.periodic.paths import PeriodPath
-from analysis.periodic.rows import largest_multipliers
+from analysis.periodic.chart.grid import largest_multipliers
+from analysis.periodic.motion.discretisation import PeriodPath, pieces_from
+from analysis.periodic.motion.variables import Family
 from linkwork.five_bar.published import SETS
 
 SMOOTH = SETS["rig-2-spring-c"].parameters

@@ -10,7 +10,7 @@ import pytest
 
 from analysis import Inputs, find_orbit, simulate, simulate_many
 from analysis.periodic import Drive, OrbitError, Stability
-from analysis.periodic.rows import largest_multipliers
+from analysis.periodic.chart.grid import largest_multipliers
 from linkwork.errors import AssemblyError
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1

@@ -39,9 +39,9 @@ from analysis.periodic import (
     orbit_of,
     special_gradient,
 )
-from analysis.periodic.orbits import period_from, pieces_from
-from analysis.periodic.planes import unit_of, value_of, with_values
-from analysis.periodic.starts import scale_of
+from analysis.periodic.motion.discretisation import period_from, pieces_from
+from analysis.periodic.motion.drive import scale_of
+from analysis.periodic.motion.variables import unit_of, value_of, with_values
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 from linkwork.slider_crank import published as rahman

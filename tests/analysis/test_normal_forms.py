@@ -19,7 +19,7 @@ from analysis.periodic import (
     normal_form,
     orbit_of,
 )
-from analysis.periodic.normal_forms import Forms, coefficient_of
+from analysis.periodic.stability.nonlinear import Forms, coefficient_of
 from linkwork.errors import InputError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 

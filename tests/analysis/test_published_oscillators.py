@@ -31,7 +31,7 @@ from analysis.periodic import (
     switch,
     with_isolas,
 )
-from analysis.periodic.starts import scale_of
+from analysis.periodic.motion.drive import scale_of
 from linkwork.errors import InputError
 from tests.mechanisms import torsion
 from tests.oracles import oscillator

@@ -26,14 +26,14 @@ from analysis.periodic import (
     confirm,
     crossing_test,
     grid,
-    grids,
-    orbit_kernels,
     orbit_of,
     orbit_test,
     plane,
     removing_damping,
     removing_damping_over,
 )
+from analysis.periodic.chart import grid as grids
+from analysis.periodic.motion import kernels as orbit_kernels
 from analysis.youssef import PeriodicEquation, hill_regions, linear_equation, linear_test, linear_verdict, monodromy
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4

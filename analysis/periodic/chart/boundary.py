@@ -1,0 +1,359 @@
+"""Boundaries of instability over two parameters: test functions, curves, branches on lines, damping that removes a region."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import LinkworkError
+
+from ...numerics.boundaries import Test, lowest
+from ...numerics.continuation import ContinuationError, Curve, End, Evaluate, Evaluation, Follower, Settings
+from ..motion.discretisation import OrbitError, period_from
+from ..motion.drive import scale_of
+from ..motion.floquet import Crossing, crossing_test
+from ..motion.orbit import PeriodicOrbit, orbit_from, orbit_of
+from ..motion.variables import Family, Plane
+from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_leave
+from .coexistence import Coexistence, coexistence
+from .grid import Grid
+
+#: Steps of the differences, relative to the scales: the multipliers are good to about 1e-10. They steer Newton's method only.
+_DIFFERENCE = 1e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CrossingCurve:
+    """A curve of folds, period doublings or torus points.
+
+    Attributes
+    ----------
+    kind : Crossing
+    points : ndarray, shape (m, 2)
+        Values of the two parameters.
+    orbits : tuple of PeriodicOrbit
+    ends : (End, End)
+        At the first and at the last point.
+    """
+
+    kind: Crossing
+    points: NDArray[np.float64]
+    orbits: tuple[PeriodicOrbit, ...]
+    ends: tuple[End, End]
+
+
+def follow_crossing(
+    at: Plane,
+    orbit: PeriodicOrbit,
+    kind: Crossing,
+    place: tuple[float, float],
+    *,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    first: float = 2e-3,
+    greatest: float = 4e-2,
+    most_points: int = 300,
+) -> CrossingCurve:
+    """Follow a crossing of the unit circle through a plane, to both sides, to the edges of a box.
+
+    Parameters
+    ----------
+    at : callable
+        Mechanism and drive at a point of the plane.
+    orbit : PeriodicOrbit
+        On the curve, or close to it.
+    kind : Crossing
+    place : (float, float)
+        Where the orbit is.
+    x, y : (float, float)
+        The box.
+    first, greatest : float
+        Steps in scaled arc length: each side of the box has length 1, and the crank's length counts as 1.
+    most_points : int
+        To either side.
+
+    Raises
+    ------
+    ContinuationError
+        If no point of the curve is near the orbit.
+    """
+    n = len(orbit.start)
+    settings = Settings(low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, most_points=most_points)
+    unknowns = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), x[1] - x[0])
+    follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)
+    begin = follower.start(np.append(orbit.start, place[0]), place[1], 1)
+
+    up = follower.follow(begin, leave=reason_to_leave)
+    down = up if up.closed else follower.follow(begin.turned(), leave=reason_to_leave)
+    points = [*up.points] if up.closed else [*reversed(down.points[1:]), *up.points]
+    return CrossingCurve(
+        kind=kind,
+        points=np.array([[p.y[-1], p.parameter] for p in points]),
+        orbits=tuple(p.data for p in points),
+        ends=(_end(down), _end(up)),
+    )
+
+
+def _end(curve: Curve) -> End:
+    last = curve.points[-1]
+    message = "" if curve.reached else curve.reason
+    return End(reason=curve.end, point=(float(last.y[-1]), last.parameter), message=message)
+
+
+def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
+    """G = (y(T) - y(0), test) in the unknowns (y(0), x) and the parameter y, with its derivatives."""
+    n = len(scale) - 1
+
+    def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
+        parameters, drive = at(float(z[n]), float(z[n + 1]))
+        period = period_from(parameters, drive, z[:n], turns)
+        orbit = orbit_from(parameters, drive, z[:n], turns, period)
+        # the test has no dimension; it is given that of x, whose row it stands in
+        return np.append(period.shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
+
+    steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
+    high = np.append(np.full(n, np.inf), [settings.bounds[n][1], settings.high])
+
+    def evaluation(unknowns: NDArray[np.float64], parameter: float) -> Evaluation:
+        z = np.append(unknowns, parameter)
+        here, orbit = values(z)
+        columns = np.empty((n + 1, n + 2))
+        for j, step in enumerate(steps):
+            there = z.copy()
+            # into the box, where there is a mechanism for certain
+            there[j] += step if z[j] + step <= high[j] else -step
+            columns[:, j] = (values(there)[0] - here) / (there[j] - z[j])
+        columns[:n, :n] = orbit.monodromy - np.eye(n)
+        return Evaluation(here, columns[:, :-1], columns[:, -1], orbit)
+
+    return evaluation
+
+
+#: Points of a line at which all motions are sought; points of a branch at most to either side, and its greatest step.
+POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
+
+
+def branches_on(
+    operation: Plane, x: tuple[float, float], y: float, *, name: str, unit: str, start: ArrayLike | None = None
+) -> tuple[list[Branch], Coexistence, list[str]]:
+    """Every motion that is found on the line y = const, followed to both sides until a branch passes each of them.
+
+    Parameters
+    ----------
+    operation : callable
+        See `plane`.
+    x : (float, float)
+        Range of the line.
+    y : float
+    name, unit : str
+        Of x.
+    start : array_like, shape (n,), optional
+        See `coexistence`.
+
+    Returns
+    -------
+    branches : list of Branch
+    found : Coexistence
+        The motions from which they were followed.
+    lost : list of str
+        Why one could not be followed, a sentence each.
+    """
+    xs = np.linspace(*x, POINTS)
+    found = coexistence(operation, xs, [y], start=start)
+    branches: list[Branch] = []
+    lost: list[str] = []
+    for value, starts, largest in zip(xs.tolist(), found.starts[0], found.largest[0].filled(np.inf)):
+        parameters, drive = operation(value, y)
+        family = Family(parameters=parameters, drive=drive, vary=lambda v: operation(v, y), name=name, unit=unit)
+        for motion in starts[largest < GREATEST]:
+            if any(passes(branch, value, motion, x[1] - x[0]) for branch in branches):
+                continue
+            try:
+                orbit = orbit_of(parameters, drive, start=motion, settle=False)
+                branch = follow_both(
+                    family,
+                    orbit,
+                    value,
+                    low=x[0],
+                    high=x[1],
+                    greatest=STEP,
+                    most_points=BRANCH_POINTS,
+                    stop=lambda orbit: orbit.largest > GREATEST,
+                )
+            except (OrbitError, ContinuationError) as error:
+                lost.append(f"{family.format_value(value)}: {error}")
+            else:
+                branches.append(branch)
+    return branches, found, lost
+
+
+#: Monodromy matrix at a point of a plane, shape (n, n).
+Monodromy = Callable[[float, float], NDArray[np.float64]]
+
+
+def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
+    """Monodromy matrix of the mechanism's own periodic orbit of one turn over a plane; points are remembered.
+
+    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from those around it
+    on a grid, then by all the ways of `orbit_of` from the first guess.
+
+    Parameters
+    ----------
+    start : array_like, shape (n,), optional
+        Guess of the first: see `find_orbit`.
+    near : Grid, optional
+        Of the same plane.
+    """
+    first = None if start is None else np.array(start, dtype=float)
+    last = first
+
+    @cache
+    def matrix(x: float, y: float) -> NDArray[np.float64]:
+        nonlocal last
+        parameters, drive = operation(x, y)
+        for place in (last, *(() if near is None else near.around(x, y))):
+            try:
+                orbit = orbit_of(parameters, drive, start=place, settle=False)
+                break
+            except OrbitError:
+                continue
+        else:
+            orbit = orbit_of(parameters, drive, start=first)
+        last = orbit.start
+        return orbit.monodromy
+
+    return matrix
+
+
+def test_of(matrix: Monodromy, crossing: Crossing | int) -> Test:
+    """Test function `crossing_test` of a monodromy matrix over a plane."""
+    return lambda x, y: float(crossing_test(matrix(x, y), crossing))
+
+
+def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
+    """`test_of` of `orbit_monodromy`."""
+    return test_of(orbit_monodromy(operation, start=start), multiplier)
+
+
+# Removing damping
+
+
+class RemovalError(LinkworkError):
+    """The damping asked for does not lie in the range given."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RemovingDamping:
+    """The damping at which a region vanishes, and the point at which it does last.
+
+    Attributes
+    ----------
+    damping : float
+        In the unit of the range given.
+    x : float
+        The other parameter at the tip of the region.
+    residual : float
+        The test function there.
+    """
+
+    damping: float
+    x: float
+    residual: float
+
+
+def removing_damping(
+    test: Callable[[float, float], float],
+    x: tuple[float, float],
+    damping: tuple[float, float],
+    *,
+    samples: int = 40,
+    tolerance: float = 1e-8,
+) -> RemovingDamping:
+    """Damping at which a region of instability vanishes: where the least value of its test function is zero.
+
+    Parameters
+    ----------
+    test : callable
+        Test function of (x, damping).
+    x : (float, float)
+        Range of the other parameter, with this region and no other in it.
+    damping : (float, float)
+        Range in which the region vanishes: it is there at the lower end and not at the upper one.
+    samples : int
+        Of x, from which the least value is sought.
+    tolerance : float
+        Of the damping, relative to its upper end.
+
+    Raises
+    ------
+    RemovalError
+        If the region is not there at the lower end, or still there at the upper one.
+    LinkworkError
+        As the test function.
+    """
+
+    def least(d: float) -> float:
+        return lowest(lambda s: test(s, d), *x, samples=samples)[1]
+
+    low, high = (least(d) for d in damping)
+    if not low < 0.0:
+        raise RemovalError(f"there is no region between {x[0]:g} and {x[1]:g} at the damping {damping[0]:g}")
+    if not high > 0.0:
+        raise RemovalError(f"the region between {x[0]:g} and {x[1]:g} is still there at the damping {damping[1]:g}")
+    found = float(scipy.optimize.brentq(least, *damping, xtol=0.1 * tolerance * damping[1], rtol=1e-14))
+    place, value = lowest(lambda s: test(s, found), *x, samples=samples)
+    return RemovingDamping(damping=found, x=place, residual=value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstDamping:
+    """The greatest of the removing dampings over a further parameter: it removes the region everywhere.
+
+    Attributes
+    ----------
+    damping, x, other : float
+        The damping, and the point at which the region vanishes last.
+    """
+
+    damping: float
+    x: float
+    other: float
+
+
+def removing_damping_over(
+    test: Callable[[float, float, float], float],
+    x: Callable[[float], tuple[float, float]],
+    damping: tuple[float, float],
+    other: tuple[float, float],
+    *,
+    samples: int = 5,
+    tolerance: float = 1e-8,
+) -> WorstDamping:
+    """Damping that removes a region for every value of a further parameter.
+
+    Parameters
+    ----------
+    test : callable
+        Test function of (x, damping, other).
+    x : callable
+        Range of x at a value of the other parameter; see `removing_damping`.
+    damping : (float, float)
+    other : (float, float)
+        Range of the further parameter.
+    samples : int
+        Of it, from which the worst is sought.
+    tolerance : float
+        See `removing_damping`.
+    """
+
+    def removing(value: float) -> RemovingDamping:
+        return removing_damping(lambda s, d: test(s, d, value), x(value), damping, tolerance=tolerance)
+
+    worst, _ = lowest(lambda value: -removing(value).damping, *other, samples=samples, tolerance=1e-4)
+    found = removing(worst)
+    return WorstDamping(damping=found.damping, x=found.x, other=worst)

@@ -1,0 +1,536 @@
+"""The stability of a mechanism over two parameters, whole: grid, traced boundaries, removing damping, long runs.
+
+`stability_chart` puts together what `grids`, `boundaries` and `stability` compute, for one mechanism and two parameters by
+their FMI names, the crank speed among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, LinkworkError, ParameterError
+from linkwork.mechanism import Mechanism
+
+from ...files import write_csv
+from ...mechanisms import Parameters, mechanism_of
+from ...notebook import Shown, format_count, format_range
+from ...numerics.boundaries import Box, chart
+from ...numerics.continuation import ContinuationError, End, Reason
+from ...run import shown, takes_published
+from ...units import RAD_S_PER_RPM, Amount, si
+from ..motion.drive import Drive, published_drive, scale_of
+from ..motion.floquet import Crossing
+from ..motion.orbit import PeriodicOrbit
+from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
+from ..response.branch import distance
+from ..response.frequency import first_freedom, natural_frequency
+from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
+from .boundary import BRANCH_POINTS, Monodromy, branches_on, follow_crossing, orbit_monodromy, removing_damping, test_of
+from .coexistence import Coexistence, coexistence
+from .grid import Grid, grid, points_to_confirm
+
+#: Crank speeds of a chart where none are given, relative to the natural frequency; others, relative to the value there is.
+_SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
+
+#: Lines of a chart on which boundaries are sought, of either kind, and samples on each.
+LINES, SAMPLES = (2, 5), 120
+
+#: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid are of one motion.
+SAME_MOTION = 0.4
+
+#: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
+SAME = 5e-3
+
+#: What the boundaries of the periodic motion that the grid has are called, and those of others.
+TRUE_ORBIT, OTHER_ORBIT = "true orbit", "another motion"
+
+#: How a boundary is written to files: whose it is, other names being of the linear equation, and its multiplier.
+_MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
+
+_MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """A parameter of a chart as it is printed and drawn: speeds in rpm, all else in SI.
+
+    Attributes
+    ----------
+    name : str
+        FMI name.
+    unit : str
+        In which it is printed and drawn.
+    factor : float
+        From SI to that unit.
+    si : str
+        Its unit in SI.
+    """
+
+    name: str
+    unit: str
+    factor: float
+    si: str
+
+    @property
+    def label(self) -> str:
+        """Name with unit."""
+        return f"{self.name} [{self.unit}]"
+
+    def format_value(self, value: float) -> str:
+        """A value in SI with the parameter's name and unit."""
+        return format_value(self.name, value, self.si)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Traced:
+    """A boundary of instability.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        In SI.
+    motion : str
+        `TRUE_ORBIT`, the one that the grid has; `OTHER_ORBIT`; or the name of a motion asked for beside them.
+    kind : Crossing
+        What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more; under a torque
+        a complex pair may pass the unit circle, at a torus.
+    ends : (End, End)
+        At the first and at the last point.
+    starts : ndarray, shape (n, m), or None
+        y at crank angle 0 of the motions on it, where they were followed.
+    """
+
+    points: NDArray[np.float64]
+    motion: str
+    kind: Crossing
+    ends: tuple[End, End]
+    starts: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Run:
+    """A long nonlinear run at a point (x, y) of a chart, in SI."""
+
+    x: float
+    y: float
+    confirmation: Confirmation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StabilityChart(Shown):
+    """Where the periodic motion of one turn is unstable.
+
+    Attributes
+    ----------
+    axes : (Axis, Axis)
+    box : Box
+        In SI.
+    grid : Grid
+        Largest Floquet multiplier of the true orbit.
+    boundaries : tuple of Traced
+        Of the true orbit, of other motions, and of those asked for beside them.
+    removals : tuple of str
+        The damping that removes the regions between the ends of the other axis, in words; none unless damping is an axis.
+    runs : tuple of Run
+        Three points put to the test.
+    most : int
+        Most stable motions that were found at a point of the lines searched, or of ``beside``.
+    beside : Coexistence or None
+        All motions at every point, where it was asked for them.
+    problems : tuple of str
+        What could not be computed, a sentence each; empty where everything was.
+    """
+
+    axes: tuple[Axis, Axis]
+    box: Box
+    grid: Grid
+    boundaries: tuple[Traced, ...]
+    removals: tuple[str, ...]
+    runs: tuple[Run, ...]
+    most: int
+    beside: Coexistence | None
+    problems: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        spans = [
+            f"{axis.name} {format_range((axis.factor * low, axis.factor * high), axis.unit)}"
+            for axis, (low, high) in zip(self.axes, (self.box.x, self.box.y))
+        ]
+        multipliers = self.grid.largest.compressed()
+        share = f", {np.mean(multipliers > 1.0):.1%} unstable" if len(multipliers) else ""
+        if any(traced.kind is Crossing.FOLD and traced.motion == TRUE_ORBIT for traced in self.boundaries):
+            share += " but with jumps at a fold"
+        return (
+            f"<StabilityChart: {' by '.join(spans)}, {len(self.grid.x)} x {len(self.grid.y)} points{share}, largest Floquet "
+            f"multiplier {format_range(multipliers, '')}; {format_count(len(self.boundaries), 'boundary')}, "
+            f"{format_count(len(self.problems), 'problem')}>"
+        )
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the grid as a table, a row a point."""
+        x, y = self.axes
+        columns = {
+            x.label: x.factor * np.tile(self.grid.x, len(self.grid.y)),
+            y.label: y.factor * np.repeat(self.grid.y, len(self.grid.x)),
+            "largest multiplier [1]": self.grid.largest.filled(np.nan).ravel(),
+            "status (0: orbit found)": self.grid.status.ravel().astype(float),
+        }
+        return write_csv(path, columns)
+
+    def boundaries_to_csv(self, path: str | Path) -> Path:
+        """Write the boundaries as a table, a row a point, numbered in the first column."""
+        rows = [np.empty((0, 5))]
+        for number, traced in enumerate(self.boundaries, start=1):
+            points = traced.points * [axis.factor for axis in self.axes]
+            head = [number, _MOTION.get(traced.motion, 0.0), _MULTIPLIER[traced.kind]]
+            rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
+        names = (
+            "boundary",
+            "true orbit (1), another motion (2) or linear equation (0)",
+            "multiplier (+1; -1; 0: a complex pair)",
+            *(a.label for a in self.axes),
+        )
+        return write_csv(path, dict(zip(names, np.concatenate(rows).T)))
+
+
+@takes_published(drive=published_drive)
+def stability_chart(
+    parameters: Parameters,
+    drive: Drive | None = None,
+    names: tuple[str, str] | None = None,
+    ranges: tuple[tuple[Amount, Amount], tuple[Amount, Amount]] | None = None,
+    *,
+    points: int = 80,
+    start: ArrayLike | None = None,
+    beside: Mapping[str, Callable[[Plane], Monodromy]] | None = None,
+    coexisting: bool = False,
+    n_jobs: int | None = None,
+    progress: bool = False,
+) -> StabilityChart:
+    """Chart the stability of the periodic motion of one turn over two parameters.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+        Or a published set or its name.
+    drive : Drive, optional
+        Speed, or torque, and constant forces, where they are no axes. A published set needs none: it is driven at its speed.
+    names : (str, str), optional
+        FMI names of the parameters along x and y; without it the crank speed and the damping of the first freedom beside the
+        crank, of a five-bar ``drive.speed`` and ``slider.damping``.
+    ranges : ((float, float), (float, float)), optional
+        Their ranges, in SI or as text such as "420 rpm"; see `default_range`.
+    points : int
+        Of the grid, along each axis.
+    start : array_like, shape (n,), optional
+        Guess of the orbits; under a torque it is needed: see `find_orbit`.
+    beside : mapping, optional
+        Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: name to their monodromy
+        matrix over a plane.
+    coexisting : bool
+        Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
+    n_jobs : int, optional
+        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    StabilityChart
+        What could not be computed is in ``problems``.
+
+    Raises
+    ------
+    InputError
+        If a name or a range is not usable.
+    GridInterrupted
+        On Ctrl-C; the same call goes on from the rows that are kept.
+
+    Examples
+    --------
+    >>> from analysis import stability_chart
+    >>> chart = stability_chart("rig-2-spring-c", ranges=(("550 rpm", "560 rpm"), ("50 N.s/m", "60 N.s/m")), points=3)
+    >>> float(chart.grid.largest.max()) < 1.0, chart.boundaries
+    (True, ())
+    """
+    mechanism = mechanism_of(parameters)
+    if drive is None:
+        raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
+    names = names or (speed_name(mechanism) or "drive.speed", damping_name(mechanism))
+    spans = tuple(
+        default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
+        for n, name in enumerate(names)
+    )
+    box = Box(x=spans[0], y=spans[1])
+    operation = plane(parameters, drive, *names)
+    x, y = (np.linspace(low, high, points) for low, high in spans)
+    found = grid(operation, x, y, start=start, n_jobs=n_jobs, progress=progress)
+    survey = _Survey(
+        operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
+    )
+    survey.note_missing_orbits()
+    around = coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None
+    true = orbit_monodromy(operation, start=start, near=found)
+    # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
+    survey.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
+    for motion, of in (beside or {}).items():
+        matrix = of(operation)
+        for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
+            survey.trace(motion, matrix, kind)
+    survey.follow_lines(np.linspace(*box.y, LINES[1]).tolist(), progress)
+    if around is not None:
+        true_ones = [traced.points for traced in survey.traced if traced.motion in _MOTION]
+        survey.follow_lines(unmet(around, survey.lines, true_ones), progress)
+        survey.most = max(survey.most, int(around.stable.max()))
+    survey.run_three_points()
+    return StabilityChart(
+        axes=survey.axes,
+        box=box,
+        grid=found,
+        boundaries=tuple(survey.traced),
+        removals=survey.removals(true),
+        runs=tuple(survey.runs),
+        most=survey.most,
+        beside=around,
+        problems=tuple(survey.problems),
+    )
+
+
+@dataclass(slots=True)
+class _Survey:
+    """A chart as it is made."""
+
+    operation: Plane
+    axes: tuple[Axis, Axis]
+    box: Box
+    grid: Grid
+    start: ArrayLike | None
+    damping: str
+    traced: list[Traced] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
+    most: int = 0
+    #: Lines y = const that were searched.
+    lines: list[float] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+    def place(self, x: float, y: float) -> str:
+        """A point of the chart in words."""
+        return ", ".join(axis.format_value(value) for axis, value in zip(self.axes, (x, y)))
+
+    def note_missing_orbits(self) -> None:
+        """Report the points of the grid without an orbit."""
+        places: NDArray[np.int64] = np.argwhere(np.ma.getmaskarray(self.grid.largest))
+        if len(places):
+            row, column = places[0].tolist()
+            self.problems.append(
+                f"a motion is not found at {len(places)} of {self.grid.largest.size} points (grey), the first at "
+                f"{self.place(float(self.grid.x[column]), float(self.grid.y[row]))}: {self.grid.reason(row, column)}"
+            )
+
+    def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
+        """Find and trace the boundaries of a kind by their test function."""
+        result = chart(test_of(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
+        self.traced += [Traced(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries]
+        if result.gaps:
+            first = result.gaps[0]
+            self.problems.append(
+                f"{motion}, {kind.value}: no value at {len(result.gaps)} points of the lines searched, the first at "
+                f"{self.place(*first.point)}: {first.message}"
+            )
+
+    def follow_lines(self, ys: Sequence[float], progress: bool) -> None:
+        """The boundaries that the branches of all motions on the lines y = const lead to, folds above all."""
+        lost: list[str] = []
+        with shown(progress and bool(ys), float(len(ys)), "following branches") as show:
+            for number, y in enumerate(ys, start=1):
+                branches, found, failed = branches_on(
+                    self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start
+                )
+                self.lines.append(y)
+                self.most = max(self.most, int(found.stable.max()))
+                lost += [f"{self.axes[1].format_value(y)}, {failure}" for failure in failed]
+                for branch in branches:
+                    for special in branch.special:
+                        self._follow_special(special, (special.parameter, y))
+                show(float(number))
+        if lost:
+            self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
+
+    def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
+        """Follow a fold, period doubling or torus through the chart, unless it is known."""
+        if self._is_known(special, place):
+            return
+        what = f"the {special.kind.value} at {self.place(*place)}"
+        try:
+            curve = follow_crossing(
+                self.operation,
+                special.orbit,
+                special.kind,
+                place,
+                x=self.box.x,
+                y=self.box.y,
+                most_points=BRANCH_POINTS,
+            )
+        except ContinuationError as error:
+            self.problems.append(f"{what} is not followed: {error}")
+            return
+        own = np.mean([_is_of(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
+        # of two folds that meet in a cusp the grid's motion ends at one; next to a jump it is the other motion on a coarse grid
+        true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
+        self.traced.append(
+            Traced(
+                points=curve.points,
+                motion=TRUE_ORBIT if true else OTHER_ORBIT,
+                kind=curve.kind,
+                ends=curve.ends,
+                starts=np.array([orbit.start for orbit in curve.orbits]),
+            )
+        )
+        for end in curve.ends:
+            if end.reason not in (Reason.BOX, Reason.CLOSED):
+                self.problems.append(f"{what} is followed to {self.place(*end.point)} only: {end.message}")
+
+    def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
+        """Whether a boundary of the same kind and of the same motion passes a special point, nearly."""
+        orbit = special.orbit
+        scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        for boundary in self.traced:
+            if boundary.kind is not special.kind or boundary.motion not in _MOTION:
+                continue
+            if distance(boundary.points / self.box.size, place / self.box.size) > SAME:
+                continue
+            if boundary.starts is None:
+                same = _is_of(self.grid, orbit, place)
+            else:
+                near = int(np.linalg.norm((boundary.points - place) / self.box.size, axis=1).argmin())
+                same = float(np.linalg.norm((boundary.starts[near] - orbit.start) / scale)) < SAME_MOTION
+            if same:
+                return True
+        return False
+
+    def run_three_points(self) -> None:
+        """Long runs at the points that put the grid to the test."""
+        for row, column in points_to_confirm(self.grid):
+            x, y = float(self.grid.x[column]), float(self.grid.y[row])
+            try:
+                check = confirm(*self.operation(x, y), start=self.grid.starts[row, column])
+            except LinkworkError as error:
+                self.problems.append(f"no long run at {self.place(x, y)}: {error}")
+            else:
+                self.runs.append(Run(x=x, y=y, confirmation=check))
+
+    def removals(self, matrix: Monodromy) -> tuple[str, ...]:
+        """The damping that removes each region, where damping is one of the axes; a sentence a boundary of a true motion."""
+        names = [axis.name for axis in self.axes]
+        if self.damping not in names:
+            return ()
+        which = names.index(self.damping)
+        return tuple(
+            self._removal(matrix, boundary, which)
+            for boundary in self.traced
+            if boundary.motion in _MOTION and boundary.kind is not Crossing.TORUS and len(boundary.points) > 1
+        )
+
+    def _removal(self, matrix: Monodromy, boundary: Traced, which: int) -> str:
+        """The damping, along axis ``which``, that removes the region of a boundary."""
+        other, up = self.axes[1 - which], self.axes[which]
+        spans = (self.box.x, self.box.y)
+        across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]
+        low, high, top = float(across.min()), float(across.max()), float(dampings.max())
+        greatest, size = spans[which][1], spans[which][1] - spans[which][0]
+        whose = "" if boundary.motion == TRUE_ORBIT else f" of {boundary.motion}"
+        region = f"{boundary.kind.value}{whose} from {other.format_value(low)} to {other.format_value(high)}"
+        if top > greatest - 1e-6 * size:
+            return f"{region}: still there at {up.format_value(greatest)}"
+        by_points = f"{region}: goes up to {self.damping} = {top:.4g} {up.si}, by its points"
+        if boundary.motion != TRUE_ORBIT:
+            return by_points
+        # this region and no other
+        margin = 0.25 * (high - low)
+        x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
+        test = test_of(matrix, boundary.kind)
+        try:
+            found = removing_damping(
+                lambda value, damping: test(value, damping) if which == 1 else test(damping, value),
+                x,
+                (float(dampings.min()), greatest),
+            )
+        except LinkworkError:
+            # the test function ends at folds: take what the traced boundary says
+            return by_points
+        return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
+
+
+def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
+    """A line y = const through each part of a plane with a number of stable motions that no line and no boundary has met.
+
+    Parameters
+    ----------
+    beside : Coexistence
+    lines : sequence of float
+        Lines that were searched.
+    boundaries : sequence of ndarray, shape (n, 2)
+        A part that one of them passes within a cell is known.
+    """
+    cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
+    found: list[float] = []
+    for number in np.unique(beside.stable):
+        labels, count = scipy.ndimage.label(beside.stable == number)
+        for label in range(1, count + 1):
+            rows, columns = np.nonzero(labels == label)
+            if any(beside.y[rows.min()] <= y <= beside.y[rows.max()] for y in (*lines, *found)):
+                continue
+            cells = np.column_stack([beside.x[columns], beside.y[rows]])
+            if not any((np.abs(points[:, None] - cells) <= cell).all(axis=2).any() for points in boundaries):
+                found.append(float(beside.y[np.bincount(rows).argmax()]))
+    return found
+
+
+def _is_of(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
+    """Whether an orbit is of the motion whose multipliers a grid has, by the points of the grid around its place."""
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)
+    return bool(np.any(distance < SAME_MOTION))
+
+
+@takes_published()
+def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
+    """Range of an axis where none is given: speeds about the natural frequency, others about the value there is.
+
+    Raises
+    ------
+    InputError
+        If there is no value, or no such axis.
+    """
+    require_variable(parameters, drive, name)
+    if name == speed_name(mechanism_of(parameters)):
+        try:
+            natural = natural_frequency(parameters)
+        except ParameterError:
+            pass
+        else:
+            return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
+    value = value_of(parameters, drive, name)
+    if value <= 0.0:
+        raise InputError(f"{name} is {value:g} here: give the range of the axis")
+    return (_OTHERS[0] * value, _OTHERS[1] * value)
+
+
+def damping_name(mechanism: Mechanism) -> str:
+    """FMI name of the damping of the first freedom beside the crank, or of the first damping that the mechanism has."""
+    own = mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".damping"
+    names = [name for name in mechanism.mechanism_variables if name.endswith(".damping")]
+    return own if own in names or not names else names[0]
+
+
+def _axis(mechanism: Mechanism, name: str) -> Axis:
+    unit = unit_of(mechanism, name)
+    if unit == "rad/s":
+        return Axis(name=name, unit="rpm", factor=1.0 / RAD_S_PER_RPM, si=unit)
+    return Axis(name=name, unit=unit, factor=1.0, si=unit)

@@ -1,0 +1,9 @@
+from .drive import Drive as Drive
+from .drive import drive_of as drive_of
+from .floquet import StabilityVerdict as StabilityVerdict
+from .floquet import verdict as verdict
+from .orbit import PeriodicOrbit as PeriodicOrbit
+from .orbit import orbit_of as orbit_of
+from .search import find_orbit as find_orbit
+from .search import find_orbits as find_orbits
+from .variables import Family as Family

@@ -1,0 +1,490 @@
+"""Compiled: a period by Gauss collocation, from what is known of it from a neighbour.
+
+At prescribed speed the coordinates follow from the rates, and these from their slopes over the crank angle: the unknowns are
+the slopes w at the Gauss nodes of each element of a period, and y at its beginning. All of them are corrected together
+(Newton's method), the slopes of an element being eliminated first, so that the elements are joined by small matrices, whose
+product is the monodromy matrix. With NODES nodes the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G.
+Wanner, Solving Ordinary Differential Equations I, section II.7). From a good guess, which neighbours give at every node, two
+or three corrections do, each with a sixth of the right-hand sides that an integrator of order 8 needs for a period; and the
+decay of the Legendre coefficients over each element says how good it is.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import boolean, float64, int64, types
+from numpy.typing import NDArray
+
+from linkwork.limits import LIMIT_SINE
+
+from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
+from ...numerics.gauss import gauss
+from .flow import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
+from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, make_room
+
+#: Nodes of an element.
+NODES = 12
+
+#: Places and weights on an element of length 1, integrals of the Lagrange polynomials up to each place, the same twice.
+C, B, A, _COEFFICIENTS = gauss(NODES)
+
+AA = np.ascontiguousarray(A @ A)
+
+BA = B @ A
+
+#: The two highest Legendre coefficients.
+TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
+
+#: `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
+DECAY = 200.0
+
+#: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
+_CORRECTIONS, _FAR = 8, 1.0
+
+
+class Bench(NamedTuple):
+    """Room to work in: what a flow takes and gives; derivatives of the rates' slopes by coordinates and by rates at the
+    nodes, and along lambda those of coordinates' slopes; the equations of an element."""
+
+    z: NDArray[np.float64]
+    out: NDArray[np.float64]
+    by_q: NDArray[np.float64]
+    by_v: NDArray[np.float64]
+    along: NDArray[np.float64]
+    equations: NDArray[np.float64]
+
+
+@part
+def make_bench(n, directional):
+    """Room for y of n components."""
+    f = n // 2
+    size = NODES * f
+    columns = n + 1 if directional else n
+    return Bench(
+        np.zeros(n * (1 + columns)),
+        np.zeros(n * (1 + columns)),
+        np.zeros((NODES, f, f)),
+        np.zeros((NODES, f, f)),
+        np.zeros((NODES, f)),
+        np.zeros((size, size + 1 + columns)),
+    )
+
+
+@inner
+def eliminate(matrix, size):
+    """Solve a system with its right-hand sides in the columns after the first ``size``, in place; whether it could be."""
+    width = matrix.shape[1]
+    for c in range(size):
+        pivot = c
+        for r in range(c + 1, size):
+            if abs(matrix[r, c]) > abs(matrix[pivot, c]):
+                pivot = r
+        # a NaN is no pivot either
+        if not abs(matrix[pivot, c]) > 0.0:
+            return False
+        if pivot != c:
+            for j in range(c, width):
+                matrix[c, j], matrix[pivot, j] = matrix[pivot, j], matrix[c, j]
+        inverse = 1.0 / matrix[c, c]
+        for r in range(c + 1, size):
+            factor = matrix[r, c] * inverse
+            if factor != 0.0:
+                for j in range(c + 1, width):
+                    matrix[r, j] -= factor * matrix[c, j]
+    for c in range(size - 1, -1, -1):
+        inverse = 1.0 / matrix[c, c]
+        for j in range(size, width):
+            matrix[c, j] *= inverse
+        for r in range(c):
+            factor = matrix[r, c]
+            for j in range(size, width):
+                matrix[r, j] -= factor * matrix[c, j]
+    return True
+
+
+@inner
+def identity(matrix):
+    """Write the identity."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[0]):
+            matrix[i, j] = 1.0 if i == j else 0.0
+
+
+@inner
+def pace_of(section, y, bench):
+    """The time that a radian takes: the derivative of a coordinate's slope by its rate."""
+    n = y.shape[0]
+    bench.z[:] = 0.0
+    for i in range(n):
+        bench.z[i] = y[i]
+        bench.z[n + i * n + i] = 1.0
+    evaluate(section.equations[VARIATIONAL], 0.0, bench.z, section.modes, section.drive, section.p, bench.out)
+    return bench.out[n + n // 2 * n]
+
+
+@inner
+def at_node(s, h, pace, y, w, z):
+    """y at a node of an element, into z."""
+    f = w.shape[1]
+    for i in range(f):
+        q, v = C[s] * y[f + i], y[f + i]
+        for j in range(NODES):
+            q += h * AA[s, j] * w[j, i]
+            v += h * A[s, j] * w[j, i]
+        z[i] = y[i] + h * pace * q
+        z[f + i] = v
+
+
+@inner
+def condense(section, angle, h, pace, y, w, bench, into):
+    """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; whether it could be.
+
+    Written are ``into`` y at its end with the slopes corrected for this beginning, shape (n,), its derivatives by the
+    beginning, (n, n), and by lambda, (n,), and the corrections and derivatives of the slopes, (NODES f, 1 + n (+ 1)).
+    """
+    end, matrix, slope, moves = into
+    n = y.shape[0]
+    f = n // 2
+    size = NODES * f
+    z, out, system = bench.z, bench.out, bench.equations
+    directional = z.shape[0] > n * (1 + n)
+    equation = section.equations[DIRECTIONAL if directional else VARIATIONAL]
+    z[:] = 0.0
+    for i in range(n):
+        z[n + i * n + i] = 1.0
+    for s in range(NODES):
+        at_node(s, h, pace, y, w, z)
+        evaluate(equation, angle + C[s] * h, z, section.modes, section.drive, section.p, out)
+        for i in range(f):
+            system[s * f + i, size] = out[f + i] - w[s, i]
+            for j in range(f):
+                bench.by_q[s, i, j] = out[n + j * n + f + i]
+                bench.by_v[s, i, j] = out[n + (f + j) * n + f + i]
+            if directional:
+                bench.along[s, i] = out[n + n * n + i]
+                system[s * f + i, size + 1 + n] = out[n + n * n + f + i]
+    for s in range(NODES):
+        for i in range(f):
+            row = s * f + i
+            for j in range(f):
+                by_q, by_v = h * pace * bench.by_q[s, i, j], bench.by_v[s, i, j]
+                for t in range(NODES):
+                    system[row, t * f + j] = -h * (A[s, t] * by_v + AA[s, t] * by_q)
+                system[row, size + 1 + j] = bench.by_q[s, i, j]
+                system[row, size + 1 + f + j] = by_v + C[s] * by_q
+                if directional:
+                    for t in range(NODES):
+                        system[row, size + 1 + n] += h * A[s, t] * bench.by_q[s, i, j] * bench.along[t, j]
+            system[row, row] += 1.0
+    if not eliminate(system, size):
+        return False
+    for row in range(size):
+        for j in range(moves.shape[1]):
+            moves[row, j] = system[row, size + j]
+    for i in range(f):
+        end[i] = y[i] + h * pace * y[f + i]
+        end[f + i] = y[f + i]
+        for j in range(n):
+            matrix[i, j] = 0.0
+            matrix[f + i, j] = 0.0
+        matrix[i, i] = 1.0
+        matrix[i, f + i] = h * pace
+        matrix[f + i, f + i] = 1.0
+        slope[i] = 0.0
+        slope[f + i] = 0.0
+        for s in range(NODES):
+            row = s * f + i
+            far, near = h * h * pace * BA[s], h * B[s]
+            value = w[s, i] + moves[row, 0]
+            end[i] += far * value
+            end[f + i] += near * value
+            for j in range(n):
+                matrix[i, j] += far * moves[row, 1 + j]
+                matrix[f + i, j] += near * moves[row, 1 + j]
+            if directional:
+                slope[i] += far * moves[row, 1 + n] + near * bench.along[s, i]
+                slope[f + i] += near * moves[row, 1 + n]
+    return True
+
+
+@inner
+def tail_of(h, scale, along, w, moves):
+    """How far the Legendre coefficients of the slopes, and of their derivatives by the beginning and lambda, have decayed."""
+    f = w.shape[1]
+    n = 2 * f
+    worst = 0.0
+    for i in range(f):
+        for j in range(-1, moves.shape[1] - 1):
+            weight = scale[f + i] / (1.0 if j < 0 else scale[j] if j < n else along)
+            last = before = greatest = 0.0
+            for s in range(NODES):
+                value = h * (moves[s * f + i, 1 + j] if j >= 0 else w[s, i])
+                greatest = max(greatest, abs(value))
+                before += TAIL[0, s] * value
+                last += TAIL[1, s] * value
+            worst = max(worst, max(abs(before), abs(last)) / (weight + greatest))
+    return worst
+
+
+@inner
+def correct(section, angles, y, w, desk):
+    """One correction of beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period; its size relative to the scale.
+
+    Written on the desk are what `condense` gives of each element, the monodromy matrix before the correction, and the decay of
+    the Legendre coefficients into ``report[0]``. Returns NaN where there is no correction.
+    """
+    bench, ends, matrices, slopes, moves, monodromy, report = desk
+    m, n = y.shape
+    f = n // 2
+    scale = section.scale
+    shift, column = bench.z, bench.out
+    report[0] = 0.0
+    pace = pace_of(section, y[0], bench)
+    identity(monodromy)
+    for e in range(m):
+        h = angles[e + 1] - angles[e]
+        into = ends[e], matrices[e], slopes[e], moves[e]
+        if not condense(section, angles[e], h, pace, y[e], w[e], bench, into):
+            return np.nan
+        report[0] = max(report[0], tail_of(h, scale, section.along, w[e], moves[e]))
+        after = y[(e + 1) % m]
+        for i in range(n):
+            ends[e, i] -= after[i]
+        for j in range(n):
+            for i in range(n):
+                column[i] = 0.0
+                for k in range(n):
+                    column[i] += matrices[e, i, k] * monodromy[k, j]
+            for i in range(n):
+                monodromy[i, j] = column[i]
+    # the gaps between the elements, carried to the end of the period
+    for i in range(n):
+        shift[i] = 0.0
+    for e in range(m):
+        _carry(matrices[e], ends[e], shift, column)
+    system = bench.equations
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = (1.0 if i == j else 0.0) - monodromy[i, j]
+        for j in range(n, system.shape[1]):
+            system[i, j] = shift[i]
+    if not eliminate(system, n):
+        return np.nan
+    for i in range(n):
+        shift[i] = system[i, n]
+    size = 0.0
+    for e in range(m):
+        h = angles[e + 1] - angles[e]
+        for row in range(moves.shape[1]):
+            change = moves[e, row, 0]
+            for j in range(n):
+                change += moves[e, row, 1 + j] * shift[j]
+            w[e, row // f, row % f] += change
+            size = max(size, abs(h * change) / scale[f + row % f])
+        for i in range(n):
+            y[e, i] += shift[i]
+            size = max(size, abs(shift[i]) / scale[i])
+            if not np.isfinite(shift[i]):
+                return np.nan
+        _carry(matrices[e], ends[e], shift, column)
+    return size
+
+
+@inner
+def _carry(matrix, gap, shift, column):
+    """A deviation at the beginning of an element becomes that at the beginning of the next."""
+    n = gap.shape[0]
+    for i in range(n):
+        column[i] = gap[i]
+        for k in range(n):
+            column[i] += matrix[i, k] * shift[k]
+    for i in range(n):
+        shift[i] = column[i]
+
+
+@inner
+def least_gap(section, angles, y, w, bench, gap):
+    """How near the links come to the limit of assembly at the nodes; NaN beyond it."""
+    least = np.inf
+    pace = pace_of(section, y[0], bench)
+    for e in range(y.shape[0]):
+        h = angles[e + 1] - angles[e]
+        for s in range(NODES):
+            at_node(s, h, pace, y[e], w[e], bench.z)
+            evaluate(
+                section.equations[GAP], angles[e] + C[s] * h, bench.z, section.modes, section.drive, section.p, gap
+            )
+            if not gap[0] >= least:
+                least = gap[0]
+    return least
+
+
+class Desk(NamedTuple):
+    """Room to work in for a period: that of an element, what `condense` writes of each, and what `correct` does."""
+
+    bench: Bench
+    ends: NDArray[np.float64]
+    matrices: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    moves: NDArray[np.float64]
+    monodromy: NDArray[np.float64]
+    report: NDArray[np.float64]
+
+
+@part
+def make_desk(n, most):
+    """Room for y of n components and so many elements."""
+    return Desk(
+        make_bench(n, False),
+        np.zeros((most, n)),
+        np.zeros((most, n, n)),
+        np.zeros((most, n)),
+        np.zeros((most, NODES * (n // 2), 1 + n)),
+        np.zeros((n, n)),
+        np.zeros(1),
+    )
+
+
+@part
+def close(section, angles, y, w, desk, room):
+    """Newton's method for beginnings y and slopes w of a period that closes; how it ended.
+
+    NO_STEP says that the elements are too few.
+    """
+    before = 0.0
+    for count in range(_CORRECTIONS):
+        size = correct(section, angles, y, w, desk)
+        if not size <= (0.5 * before if count else _FAR):
+            return DIVERGED
+        if size <= 100.0 * section.tolerance:
+            if desk.report[0] > DECAY * np.sqrt(section.tolerance):
+                return NO_STEP
+            return DONE if least_gap(section, angles, y, w, desk.bench, room.gap) > LIMIT_SINE else LIMIT
+        before = size
+    return DIVERGED
+
+
+@part
+def spread(section, angles, start, y, w, room):
+    """Beginnings y and slopes w of the elements of a period from its start, by the integrator."""
+    n = start.shape[0]
+    z, out = start.copy(), np.empty(n)
+    carry = np.array([0.1, 0.0])
+    for e in range(y.shape[0]):
+        angle, h = angles[e], angles[e + 1] - angles[e]
+        copy(z, y[e])
+        for s in range(NODES + 1):
+            following = angles[e] + C[s] * h if s < NODES else angles[e + 1]
+            status = advance(section, angle, following, z, room, carry)
+            if status != DONE:
+                return status
+            angle = following
+            if s < NODES:
+                evaluate(section.equations[PLAIN], angle, z, section.modes, section.drive, section.p, out)
+                copy(out[n // 2 :], w[e, s])
+    return DONE
+
+
+@kernel(
+    int64(
+        SECTION,
+        VECTOR,
+        int64[::1],
+        MATRIX,
+        float64,
+        boolean,
+        types.Tuple((MATRIX, CUBE, CUBE)),
+        types.Tuple((MATRIX, VECTOR, VECTOR)),
+    ),
+    purpose="the collocation of periodic motions",
+)
+def walk(section, angles, firsts, starts, change, known, neighbour, found):
+    """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (m + 1,)
+        Crank angles at which the elements begin, and the end of the last.
+    firsts : ndarray of int64, shape (k + 1,)
+        Number of the first element of each piece, and m.
+    starts : ndarray, shape (k, n)
+        y at the beginning of each piece.
+    change : float
+        Of lambda from the neighbour.
+    known : bool
+        Whether there is one; without it the integrator gives the first guess.
+    neighbour : tuple of ndarray, shapes (m, n), (m, NODES, f) and (m, NODES f, 2 + n)
+        Its beginnings, slopes and their derivatives; overwritten.
+    found : tuple of ndarray, shapes (k, n (2 + n)), (m,) and (1,)
+        Written: y at the end of each piece, dy/dy there by columns, dy/dlambda; decay of the Legendre coefficients of each
+        element; how near the links come to the limit of assembly.
+
+    Returns
+    -------
+    int
+        A `Status`; NO_STEP where elements are too long, DIVERGED if the slopes were not found.
+    """
+    (y, w, moves), (rows, tails, report) = neighbour, found
+    n = starts.shape[1]
+    f = n // 2
+    scale = section.scale
+    bench, room = make_bench(n, True), make_room(section, 0)
+    start, end, column = np.empty(n), np.empty(n), np.empty(n)
+    matrix, whole, slope, along = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
+    report[0] = np.inf
+    pace = pace_of(section, starts[0], bench)
+    for piece in range(starts.shape[0]):
+        first, last = firsts[piece], firsts[piece + 1]
+        copy(starts[piece], start)
+        identity(whole)
+        along[:] = 0.0
+        if not known:
+            status = spread(section, angles[first : last + 1], start, y[first:last], w[first:last], room)
+            if status != DONE:
+                return status
+            moves[first:last] = 0.0
+        for e in range(first, last):
+            h = angles[e + 1] - angles[e]
+            for row in range(moves.shape[1]):
+                ahead = moves[e, row, 1 + n] * change
+                for i in range(n):
+                    ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
+                w[e, row // f, row % f] += ahead
+            copy(start, y[e])
+            before = 0.0
+            for count in range(_CORRECTIONS):
+                if not condense(section, angles[e], h, pace, y[e], w[e], bench, (end, matrix, slope, moves[e])):
+                    return DIVERGED
+                size = 0.0
+                for row in range(moves.shape[1]):
+                    w[e, row // f, row % f] += moves[e, row, 0]
+                    size = max(size, abs(h * moves[e, row, 0]) / scale[f + row % f])
+                if not size <= (0.5 * before if count else _FAR):
+                    return DIVERGED
+                before = size
+                if size <= 100.0 * section.tolerance:
+                    break
+            else:
+                return DIVERGED
+            tails[e] = tail_of(h, scale, section.along, w[e], moves[e])
+            for j in range(n):
+                for i in range(n):
+                    column[i] = 0.0
+                    for k in range(n):
+                        column[i] += matrix[i, k] * whole[k, j]
+                for i in range(n):
+                    whole[i, j] = column[i]
+            _carry(matrix, slope, along, column)
+            copy(end, start)
+        for i in range(n):
+            rows[piece, i] = start[i]
+            rows[piece, n + n * n + i] = along[i]
+            for j in range(n):
+                rows[piece, n + j * n + i] = whole[i, j]
+    for e in range(tails.shape[0]):
+        if tails[e] > DECAY * np.sqrt(section.tolerance):
+            return NO_STEP
+    report[0] = least_gap(section, angles, y, w, bench, room.gap)
+    return DONE if report[0] > LIMIT_SINE else LIMIT

@@ -1,0 +1,369 @@
+"""What drives a mechanism over a periodic motion, magnitudes of its state, and starts of the search for motions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from math import isfinite, pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import AssemblyError, InputError
+from linkwork.mechanism import Channel, Mechanism, Mode, PublishedSet
+from linkwork.parameters import field_name
+
+from ...files import unknown_name
+from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
+from ...numerics.sobol import sobol
+from ...run import InductionMotor, Inputs, driven, given, started, takes_published
+from ...units import Amount, in_si
+from .flow import Flow, crank_of, flow
+
+#: A torque on the crank: constant, a motor's, or both.
+Torque = float | InductionMotor | Sequence[float | InductionMotor]
+
+
+class VaryingInputError(InputError):
+    """An input varies in time, and so there is no periodic motion under it; ``channel`` is its name."""
+
+    def __init__(self, channel: str, value: object) -> None:
+        self.channel = channel
+        super().__init__(
+            f"{channel} is a {type(value).__name__}: what acts on a periodic motion must be constant, or an induction motor"
+        )
+
+
+@in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What drives a mechanism over an orbit: a speed of its cyclic freedom, the crank, or a torque on it; all else constant.
+
+    Attributes
+    ----------
+    speed : float or None
+        Prescribed crank speed (rad/s), above zero; None for a drive by torque.
+    torque : float
+        Constant torque on the crank (N.m): the mean torque.
+    motor : InductionMotor or None
+        A motor whose torque is added.
+    forces : mapping of str to float
+        Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N).
+    held : mapping of str to float
+        Coordinates of freedoms that are held, by their FMI names, such as ``shift.position``; 0 where they are left out.
+    modes : mapping of str to int
+        Modes of other freedoms than the crank, by name, such as ``axial.mode``. Without it a freedom with a mode is free where
+        its force is among ``forces``, be it 0, and else in its default mode.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, the speed is not above zero, or there are both a speed and a torque.
+    """
+
+    speed: Amount = None
+    torque: Amount = 0.0
+    motor: InductionMotor | None = None
+    forces: Mapping[str, Amount] = field(default_factory=dict)
+    held: Mapping[str, Amount] = field(default_factory=dict)
+    modes: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
+            raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero")
+        for name, value in {"torque": self.torque, **self.forces, **self.held}.items():
+            if not isfinite(value):
+                raise InputError(f"{name} is {value}: it must be a finite number")
+        if self.speed is not None and (self.torque != 0.0 or self.motor is not None):
+            raise InputError("both a speed and a torque are given: an orbit has either")
+        if self.speed is None and self.torque == 0.0 and self.motor is None:
+            raise InputError("neither a speed nor a torque is given: an orbit needs one of them")
+
+    @property
+    def speed_drive(self) -> bool:
+        """Whether the speed is prescribed."""
+        return self.speed is not None
+
+    def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
+        """What drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`.
+
+        Raises
+        ------
+        InputError
+            If a mode is not one of a freedom beside the crank, or has no such value.
+        """
+        return _arguments(mechanism, self.speed_drive, tuple(self.forces), tuple(self.modes.items()))
+
+    def flow(self, mechanism: Mechanism) -> Flow:
+        """The mechanism's flow, driven in this way.
+
+        Raises
+        ------
+        InputError
+            If the mechanism cannot be driven so, or nothing of it is free.
+        """
+        crank = crank_of(mechanism)
+        if (crank.command if self.speed_drive else crank.torque) is None:
+            what = "speed of" if self.speed_drive else "torque on"
+            raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
+        chosen = self.arguments(mechanism)
+        made = flow(mechanism, tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes))
+        if made.size == 0:
+            raise InputError(
+                f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque, or another freedom by "
+                f"a force, such as {_forces(mechanism)} = 0"
+            )
+        return made
+
+    def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
+        """The numbers of the drive, as `kernels.Section` has them.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no force of a name.
+        InputError
+            If a force does not act, or a coordinate is not one that is held.
+        """
+        crank, numbers = crank_of(mechanism), {c.name: n for n, c in enumerate(mechanism.channels)}
+        u = np.zeros(len(numbers))
+        if self.speed is not None and crank.command is not None:
+            u[crank.command] = self.speed
+        elif crank.torque is not None:
+            u[crank.torque] = self.torque
+        forces = forces_of(mechanism)
+        for name, value in self.forces.items():
+            if name not in forces:
+                raise unknown_name(name, forces)
+            require_acting(self, mechanism, forces[name])
+            u[numbers[name]] = value
+        motor = (0.0, 1.0, 1.0)
+        if self.motor is not None:
+            motor = (self.motor.breakdown_torque, self.motor.breakdown_slip, self.motor.synchronous_speed)
+        free = self.flow(mechanism).free
+        coordinates = [f.coordinate for f in mechanism.freedoms]
+        for name in self.held:
+            if name not in coordinates or coordinates.index(name) in (crank.freedom, *free):
+                raise InputError(f"{name} is no coordinate of the {mechanism.name} that is held in this drive")
+        return np.array([*u, *motor, *(self.held.get(name, 0.0) for name in coordinates)])
+
+    def inputs(self, mechanism: Mechanism) -> Inputs:
+        """The inputs of a run that drive the mechanism in this way."""
+        crank = crank_of(mechanism)
+        acting: dict[str, Any] = {c.argument: self.forces[c.name] for c in mechanism.channels if c.name in self.forces}
+        if self.speed_drive:
+            acting[mechanism.channels[crank.command or 0].argument] = self.speed
+        else:
+            torque = self.torque if self.motor is None else (self.torque, self.motor)
+            acting[mechanism.channels[crank.torque or 0].argument] = torque
+        known = {c.argument for c in mechanism.channels}
+        for argument in self.arguments(mechanism).values():
+            acting.setdefault(argument, 0.0 if argument in known else True)
+        return Inputs(**acting)
+
+
+class Direction(NamedTuple):
+    """Derivatives of `Drive.vector` and of the constants with respect to a parameter lambda."""
+
+    drive: NDArray[np.float64]
+    constants: NDArray[np.float64]
+
+
+@cache
+def _arguments(
+    mechanism: Mechanism, speed_drive: bool, forces: tuple[str, ...], modes: tuple[tuple[str, int], ...]
+) -> Mapping[str, str]:
+    """See `Drive.arguments`, which is asked again and again along a branch."""
+    found, crank, own = {}, crank_of(mechanism), dict(modes)
+    others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank.freedom}
+    for name, value in modes:
+        if name not in others or value not in range(len(others[name].values)):
+            raise InputError(f"{name} = {value} is no mode of a {mechanism.name} that a drive can have")
+    for number, freedom in enumerate(mechanism.freedoms):
+        if (mode := freedom.mode) is None:
+            continue
+        if mode.name in own:
+            found[mode.name] = mode.arguments[own[mode.name]]
+            continue
+        kind = "command" if number == crank.freedom and speed_drive else "force"
+        channel = next((c for c in mechanism.channels if c.freedom == number and c.kind == kind), None)
+        acts = channel is not None and (number == crank.freedom or channel.name in forces)
+        found[mode.name] = channel.argument if acts and channel else mode.arguments[mode.default]
+    return found
+
+
+@cache
+def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
+    """The inputs of a mechanism that are forces, but for the crank's torque, by FMI name."""
+    crank = crank_of(mechanism).freedom
+    return {c.name: c for c in mechanism.channels if c.kind == "force" and c.freedom != crank}
+
+
+def _forces(mechanism: Mechanism) -> str:
+    return next((c.name for c in forces_of(mechanism).values() if c.freedom >= 0), "none")
+
+
+def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
+    """Make sure that a channel acts under a drive; raises InputError if the freedom is driven otherwise."""
+    mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
+    chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
+    if mode is not None and chosen != channel.argument:
+        raise InputError(f"{channel.name} does not act: {mode.name} is {_value(mode, chosen)}")
+
+
+def _value(mode: Mode, argument: str) -> str:
+    return mode.values[mode.arguments.index(argument)]
+
+
+def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
+    """A drive that is given, or else that of a published set: its crank speed, what is held as it is at the start."""
+    return drive or drive_of(known.parameters, driven(known, None), known.initial)
+
+
+@takes_published(inputs=driven, initial=started)
+@in_si(speed="rad/s", torque="N.m")
+def drive_of(
+    parameters: Parameters,
+    inputs: Inputs | None = None,
+    initial: InitialState | None = None,
+    *,
+    speed: Amount = None,
+    torque: Amount = None,
+) -> Drive:
+    """The drive of an orbit under the inputs of a run, which must not vary in time.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    inputs : Inputs, optional
+    initial : state at the start, optional
+        Where freedoms that are neither free nor the crank's are held.
+    speed, torque : optional
+        In the place of what drives the crank in the inputs.
+
+    Raises
+    ------
+    VaryingInputError
+        If an input varies.
+    InputError
+        If nothing drives the crank, or another freedom is commanded to go on.
+    """
+    mechanism = mechanism_of(parameters)
+    inputs, initial = given(mechanism, inputs, initial)
+    crank = crank_of(mechanism)
+    constant: dict[str, float] = {}
+    motors: list[InductionMotor] = []
+    for number, channel in enumerate(mechanism.channels):
+        if channel.freedom == crank.freedom and (speed is not None or torque is not None):
+            continue
+        for part in inputs.parts(channel.argument) if channel.kind != "rate" else ():
+            if isinstance(part, InductionMotor) and number == crank.torque:
+                motors.append(part)
+            elif isinstance(part, (int, float, np.floating, np.integer)):
+                constant[channel.name] = constant.get(channel.name, 0.0) + float(part)
+            else:
+                raise VaryingInputError(channel.argument, part)
+    named = [None if n is None else mechanism.channels[n].name for n in (crank.command, crank.torque)]
+    for channel in mechanism.channels:
+        if channel.kind == "command" and channel.name != named[0] and constant.get(channel.name, 0.0) != 0.0:
+            raise InputError(
+                f"{channel.argument} is {constant[channel.name]}: a motion that goes on so is not periodic"
+            )
+    parts = () if torque is None else tuple(torque) if isinstance(torque, Sequence) else (torque,)
+    motors += [part for part in parts if isinstance(part, InductionMotor)]
+    if len(motors) > 1:
+        raise InputError(f"{len(motors)} motors: an orbit has one at most")
+    modes = inputs.modes(mechanism)
+    free = flow(mechanism, tuple(modes.values())).free
+    other = [f for n, f in enumerate(mechanism.freedoms) if n not in (crank.freedom, *free)]
+    return Drive(
+        speed=constant.get(named[0] or "") if speed is None else speed,
+        torque=constant.get(named[1] or "", 0.0) + sum(float(p) for p in parts if not isinstance(p, InductionMotor)),
+        motor=motors[0] if motors else None,
+        forces={name: constant[name] for name in forces_of(mechanism) if name in constant},
+        held={f.coordinate: float(getattr(initial, f.initial[0])) for f in other},
+        modes={f.mode.name: modes[f.mode.name] for f in other if f.mode is not None},
+    )
+
+
+#: Distance of two starts, relative to the scale, below which they are of one motion.
+SAME = 1e-6
+
+#: How far starts reach where no limit of assembly is met, in the scale of y, and the step to it.
+_WIDEST, _WIDER = 16.0, 1.25
+
+#: Crank speeds of starts under a torque, relative to the guess.
+_SPEEDS = (0.25, 1.5)
+
+
+@takes_published()
+def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
+    """Magnitudes of y: of a five-bar the crank's length, its speed at the pin, and the crank speed."""
+    mechanism = mechanism_of(parameters)
+    return scale_in(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
+
+
+def scale_in(
+    flow: Flow, parameters: Parameters, vector: NDArray[np.float64], start: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same, where the flow and the numbers of the drive are at hand."""
+    scale = flow.mechanism.error_scale(parameters, flow.state(start, vector))
+    return np.array([scale[place] for place in flow.places])
+
+
+def is_smooth(parameters: Parameters) -> bool:
+    """Whether the rates are smooth over a turn: friction changes fast where a motion turns round, which only an integrator with
+    steps of its own is sure to meet."""
+    mechanism = mechanism_of(parameters)
+    rough = [name for name in mechanism.mechanism_variables if "friction" in name]
+    return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.switched(
+        parameters.constants()
+    )
+
+
+def extent_of(parameters: Parameters, drive: Drive, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far each free coordinate can go to both sides of zero at the crank angle 0; shape (free coordinates,)."""
+    mechanism = mechanism_of(parameters)
+    flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), scale_of(parameters, drive, guess)
+    found = scale[: flow.size // 2].copy()
+    for i in range(len(found)):
+        while found[i] < _WIDEST * scale[i]:
+            try:
+                for sign in (-1.0, 1.0):
+                    y = guess.copy()
+                    y[i] = sign * found[i]
+                    mechanism.check_assembly(parameters, flow.state(y, vector))
+            except AssemblyError:
+                break
+            found[i] *= _WIDER
+    return found
+
+
+def starts_of(
+    parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
+) -> NDArray[np.float64]:
+    """Starts with all amplitudes up to the extent and all phases, by a scrambled Sobol sequence; shape (count, n).
+
+    Parameters
+    ----------
+    guess : ndarray, shape (n,)
+        Its crank speed is the one about which others are taken under a torque.
+    count : int
+        A power of two.
+    number : int
+        Of the set; sets of different numbers have different starts.
+    """
+    flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
+    half = flow.size // 2
+    extent = extent_of(parameters, drive, guess)
+    sequence = sobol(flow.size, count, number)
+    amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
+    found = np.tile(guess, (count, 1))
+    found[:, :half] = extent * amplitude * np.cos(phase)
+    found[:, half : 2 * half] = extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
+    if flow.torque:
+        low, high = _SPEEDS
+        found[:, -1] *= low + (high - low) * sequence[:, -1]
+    return found

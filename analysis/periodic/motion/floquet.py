@@ -1,0 +1,208 @@
+"""Floquet multipliers and what they say: verdicts with a margin, and how stability is lost.
+
+What a small deviation from a periodic motion becomes after one period is the monodromy matrix times what it was; the
+eigenvalues of that matrix are the Floquet multipliers. The orbits of the mechanism
+itself and linear equations with periodic coefficients are judged here by the same rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import exp, isfinite, pi
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, LinkworkError
+
+#: Distance of the largest multiplier from the unit circle below which a verdict is "marginal" by default.
+TOLERANCE = 1e-6
+
+#: Angle from the real axis (rad) below which a multiplier counts as real. A double one on the axis is computed only to the
+#: square root of the rounding errors.
+REAL_ANGLE = 1e-5
+
+
+class VerdictError(LinkworkError, TypeError):
+    """A verdict was used as if it were a bare yes or no."""
+
+
+class Stability(Enum):
+    """What becomes of a small deviation: it dies out, grows, or the linear theory does not decide."""
+
+    STABLE = "stable"
+    UNSTABLE = "unstable"
+    MARGINAL = "marginal"
+
+
+class Crossing(Enum):
+    """Where on the unit circle the largest multiplier leaves it, and what happens there."""
+
+    FOLD = "fold"  # at +1: two motions of the same period meet, or a branch point
+    PERIOD_DOUBLING = "period doubling"  # at -1
+    TORUS = "torus"  # a complex pair
+
+
+#: The real multiplier at a crossing.
+_SIGN = {Crossing.FOLD: 1, Crossing.PERIOD_DOUBLING: -1}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StabilityVerdict:
+    """A verdict on a periodic motion; not a bare boolean: ask for ``stability``.
+
+    Attributes
+    ----------
+    stability : Stability
+    margin : float
+        1 - ``max |multiplier|``: positive where deviations die out, negative where they grow; dimensionless.
+    tolerance : float
+        Size of the margin below which the verdict is MARGINAL. A system without damping is never better than that.
+    largest_multiplier : complex
+        The multiplier of the greatest modulus.
+
+    Raises
+    ------
+    VerdictError
+        If it is used as a truth value.
+    """
+
+    stability: Stability
+    margin: float
+    tolerance: float
+    largest_multiplier: complex
+
+    def __bool__(self) -> NoReturn:
+        raise VerdictError(
+            f"a verdict ({self}) is no yes or no: compare .stability with STABLE, UNSTABLE or MARGINAL, or use .margin"
+        )
+
+    def __str__(self) -> str:
+        return f"{self.stability.value}, margin {self.margin:.3g} with tolerance {self.tolerance:.1g}"
+
+    @property
+    def crossing(self) -> Crossing:
+        """Where the largest multiplier leaves the unit circle, or would."""
+        return crossing(self.largest_multiplier)
+
+
+def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
+    """Floquet multipliers, the largest modulus first.
+
+    Parameters
+    ----------
+    monodromy : array_like, shape (..., n, n)
+        One matrix or many.
+
+    Returns
+    -------
+    ndarray of complex, shape (..., n)
+
+    Raises
+    ------
+    InputError
+        If an entry is not finite.
+    """
+    matrix = np.asarray(monodromy, dtype=float)
+    if not np.isfinite(matrix).all():
+        raise InputError("a monodromy matrix is not finite")
+    values = np.linalg.eigvals(matrix).astype(np.complex128)
+    order = np.argsort(-np.abs(values), axis=-1, kind="stable")
+    return np.take_along_axis(values, order, axis=-1)
+
+
+def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVerdict:
+    """The verdict that the multipliers of one periodic motion give.
+
+    Parameters
+    ----------
+    multipliers : array_like of complex, shape (n,)
+    tolerance : float
+        Margin from which on the verdict is not "marginal"; at least the error of the multipliers.
+
+    Raises
+    ------
+    InputError
+        If there are none, one is not finite, or the tolerance is not a number from 0 on.
+    """
+    values = np.atleast_1d(np.asarray(multipliers, dtype=complex))
+    if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
+        raise InputError(f"multipliers {values}: they must be finite numbers, at least one")
+    if not (isfinite(tolerance) and tolerance >= 0.0):
+        raise InputError(f"tolerance is {tolerance}: it must be a finite number, zero or greater")
+    largest = complex(values[np.argmax(np.abs(values))])
+    margin = 1.0 - abs(largest)
+    if margin > tolerance:
+        stability = Stability.STABLE
+    elif margin < -tolerance:
+        stability = Stability.UNSTABLE
+    else:
+        stability = Stability.MARGINAL
+    return StabilityVerdict(stability=stability, margin=margin, tolerance=tolerance, largest_multiplier=largest)
+
+
+def crossing(multiplier: complex, angle: float = REAL_ANGLE) -> Crossing:
+    """What a multiplier on its way through the unit circle means; real ones to within an angle (rad)."""
+    if abs(np.angle(multiplier)) <= angle:
+        return Crossing.FOLD
+    if abs(np.angle(-multiplier)) <= angle:
+        return Crossing.PERIOD_DOUBLING
+    return Crossing.TORUS
+
+
+def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
+    """Determinant of the monodromy matrix by Liouville's formula, exp of the integral of the trace over the period.
+
+    Parameters
+    ----------
+    trace : array_like, shape (n,)
+        Trace of the Jacobian matrix at equal steps over one period, the end left out. The trapezoidal rule, exact here to
+        within the trace's harmonics of order n and more.
+    period : float
+        In the unit of the independent variable: rad, or s.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, or there is none.
+    """
+    values = np.asarray(trace, dtype=float)
+    if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
+        raise InputError("the traces over a period must be finite numbers, at least one")
+    return exp(period * float(values.mean()))
+
+
+def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> NDArray[np.float64]:
+    """Smooth function of monodromy matrices that is zero where a multiplier crosses the unit circle in this way.
+
+    Parameters
+    ----------
+    monodromy : ndarray, shape (..., n, n)
+    crossing : Crossing or int
+        +1 for a fold, -1 for a period doubling: det(I - multiplier Phi), positive where all multipliers are inside the unit
+        circle, negative where one real multiplier has passed it. For a torus the product, over all pairs of
+        multipliers, of their product less one.
+
+    Returns
+    -------
+    ndarray, shape (...,)
+    """
+    if crossing is Crossing.TORUS:
+        mu = multipliers(monodromy)
+        pairs = [mu[..., i] * mu[..., j] - 1.0 for i in range(mu.shape[-1]) for j in range(i)]
+        return np.asarray(np.prod(pairs, axis=0).real)
+    multiplier = _SIGN[crossing] if isinstance(crossing, Crossing) else crossing
+    require_sign(multiplier)
+    if monodromy.shape[-1] != 2:
+        return np.asarray(np.linalg.det(np.eye(monodromy.shape[-1]) - multiplier * monodromy))
+    trace = monodromy[..., 0, 0] + monodromy[..., 1, 1]
+    det = monodromy[..., 0, 0] * monodromy[..., 1, 1] - monodromy[..., 0, 1] * monodromy[..., 1, 0]
+    return np.asarray(1.0 - multiplier * trace + det)
+
+
+def require_sign(multiplier: int) -> None:
+    """Raise `InputError` for a multiplier that is neither +1 nor -1."""
+    if multiplier not in (1, -1):
+        raise InputError(f"multiplier is {multiplier}: the boundaries sought are those of +1 or -1")

@@ -1,0 +1,309 @@
+"""What can vary of a mechanism and its drive, by FMI name: one parameter, two of a chart, and exact derivatives by all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name, fmi_name
+
+from ...files import unknown_name
+from ...mechanisms import Parameters, mechanism_of
+from ...numerics import symbolic
+from ...run import of_parameters, takes_published
+from ...units import RAD_S_PER_RPM
+from .drive import Direction, Drive, forces_of, require_acting
+from .flow import Flow, crank_of
+
+#: A mechanism and what drives it.
+Operation = tuple[Parameters, Drive]
+
+#: The operation at a point of a chart.
+Plane = Callable[[float, float], Operation]
+
+
+@cache
+def _of_the_crank(mechanism: Mechanism) -> dict[str, str]:
+    """FMI names of the crank's speed and torque: what of `Drive` each is."""
+    crank = crank_of(mechanism)
+    numbers = {"torque": crank.torque, "speed": crank.command}
+    return {mechanism.channels[n].name: what for what, n in numbers.items() if n is not None}
+
+
+@cache
+def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
+    """Names of what a motor on the crank has, in the order of `Drive.vector`: field and unit of each."""
+    units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
+    torques = [name for name, what in _of_the_crank(mechanism).items() if what == "torque"]
+    return {f"{name}.{field}": (field, unit) for name in torques for field, unit in units.items()}
+
+
+def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of what can vary of a drive: the crank's speed and torque, what a motor has, and forces."""
+    return (*_of_the_crank(mechanism), *of_the_motor(mechanism), *forces_of(mechanism))
+
+
+def speed_name(mechanism: Mechanism) -> str | None:
+    """FMI name of the crank's prescribed speed, such as ``drive.speed``; None where it cannot be prescribed."""
+    return next((name for name, what in _of_the_crank(mechanism).items() if what == "speed"), None)
+
+
+@takes_published()
+def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
+    """Check that a parameter of this name can vary in this drive.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of that name.
+    InputError
+        If it does not act in this drive: a speed under a torque, a torque at prescribed speed, a motor's where there is none.
+    """
+    mechanism = mechanism_of(parameters)
+    unit_of(mechanism, name)
+    what = _of_the_crank(mechanism).get(name)
+    if what is not None and (what == "speed") != drive.speed_drive:
+        raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+    if name in of_the_motor(mechanism) and drive.motor is None:
+        raise InputError(f"{name} cannot vary: no motor drives the crank")
+    if name in forces_of(mechanism):
+        require_acting(drive, mechanism, forces_of(mechanism)[name])
+
+
+def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of what can vary of a mechanism and its drive: see `driving_names`; and parameters."""
+    of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
+    return (*driving_names(mechanism), *of_mechanism)
+
+
+def unit_of(mechanism: Mechanism, name: str) -> str:
+    """Unit of what can vary of a mechanism and its drive, by its FMI name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such thing.
+    """
+    names = variable_names(mechanism)
+    if name not in names:
+        raise unknown_name(name, names)
+    if name in of_the_motor(mechanism):
+        return of_the_motor(mechanism)[name][1]
+    return next(v.unit for v in mechanism.variables if v.name == name)
+
+
+@takes_published()
+def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
+    """The value there is of what can vary; NaN of a speed under a torque, or of a motor that there is not."""
+    mechanism = mechanism_of(parameters)
+    what = _of_the_crank(mechanism).get(name)
+    if what is not None:
+        value = getattr(drive, what)
+        return float("nan") if value is None else float(value)
+    if name in of_the_motor(mechanism):
+        return float(getattr(drive.motor, of_the_motor(mechanism)[name][0], np.nan))
+    if name in forces_of(mechanism):
+        return float(drive.forces.get(name, 0.0))
+    return float(getattr(parameters, field_name(name)))
+
+
+def format_value(name: str, value: float, unit: str) -> str:
+    """A value with its name and unit; speeds in rpm too."""
+    rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
+    return f"{name} = {value:.6g} {unit}".rstrip() + rpm
+
+
+@lru_cache(maxsize=64)
+def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
+    """Parameters with others of these values; a row of a chart over the speed has one mechanism."""
+    return replace(parameters, **dict(values))
+
+
+@takes_published()
+def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
+    """Mechanism and drive with other values of parameters by their FMI names."""
+    mechanism = mechanism_of(parameters)
+    of_crank, of_motor, forces = _of_the_crank(mechanism), of_the_motor(mechanism), forces_of(mechanism)
+    of_drive: dict[str, Any] = {of_crank[name]: value for name, value in values.items() if name in of_crank}
+    acting = {name: value for name, value in values.items() if name in forces}
+    driving = {of_motor[name][0]: value for name, value in values.items() if name in of_motor}
+    of_mechanism = {field_name(n): v for n, v in values.items() if n not in {*of_crank, *of_motor, *forces}}
+    if acting:
+        of_drive["forces"] = {**drive.forces, **acting}
+    if driving and drive.motor is not None:
+        of_drive["motor"] = replace(drive.motor, **driving)
+    return (
+        _replaced(parameters, *of_mechanism.items()) if of_mechanism else parameters,
+        replace(drive, **of_drive) if of_drive else drive,
+    )
+
+
+@takes_published()
+def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
+    """The plane of two parameters; all else stays as it is.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    x, y : str
+        Parameters of mechanism or drive by their names in the FMI contract, such as ``slider.damping``, ``drive.speed`` or
+        ``slider.force``; in SI.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of that name.
+    InputError
+        If both axes are the same, or one does not act in this drive.
+    """
+    if x == y:
+        raise InputError(f"both axes are {x!r}: a chart needs two parameters")
+    for name in (x, y):
+        require_variable(parameters, drive, name)
+
+    def operation(first: float, second: float) -> Operation:
+        return with_values(parameters, drive, {x: first, y: second})
+
+    return operation
+
+
+#: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
+#: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
+_DIFFERENCE = 1e-6
+
+#: What varies: an FMI name, or a function of one number.
+Vary = str | Callable[[float], Operation]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """Periodic motions of a mechanism as one parameter varies.
+
+    Attributes
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    vary : str or callable
+        FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
+        as ``slider.damping``; or a function from a number to (parameters, Drive).
+    name, unit : str
+        Of the parameter, for tables and plots; they follow from an FMI name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of that name.
+    InputError
+        If it does not act in this drive.
+    """
+
+    parameters: Parameters
+    drive: Drive
+    vary: Vary = "drive.speed"
+    name: str = ""
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if callable(self.vary):
+            object.__setattr__(self, "name", self.name or "parameter")
+            return
+        require_variable(self.parameters, self.drive, self.vary)
+        object.__setattr__(self, "name", self.name or self.vary)
+        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), self.vary))
+
+    def at(self, value: float) -> Operation:
+        """Mechanism and drive at a value of the parameter."""
+        if callable(self.vary):
+            return self.vary(value)
+        return with_values(self.parameters, self.drive, {self.vary: value})
+
+    def format_value(self, value: float) -> str:
+        """A value of the parameter with its name and unit; speeds in rpm too."""
+        return format_value(self.name, value, self.unit)
+
+    def direction(self, value: float, low: float, high: float) -> Direction:
+        """By differences inside the parameter's range."""
+        step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
+        a, b = max(value - step, low), min(value + step, high)
+        mechanism = mechanism_of(self.parameters)
+        vectors, numbers = zip(*((d.vector(mechanism), np.array(p.constants())) for p, d in (self.at(a), self.at(b))))
+        return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
+
+
+FloatArray = NDArray[np.float64]
+
+
+@takes_published()
+def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
+    """All parameters that motions have derivatives by: what acts of the drive, and those of the mechanism, by FMI name.
+
+    A parameter that would switch on what is switched off, friction by contact forces, is left out: it can be named all the
+    same.
+    """
+    mechanism, acting = mechanism_of(parameters), []
+    for name in variable_names(mechanism):
+        try:
+            require_variable(parameters, drive, name)
+        except InputError:
+            continue
+        acting.append(name)
+    if mechanism.switch_place < 0 or mechanism.switched(parameters.constants()):
+        return tuple(acting)
+    effect = along_parameters(parameters, acting).p[mechanism.switch_place]
+    return tuple(name for name, change in zip(acting, effect) if change == 0.0)
+
+
+class Along(NamedTuple):
+    """Derivatives of the constants with respect to parameters, and of these with respect to one more; shape (P, m)."""
+
+    p: FloatArray
+    p_along: FloatArray
+
+
+def along_parameters(parameters: Parameters, names: Sequence[str], along: str = "") -> Along:
+    """Derivatives of the constants by parameters of FMI names, zero by what is no parameter of the mechanism."""
+    mechanism = mechanism_of(parameters)
+    own = [float(getattr(parameters, field.name)) for field in fields(parameters)]
+    known = {fmi_name(field.name): number for number, field in enumerate(fields(parameters))}
+    direction = np.zeros(len(own))
+    if along in known:
+        direction[known[along]] = 1.0
+    found = [np.asarray(part) for part in _constants(mechanism)(own, direction)]
+    chosen = [np.zeros((len(found[0]), len(names))) for _ in found]
+    for part, columns in zip(found, chosen):
+        for column, name in enumerate(names):
+            if name in known:
+                columns[:, column] = part[:, known[name]]
+    return Along(*chosen)
+
+
+def stacked(flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
+    """Derivatives of the numbers of the drive, and after them of the constants, ``p``; shape (c, m)."""
+    mechanism = flow.mechanism
+    drive = np.zeros((flow.drive_size, p.shape[1]))
+    # in the order of `Drive.vector`
+    places = (*mechanism.input_names, *of_the_motor(mechanism))
+    for column, name in enumerate(names):
+        if name in places:
+            drive[places.index(name), column] = 1.0
+    return np.vstack([drive, p])
+
+
+@cache
+def _constants(mechanism: Mechanism) -> Any:
+    """(parameters, direction) -> derivatives of the constants, and of these along the direction."""
+    casadi = symbolic.library()
+    traced = of_parameters(mechanism)
+    k = casadi.vertcat(*traced.parameters.constants())
+    direction = casadi.SX.sym("direction", *traced.own.shape)
+    jacobian = casadi.jacobian(k, traced.own)
+    along = casadi.reshape(casadi.jtimes(casadi.vec(jacobian), traced.own, direction), *jacobian.shape)
+    return casadi.Function("constants", [traced.own, direction], [casadi.densify(jacobian), casadi.densify(along)])

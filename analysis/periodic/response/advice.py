@@ -1,0 +1,380 @@
+"""Which values of a parameter to avoid and why, what follows at folds, and where the amplitude is greatest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import combinations, pairwise, product
+from math import inf, isfinite, prod, sqrt
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, LinkworkError
+
+from ...numerics.peaks import peaks
+from ..motion.discretisation import OrbitError
+from ..motion.floquet import TOLERANCE, Crossing, Stability
+from ..motion.orbit import PeriodicOrbit, orbit_of
+from ..motion.variables import Family, value_of
+from ..stability.nonlinear import SpecialPoint
+from ..stability.sensitivity import PointGradient, crossing_gradient, extremum_gradient, extremum_orbit
+from .branch import Branch
+
+#: A resonance reaches from a peak to where the amplitude is less than this part of it: the half-power points.
+HALF_POWER = 1.0 / sqrt(2.0)
+
+#: How far a peak stands out, relative to its height, to count as one.
+_PROMINENCE = 1e-3
+
+#: Relative difference up to which two arcs are one curve, followed twice.
+_SAME = 1e-2
+
+#: Relative difference of values of the parameter that is a rounding error; part of the range below which an interval is none:
+#: a doubled branch begins a step beyond its doubling.
+_ROUNDING, _SLIVER = 1e-6, 1e-4
+
+FloatArray = NDArray[np.float64]
+
+Interval = tuple[float, float]
+
+
+class Risk(Enum):
+    """Why a value of the parameter is to be avoided."""
+
+    RESONANCE = "resonance, above 0.71 of the peak"
+    SEVERAL = "several stable motions, jumps between them"
+    DOUBLED = "stable only with a period of several turns"
+    UNSTABLE = "no stable motion found"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Avoided:
+    """A range of the parameter, of a speed in rad/s, that a machine had better not stay in, and why."""
+
+    low: float
+    high: float
+    risk: Risk
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoldJump:
+    """What a machine does that comes to a fold on the stable motion that ends there.
+
+    Attributes
+    ----------
+    parameter : float
+    direction : int
+        +1 if the motion is there below the fold and ends as the parameter rises, -1 if it ends as it falls.
+    before : float
+        Amplitude of the motion that ends.
+    after : tuple of float
+        Amplitudes of the stable motions there are beyond; more than one where the branches do not tell which it will be, none
+        where none was followed.
+    """
+
+    parameter: float
+    direction: int
+    before: float
+    after: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Arc:
+    """A part of a branch with one way of the parameter and one stability.
+
+    Attributes
+    ----------
+    turns : int
+        Of the crank in a period.
+    stable : bool
+        Whether no deviation grows.
+    parameter, amplitude : ndarray, shape (m,)
+        By rising parameter, from special point to special point.
+    start : ndarray, shape (m, n)
+        Starts of the orbits.
+    cut : (bool, bool)
+        Whether the branch goes on beyond the low and the high end, on another arc.
+    """
+
+    turns: int
+    stable: bool
+    parameter: FloatArray
+    amplitude: FloatArray
+    start: FloatArray
+    cut: tuple[bool, bool]
+
+    @property
+    def span(self) -> Interval:
+        """The least and the greatest value of the parameter."""
+        return float(self.parameter[0]), float(self.parameter[-1])
+
+    def same_as(self, other: Arc) -> bool:
+        """Whether two arcs are one curve where they overlap: a branch that was followed from both of its ends is."""
+        low, high = _overlap(self, other)
+        if self.turns != other.turns or low >= high:
+            return False
+        places = np.linspace(low, high, 7)[1:-1]
+        # a period of several turns may begin with any of them
+        own, others = (a.start if a.turns == 1 else a.amplitude[:, None] for a in (self, other))
+        size = np.abs(own).max(axis=0) + 1e-300
+        apart = [
+            np.abs(np.interp(places, self.parameter, a) - np.interp(places, other.parameter, b)) / s
+            for a, b, s in zip(own.T, others.T, size)
+        ]
+        return bool(np.median(np.max(apart, axis=0)) < _SAME)
+
+
+def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
+    """The arcs of branches, in their order."""
+    return tuple(arc for branch in branches for arc in _arcs_of(branch))
+
+
+def _arcs_of(branch: Branch) -> list[Arc]:
+    places = [special.after + 1 for special in branch.special]
+    special = [special.orbit for special in branch.special]
+    parameter = np.insert(branch.parameter, places, [s.parameter for s in branch.special])
+    amplitude = np.insert(branch.amplitude, places, [orbit.amplitude for orbit in special])
+    start = np.array([orbit.start for orbit in branch.orbits])
+    start = np.insert(start, places, [orbit.start for orbit in special], axis=0) if special else start
+    # at a special point itself a multiplier is on the unit circle: its neighbours judge
+    holds = np.insert(branch.largest_multiplier <= 1.0 + TOLERANCE, places, True)
+    stable = holds[1:] & holds[:-1]
+    if len(places) > 1:
+        own = np.insert(np.zeros(len(branch), dtype=bool), places, True)
+        stable &= ~(own[1:] & own[:-1])
+    signs = np.sign(np.diff(parameter))
+    changes = np.flatnonzero((stable[1:] != stable[:-1]) | (signs[1:] != signs[:-1])) + 1
+    bounds = [0, *changes.tolist(), len(stable)]
+    found = []
+    for first, last in pairwise(bounds):
+        if last == first or parameter[first] == parameter[last]:
+            continue
+        way = slice(first, last + 1)
+        cut = first > 0, last < len(stable)
+        order = 1 if parameter[last] > parameter[first] else -1
+        found.append(
+            Arc(
+                turns=branch.turns,
+                stable=bool(stable[first]),
+                parameter=parameter[way][::order],
+                amplitude=amplitude[way][::order],
+                start=start[way][::order],
+                cut=cut if order > 0 else (cut[1], cut[0]),
+            )
+        )
+    return found
+
+
+def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
+    """What happens at the folds at which a stable motion ends, by parameter."""
+    stable = [arc for arc in arcs(branches) if arc.stable]
+    found: list[FoldJump] = []
+    # a motion of twice the period begins at a doubling, where its branch turns back on itself: no motion ends there
+    born = [s.parameter for branch in branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
+    for branch, special in ((b, s) for b in branches for s in b.special if s.kind is Crossing.FOLD):
+        if branch.turns > 1 and any(abs(special.parameter / value - 1.0) < _ROUNDING for value in born):
+            continue
+        value, amplitude = special.parameter, special.orbit.amplitude
+        for arc, (end, direction) in product(stable, ((-1, 1), (0, -1))):
+            if arc.parameter[end] != value or arc.amplitude[end] != amplitude:
+                continue
+            beyond: list[Arc] = []
+            for other in (o for o in stable if o.span[0] < value < o.span[1]):
+                # what was followed twice is one motion
+                if not any(other.same_as(known) for known in (arc, *beyond)):
+                    beyond.append(other)
+            after = sorted(float(np.interp(value, other.parameter, other.amplitude)) for other in beyond)
+            # and so is a fold that was met from both sides
+            if not any(
+                abs(value - other.parameter) < _ROUNDING * abs(value)
+                and abs(amplitude - other.before) < _SAME * amplitude
+                for other in found
+            ):
+                found.append(FoldJump(parameter=value, direction=direction, before=amplitude, after=tuple(after)))
+    return tuple(sorted(found, key=lambda jump: jump.parameter))
+
+
+def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tuple[Avoided, ...]:
+    """Where a machine resonates, may jump, doubles its period or has no stable motion, between two values of the parameter."""
+    least = _SLIVER * (high - low)
+    stable = [arc for arc in arcs(branches) if arc.stable]
+    without = _gaps(_union((arc.span for arc in stable if arc.turns == 1), least), low, high)
+    several = _union((arc.span for arc in stable if arc.turns > 1), least)
+    doubled = [part for gap in without for part in _within(several, *gap)]
+    found = {
+        Risk.RESONANCE: _union((band for arc in stable for band in _resonances(arc)), least),
+        Risk.SEVERAL: _union((_overlap(a, b) for a, b in combinations(stable, 2) if not a.same_as(b)), least),
+        Risk.DOUBLED: doubled,
+        Risk.UNSTABLE: [part for gap in without for part in _gaps(doubled, *gap)],
+    }
+    ranges = [Avoided(low=a, high=b, risk=risk) for risk, parts in found.items() for a, b in parts if b - a > least]
+    return tuple(sorted(ranges, key=lambda avoided: (avoided.low, avoided.high)))
+
+
+def _overlap(a: Arc, b: Arc) -> Interval:
+    """Where both arcs are; the end is not above the beginning where that is nowhere."""
+    return max(a.span[0], b.span[0]), min(a.span[1], b.span[1])
+
+
+def _resonances(arc: Arc) -> list[Interval]:
+    """The half-power bands of the peaks of an arc, and of where it is largest at its end and loses its stability."""
+    a = arc.amplitude
+    tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
+    bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]
+    # at an end the amplitude must have fallen for it to be more than a place on a slope
+    for end, cut, way in ((0, arc.cut[0], 1), (len(a) - 1, arc.cut[1], -1)):
+        if arc.turns == 1 and cut and a[end] == a.max() and a.min() < HALF_POWER * a[end]:
+            bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc, end, way)))))
+    return [(low, high) for low, high in bands if isfinite(low) and isfinite(high)]
+
+
+def _band_end(arc: Arc, top: int, way: int) -> float:
+    """The half-power point of a peak to one side; infinite if the amplitude rises above the peak before."""
+    a, x = arc.amplitude, arc.parameter
+    level, i = HALF_POWER * a[top], top
+    while 0 <= i + way < len(a):
+        i += way
+        if a[i] > a[top]:
+            return inf
+        if a[i] < level:
+            # by the cubic through the points about it, as far as it is between these two
+            about = slice(max(min(i, i - way) - 1, 0), max(i, i - way) + 2)
+            places = a[about].tolist()
+            weights = [prod((level - b) / (c - b) for b in places if b != c) for c in places]
+            return float(np.clip(np.dot(weights, x[about]), *sorted((x[i - way], x[i]))))
+    return float(x[i])
+
+
+def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
+    """Intervals that overlap or are less apart than ``least`` become one."""
+    joined: list[Interval] = []
+    for low, high in sorted((low, high) for low, high in intervals if low < high):
+        if joined and low <= joined[-1][1] + least:
+            joined[-1] = joined[-1][0], max(joined[-1][1], high)
+        else:
+            joined.append((low, high))
+    return joined
+
+
+def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
+    """What intervals leave free between two values."""
+    ends = [low, *(v for interval in intervals for v in interval), high]
+    return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
+
+
+def _within(intervals: Iterable[Interval], low: float, high: float) -> list[Interval]:
+    """The parts of intervals between two values."""
+    return [(max(a, low), min(b, high)) for a, b in intervals if max(a, low) < min(b, high)]
+
+
+#: How far a maximum of the amplitude stands out, relative to its height, to count as one.
+PROMINENCE = 1e-3
+
+#: Error of an amplitude that is read from samples, relative to it.
+_SAMPLED = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extremum:
+    """A local maximum or minimum of the amplitude over the parameter.
+
+    Attributes
+    ----------
+    parameter : float
+        Speed (rad/s), or what else varies.
+    amplitude : float
+        m.
+    stability : Stability
+        Of the motion there.
+    orbit : PeriodicOrbit
+        That motion.
+    """
+
+    parameter: float
+    amplitude: float
+    stability: Stability
+    orbit: PeriodicOrbit
+
+
+def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
+    """Local maxima (sign +1) or minima (-1) of the amplitude along a branch, each brought to rest.
+
+    The place is that of `extremum_gradient`: where the derivative of the amplitude with respect to the parameter, which is
+    exact, is zero. What varies by a function, or has a kink there, is searched by Brent's method on the orbits at fixed
+    parameters: since the amplitude hardly changes there, the place is then good to 1e-4 of the parameter.
+    """
+    amplitude = sign * branch.amplitude
+    found = []
+    for i, prominence in peaks(amplitude):
+        if prominence < PROMINENCE * abs(amplitude[i]):
+            continue
+        a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
+        # at a fold the parameter turns back, and the greatest amplitude of the neighbours stands
+        if not a < branch.parameter[i] < c:
+            continue
+        place, orbit = _at_rest(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
+        found.append(
+            Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability, orbit=orbit)
+        )
+    return tuple(found)
+
+
+def _at_rest(
+    family: Family, orbit: PeriodicOrbit, a: float, begin: float, c: float, sign: int
+) -> tuple[float, PeriodicOrbit]:
+    """The extremum between a and c and the motion there, from a motion between them."""
+    if isinstance(family.vary, str):
+        try:
+            rested = extremum_orbit(orbit, family.vary)
+        except LinkworkError:
+            pass
+        else:
+            place = value_of(rested.parameters, rested.drive, family.vary)
+            if a < place < c and sign * (rested.amplitude - orbit.amplitude) > -_SAMPLED * orbit.amplitude:
+                return place, rested
+
+    def near(value: float) -> PeriodicOrbit:
+        parameters, drive = family.at(value)
+        return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
+
+    try:
+        best = scipy.optimize.minimize_scalar(
+            lambda value: -sign * near(value).amplitude,
+            bounds=(a, c),
+            method="bounded",
+            options={"xatol": 1e-6 * (c - a)},
+        )
+        return float(best.x), near(float(best.x))
+    except OrbitError:
+        # next to the limit of assembly a neighbour at a fixed parameter may not be found: the point itself stands
+        return begin, orbit
+
+
+def special_gradient(
+    family: Family, point: SpecialPoint | Extremum, names: Sequence[str] | None = None
+) -> PointGradient:
+    """How a special point of a branch, or a maximum or minimum of its amplitude, moves with the other parameters.
+
+    Parameters
+    ----------
+    family : Family
+        Over a parameter with an FMI name.
+    point : SpecialPoint or Extremum
+    names : sequence of str, optional
+        Of the other parameters; by default all, see `gradient_names`.
+
+    Raises
+    ------
+    InputError
+        If the family's parameter is a function.
+    LinkworkError
+        If the place has no derivative, as where two folds meet.
+    """
+    if not isinstance(family.vary, str):
+        raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")
+    if isinstance(point, SpecialPoint):
+        return crossing_gradient(point.orbit, point.kind, family.vary, names)
+    return extremum_gradient(point.orbit, family.vary, names)

@@ -1,0 +1,489 @@
+"""Branches of periodic motions: how an orbit changes with a parameter, where it loses its stability, and what branches off.
+
+The parameter is the speed, the torque, a force, any parameter of the FMI contract, or whatever a function of one number
+says. A branch is followed by arclength, past its folds; between its points are located where a Floquet multiplier crosses the
+unit circle: at +1 (fold), at -1 (period doubling), or as a complex pair (torus). From a period doubling one switches to the
+motion of twice the period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ...files import write_csv
+from ...mechanisms import mechanism_of
+from ...notebook import Shown, format_count, format_range
+from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
+from ..motion.discretisation import OrbitError, growths, period_from, pieces_from
+from ..motion.drive import scale_of
+from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test
+from ..motion.flow import label
+from ..motion.orbit import PeriodicOrbit, Turn, orbit_equations
+from ..motion.variables import Family
+from ..stability.nonlinear import SpecialPoint
+
+#: First step along a branch, in scaled arc length, the greatest where the parameter hardly changes, and the angle between the
+#: tangents of two points (rad) up to which steps grow: where a curve is round, 150 points a turn are enough to draw it.
+_FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
+
+#: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
+_SWITCH = 2e-3
+
+#: A branch is left where the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or where its
+#: largest multiplier passes this.
+LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
+
+#: Growth over a period, or over one of its pieces, from which a period is followed in (more) pieces; growth aimed at for each,
+#: pieces at least and at most a turn, and places of a turn from which their ends are chosen.
+_GROWTH, _AIM, _FEWEST, _PLACES = 1e3, 10.0, 8, 64
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Branch(Shown):
+    """Orbits along a curve, in its order.
+
+    Attributes
+    ----------
+    family : Family
+    turns : int
+        Turns of the crank in a period.
+    parameter : ndarray, shape (m,)
+    orbits : tuple of PeriodicOrbit
+    special : tuple of SpecialPoint
+    reached, closed : bool
+        Whether it ended at an end of the range, where it began, or at a branch of half its period; where it began.
+    reason : str
+        Why it ended. Where the branch was lost, its last point is the last good one.
+    """
+
+    family: Family
+    turns: int
+    parameter: NDArray[np.float64]
+    orbits: tuple[PeriodicOrbit, ...]
+    special: tuple[SpecialPoint, ...]
+    reached: bool
+    closed: bool
+    reason: str
+    # what `columns` has computed
+    _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        special = "".join(f", {s.kind.value} at {self.family.format_value(s.parameter)}" for s in self.special)
+        ended = "" if self.reached else f", ended early: {self.reason}"
+        return f"<Branch: {describe((self,))}{special}{ended}>"
+
+    def __len__(self) -> int:
+        return len(self.orbits)
+
+    @property
+    def amplitude(self) -> NDArray[np.float64]:
+        """Half the range of the first free coordinate at each point, of a slider position (m); shape (m,)."""
+        label, unit = self.orbits[0].swing
+        return self.columns()[f"amplitude of {label} [{unit}]"]
+
+    @property
+    def largest_multiplier(self) -> NDArray[np.float64]:
+        """Largest modulus of the Floquet multipliers at each point, shape (m,)."""
+        return np.array([orbit.largest for orbit in self.orbits])
+
+    def stability(self, tolerance: float = TOLERANCE) -> tuple[Stability, ...]:
+        """Verdict at each point."""
+        return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
+
+    def columns(self) -> Mapping[str, NDArray[np.float64]]:
+        """What varies along the branch, by name with unit, each of shape (m,).
+
+        The parameter, mean speed (under a torque), turns in a period, and of the first free coordinate, a five-bar's u,
+        amplitude, mean and first harmonics; largest multiplier, stability; of what the mechanism has, mean and greatest crank
+        torque, greatest forces in pins, guide and bearings, least transmission sine.
+        """
+        if not self._table:
+            turns = [orbit.turn() for orbit in self.orbits]
+            values = _of_a_turn(self.orbits[0], turns[0])
+            self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in values.items()})
+        unit = f" [{self.family.unit}]" if self.family.unit else ""
+        largest = self.largest_multiplier
+        signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
+        first = {
+            f"{self.family.name}{unit}": self.parameter,
+            "turns in a period [1]": np.full(len(self), float(self.turns)),
+            "largest multiplier [1]": largest,
+            "stable (1), marginal (0), unstable (-1)": signs,
+        }
+        return first | self._table
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the branch as a table, a row a point; see `columns`."""
+        return write_csv(path, self.columns())
+
+
+#: Beginning of the names of the columns of forces in joints.
+FORCE = "greatest force in "
+
+
+def _of_a_turn(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
+    """Columns of a branch that come from the outputs over a period, of those outputs that the mechanism has."""
+    mechanism = mechanism_of(orbit.parameters)
+    rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
+    swing, what = first.swing, "{} [{}]".format(*orbit.swing)
+    columns: dict[str, Callable[[Turn], float]] = {
+        f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * turn.turns / turn.period,
+        f"amplitude of {what}": lambda turn: turn.amplitude,
+        f"mean of {what}": lambda turn: float(turn[swing].mean()),
+    }
+    for order in (1, 2, 3):
+        columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]
+    if "drive.applied_torque" in first.names:
+        columns["mean crank torque [N.m]"] = lambda turn: float(turn["drive.applied_torque"].mean())
+        columns["greatest crank torque [N.m]"] = lambda turn: float(np.abs(turn["drive.applied_torque"]).max())
+    for joint in dict.fromkeys(name.removesuffix(".fx") for name in first.names if name.endswith(".fx")):
+        parts = [f"{joint}.f{axis}" for axis in "xyz" if f"{joint}.f{axis}" in first.names]
+        columns[f"{FORCE}{joint.replace('.', ' ')} [N]"] = lambda turn, parts=parts: float(  # type: ignore[misc]
+            reduce(np.hypot, (turn[part] for part in parts)).max()
+        )
+    if "slider.guide_force" in first.names:
+        columns["greatest guide force [N]"] = lambda turn: float(np.abs(turn["slider.guide_force"]).max())
+    if "transmission.angle" in first.names:
+        columns["least sine of the transmission angle [1]"] = lambda turn: float(
+            np.abs(np.sin(turn["transmission.angle"])).min()
+        )
+    return columns
+
+
+def follow(
+    family: Family,
+    orbit: PeriodicOrbit,
+    value: float,
+    *,
+    low: float,
+    high: float,
+    direction: int = 1,
+    greatest: float = 2e-2,
+    most_points: int = 5000,
+    watch: Callable[[float], None] | None = None,
+    stop: Callable[[PeriodicOrbit], bool] | None = None,
+) -> Branch:
+    """Follow the branch through an orbit to an end of the range of the parameter.
+
+    Parameters
+    ----------
+    family : Family
+    orbit : PeriodicOrbit
+        At the value of the parameter.
+    value : float
+        Where to begin, from ``low`` to ``high``.
+    low, high : float
+        Range of the parameter.
+    direction : int
+        +1 to higher values at first, -1 to lower.
+    greatest : float
+        Greatest step of the parameter, relative to its range; narrow resonances need small ones.
+    most_points : int
+    watch : callable, optional
+        Called with the parameter of every point.
+    stop : callable, optional
+        Asked with the orbit of every point whether to leave it at that.
+
+    Returns
+    -------
+    Branch
+        As far as it could be followed; ``reason`` says why it ended.
+
+    Raises
+    ------
+    ContinuationError
+        If the orbit is not on the family.
+    """
+    settings = _settings(low, high, greatest, most_points)
+    follower = _follower(family, orbit, settings)
+    return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch, stop)
+
+
+def switch(
+    family: Family,
+    doubling: SpecialPoint,
+    *,
+    low: float,
+    high: float,
+    greatest: float = 2e-2,
+    largest: float = GREATEST_MULTIPLIER,
+    most_points: int = 5000,
+    watch: Callable[[float], None] | None = None,
+    stop: Callable[[PeriodicOrbit], bool] | None = None,
+) -> Branch:
+    """The branch of twice the period that leaves a branch at a period doubling.
+
+    Parameters
+    ----------
+    family, low, high, greatest, most_points, watch, stop
+        See `follow`.
+    doubling : SpecialPoint
+    largest : float
+        The branch is left where its largest multiplier passes this.
+
+    Raises
+    ------
+    InputError
+        If the point is no period doubling.
+    ContinuationError
+        If no point on the new branch is found.
+    """
+    if doubling.kind is not Crossing.PERIOD_DOUBLING:
+        raise InputError(
+            f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
+        )
+    orbit = doubling.orbit
+    settings = _settings(low, high, greatest, most_points)
+    doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
+    follower = _follower(family, doubled, settings)
+    # the eigenvector of the multiplier -1 is the direction in which every second period differs
+    scale = follower.scale[:-1]
+    scaled = (orbit.monodromy + np.eye(len(scale))) * scale / scale[:, None]
+    vector = np.linalg.svd(scaled)[2][-1] * scale
+    base = follower.along(orbit.start, doubling.parameter, np.append(vector, 0.0))
+    for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
+        taken = follower.step(base, length)
+        # back on the undoubled branch the start repeats itself after half the period
+        if taken is not None and abs(float((taken.y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length:
+            return _branch(family, doubled.turns, follower, taken, watch, stop, largest)
+    raise ContinuationError(
+        f"the motion of twice the period is not met next to {family.format_value(doubling.parameter)}"
+    )
+
+
+def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
+    """The whole branch through an orbit, to both sides of it: see `follow`."""
+    up = follow(family, orbit, value, low=low, high=high, **how)
+    if up.closed:
+        return up
+    down = follow(family, orbit, value, low=low, high=high, direction=-1, **how)
+    before = len(down) - 1
+    turned = [replace(special, after=before - 1 - special.after) for special in reversed(down.special)]
+    return Branch(
+        family=family,
+        turns=orbit.turns,
+        parameter=np.concatenate([down.parameter[:0:-1], up.parameter]),
+        orbits=(*down.orbits[:0:-1], *up.orbits),
+        special=(*turned, *(replace(special, after=special.after + before) for special in up.special)),
+        reached=down.reached and up.reached,
+        closed=False,
+        reason=up.reason if down.reached else down.reason,
+    )
+
+
+def _settings(low: float, high: float, greatest: float, most_points: int) -> Settings:
+    return Settings(
+        low=low,
+        high=high,
+        first=min(_FIRST, greatest),
+        greatest=max(_LONGEST, greatest),
+        widest=greatest,
+        most_points=most_points,
+        growing_turn=_ROUND,
+    )
+
+
+def _follower(
+    family: Family, orbit: PeriodicOrbit, settings: Settings, angles: NDArray[np.float64] | None = None
+) -> Follower:
+    ends = [family.at(value) for value in (settings.low, settings.high)]
+    scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
+    if angles is not None:
+        # an arc has the length of the mean square over the pieces
+        scale = np.tile(scale * np.sqrt(len(angles) - 1), len(angles) - 1)
+    return Follower(orbit_equations(family, orbit.turns, settings.low, settings.high, angles), scale, settings)
+
+
+def _growth(orbit: PeriodicOrbit) -> float:
+    """Growth of a deviation over a period, or over one of its pieces where it is followed in pieces."""
+    return orbit.largest if orbit.stations is None else orbit.stations.growth
+
+
+def _in_pieces(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
+    """The same curve from its last point on, the period followed in pieces in each of which deviations grow alike."""
+    orbit: PeriodicOrbit = last.data
+    count = _PLACES * orbit.turns
+    places = orbit.turn(count).states[:, orbit.flow.places]
+    angles = np.linspace(0.0, orbit.flow.period * orbit.turns, count + 1)
+    matrices = pieces_from(orbit.parameters, orbit.drive, angles, places)[1]
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    growth = np.log(growths(matrices, scale).clip(1.0))
+    # half of the pieces by growth, half by angle
+    pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(_AIM)), _FEWEST * orbit.turns, count))
+    share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
+    chosen = np.unique(np.searchsorted(share, np.linspace(0.0, share[-1], pieces + 1)).clip(0, count))
+    refined = _follower(family, orbit, settings, angles[chosen])
+    n, k = len(orbit.start), len(chosen) - 1
+    ahead = np.zeros(n * k + 1)
+    ahead[:n], ahead[-1] = last.tangent[:n], last.tangent[-1]
+    return refined, refined.resume(places[chosen[:-1]].ravel(), last.parameter, ahead)
+
+
+def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
+    """Why a branch is not followed beyond a point; empty where it is."""
+    orbit = point.data
+    if orbit.largest > largest:
+        return f"its largest multiplier passes {largest:g}"
+    sine = orbit.clearance(64) if orbit.nearest is None else orbit.nearest
+    if sine < LEAST_SINE:
+        return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
+    return ""
+
+
+def _branch(
+    family: Family,
+    turns: int,
+    follower: Follower,
+    first: Point,
+    watch: Callable[[float], None] | None,
+    stop: Callable[[PeriodicOrbit], bool] | None,
+    largest: float = GREATEST_MULTIPLIER,
+) -> Branch:
+    pieces: list[tuple[Follower, Curve]] = []
+    settings = follower.settings
+    before, merged = first, False
+    while True:
+        refine = False
+
+        def leave(point: Point) -> str:
+            nonlocal refine, before, merged
+            merged = _meets_half(before, point)
+            if merged:
+                return "it meets the branch of half the period"
+            before = point
+            if stop is not None and stop(point.data):
+                return "it was interrupted"
+            reason = reason_to_leave(point, largest)
+            if not reason and _growth(point.data) > _GROWTH:
+                refine = True
+                return "deviations grow too fast to be followed over a whole period"
+            return reason
+
+        curve = follower.follow(
+            first, watch=None if watch is None else lambda point: watch(point.parameter), leave=leave
+        )
+        if merged:
+            # beyond it are the same motions, begun half a period later
+            curve = replace(curve, points=curve.points[:-1], steps=curve.steps[:-1])
+        pieces.append((follower, curve))
+        last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
+        lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > _AIM and last.data.stations is None
+        if not (refine or lost) or left < 2 or (len(curve.points) == 1 and len(pieces) > 1):
+            break
+        settings = replace(settings, most_points=left)
+        try:
+            follower, first = _in_pieces(family, last, settings)
+        except OrbitError:
+            break
+    special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]
+    # the first point of a piece is the last of the one before
+    points = [p for part, (_, curve) in enumerate(pieces) for p in curve.points[min(part, 1) :]]
+    return Branch(
+        family=family,
+        turns=turns,
+        parameter=np.array([point.parameter for point in points]),
+        orbits=tuple(point.data for point in points),
+        special=tuple(special),
+        reached=curve.reached or merged,
+        closed=curve.closed,
+        reason=curve.reason,
+    )
+
+
+def _meets_half(before: Point, after: Point) -> bool:
+    """Whether a branch meets one of half the period between two points: there it turns back, and the halves change places."""
+    turns = after.data.turns
+    if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
+        return False
+    try:
+        halves = [
+            period_from(o.parameters, o.drive, o.start, turns // 2).shift / scale_of(o.parameters, o.drive, o.start)
+            for o in (before.data, after.data)
+        ]
+    except OrbitError:
+        return False
+    return bool(halves[0] @ halves[1] < 0.0)
+
+
+def _tests(point: Point) -> dict[Crossing, float]:
+    """What changes its sign along a branch where a multiplier crosses the unit circle."""
+    # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
+    return {
+        kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
+        for kind in Crossing
+    }
+
+
+def _special_points(
+    curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
+) -> list[SpecialPoint]:
+    """The special points of a piece of a branch, numbered after the pieces before it."""
+    passed = sum(len(piece.points) - 1 for _, piece in pieces)
+    found: list[tuple[int, float, SpecialPoint]] = []
+    values = [_tests(point) for point in curve.points]
+    for i, length in enumerate(curve.steps):
+        for kind in Crossing:
+            # the product of two multipliers at prescribed speed follows from the damping alone and crosses nothing
+            if (
+                kind is Crossing.TORUS
+                and curve.points[i].data.drive.speed_drive
+                and len(curve.points[i].data.start) < 3
+            ):
+                continue
+            if not values[i][kind] * values[i + 1][kind] < 0.0:
+                continue
+            before, after = curve.points[i : i + 2]
+            point, s = follower.locate(before, length, after, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+            # a real pair with the product 1 is no torus
+            if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
+                continue
+            found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=passed + i)))
+    return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])]
+
+
+def describe(branches: Sequence[Branch]) -> str:
+    """One line on branches of a family: range, orbits, stability and greatest amplitude, and where."""
+    family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
+    span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
+    words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
+    largest = max(branches, key=lambda branch: float(branch.amplitude.max()))
+    place = int(largest.amplitude.argmax())
+    return (
+        f"{family.name} {span}, {format_count(sum(len(branch) for branch in branches), 'orbit')}, {' and '.join(words)}; "
+        f"greatest amplitude of {name} {largest.amplitude[place]:.4g} {unit} at "
+        f"{family.format_value(float(largest.parameter[place]))}"
+    )
+
+
+#: Largest multiplier with which a motion is followed.
+GREATEST = 1e3
+
+#: Distance in scaled arc length at which a motion lies on a branch: the straight pieces are as near to it.
+_ON = 2e-3
+
+
+def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
+    """Least distance of a place, shape (n,), from the straight pieces between points, shape (m, n)."""
+    s = points - place
+    pieces = np.diff(s, axis=0)
+    squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
+    along = np.clip(-(s[:-1] * pieces).sum(axis=1) / squares, 0.0, 1.0)
+    feet = s[:-1] + along[:, None] * pieces
+    return float(np.linalg.norm(np.vstack([s[:1], feet]), axis=1).min())
+
+
+def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
+    """Whether a branch passes a motion, given by its start."""
+    ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
+    scale = np.append(np.max([scale_of(o.parameters, o.drive, o.start) for o in ends], axis=0), width)
+    points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
+    return distance(points / scale, np.append(motion, value) / scale) < _ON

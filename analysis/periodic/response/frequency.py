@@ -1,0 +1,501 @@
+"""Where the slider resonates, how large, and which harmonics: the true periodic motion over the speed.
+
+`frequency_response` follows the periodic motions of the full nonlinear plant over a range of speeds, past folds, from both
+ends of the range, and switches to the motions of twice the period, and from those again. `natural_frequency` is the classical
+estimate, from the mean effective mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import product
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, Interrupted, ParameterError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
+
+from ...files import write_csv
+from ...mechanisms import Parameters, mechanism_of
+from ...notebook import Shown, format_count
+from ...numerics import symbolic
+from ...numerics.continuation import ContinuationError
+from ...numerics.workers import interruptible
+from ...run import at_rest, shown, takes_published
+from ...units import Amount, si
+from ..motion.discretisation import OrbitError
+from ..motion.drive import SAME, Drive, published_drive, scale_of
+from ..motion.floquet import Crossing
+from ..motion.flow import crank_of
+from ..motion.orbit import PeriodicOrbit, orbit_of, require_turns
+from ..motion.search import orbits_of, passages
+from ..motion.variables import Family, unit_of
+from ..stability.nonlinear import SpecialPoint
+from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
+from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
+
+#: Crank angles over which the effective mass is averaged.
+MASS_SAMPLES = 1024
+
+
+def first_freedom(mechanism: Mechanism) -> int:
+    """Number of the first freedom that is not the crank's; raises ParameterError if there is none."""
+    crank = crank_of(mechanism).freedom
+    for number in range(len(mechanism.freedoms)):
+        if number != crank:
+            return number
+    raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
+
+
+def stiffness_name(mechanism: Mechanism) -> str:
+    """FMI name of the stiffness of the first freedom's spring, as it is where the mechanism has one: ``slider.stiffness``."""
+    return mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".stiffness"
+
+
+def _means(parameters: Parameters) -> tuple[float, float]:
+    """Effective mass (kg) and stiffness (N/m) of the first freedom at its zero, as means over a turn."""
+    mechanism = mechanism_of(parameters)
+    crank = crank_of(mechanism).freedom
+    angles = np.linspace(0.0, mechanism.freedoms[crank].period, MASS_SAMPLES, endpoint=False)
+    for angle in angles.tolist():
+        x = [0.0] * mechanism.size
+        x[crank] = angle
+        mechanism.check_assembly(parameters, x)
+    mass, stiffness = symbolic.over(
+        at_rest(mechanism, crank, first_freedom(mechanism)), angles, list(parameters.constants())
+    )
+    return float(mass.mean()), float(stiffness.mean())
+
+
+@takes_published()
+def mean_effective_mass(parameters: Parameters) -> float:
+    """Mean over a turn of what moves with the first freedom beside the crank, at its zero (kg): a five-bar's m22 at u = 0.
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined there over the whole turn.
+    """
+    return _means(parameters)[0]
+
+
+@takes_published()
+def natural_frequency(parameters: Parameters) -> float:
+    """Natural frequency of the first freedom beside the crank on its spring (rad/s), from the mean effective mass over a turn.
+
+    A spring's stiffness is that of the parameter of this name, such as ``slider.stiffness``; where the mechanism has none, it
+    is the mean over a turn of the second derivative of the energy.
+
+    Raises
+    ------
+    ParameterError
+        If there is no spring.
+    AssemblyError
+        If the mechanism, that freedom held at its zero, cannot make the turn.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from analysis import natural_frequency
+    >>> round(natural_frequency("rig-1-spring-a") * 30.0 / pi, 1)
+    591.9
+    """
+    mechanism = mechanism_of(parameters)
+    name = stiffness_name(mechanism)
+    spring = getattr(parameters, field_name(name), None)
+    if spring is not None and spring <= 0.0:
+        raise ParameterError(name, spring, "be above zero for a natural frequency")
+    mass, stiffness = _means(parameters)
+    stiffness = stiffness if spring is None else spring
+    if stiffness <= 0.0:
+        raise ParameterError(name, stiffness, "be above zero for a natural frequency")
+    return sqrt(stiffness / mass)
+
+
+#: A branch of four times the period and more is left where its largest multiplier passes this: it has doubled once more, or
+#: folded, and will not be met by a machine again before another motion has been.
+STRAYED = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Response(Shown):
+    """The periodic motions over a range of one parameter.
+
+    Attributes
+    ----------
+    branches : tuple of Branch
+        The one from the low end first, then, where it is another, the one from the high end, then those of twice the
+        period, of four times and so on, then those that are connected with none of these; each says whether it is ``closed``.
+    low, high : float
+        The range asked for.
+    problems : tuple of str
+        What could not be followed, a sentence each with the last good parameter; empty where everything was.
+    """
+
+    branches: tuple[Branch, ...]
+    low: float
+    high: float
+    problems: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        parts = f"{format_count(len(self.branches), 'branch')}, {format_count(len(self.problems), 'problem')}"
+        return f"<Response: {describe(self.branches)}; {parts}>"
+
+    @property
+    def family(self) -> Family:
+        """What varies."""
+        return self.branches[0].family
+
+    @property
+    def speeds_to_avoid(self) -> tuple[Avoided, ...]:
+        """Ranges of the speed, or of what else varies, that a machine had better not stay in, each with its reason."""
+        return ranges_to_avoid(self.branches, self.low, self.high)
+
+    @property
+    def jumps(self) -> tuple[FoldJump, ...]:
+        """What happens at the folds at which a stable motion ends."""
+        return fold_jumps(self.branches)
+
+    def maxima(self) -> tuple[Extremum, ...]:
+        """Local maxima of the amplitude on the branches of the simple period, by parameter."""
+        return self._extrema(1)
+
+    def minima(self) -> tuple[Extremum, ...]:
+        """Local minima of the amplitude on the branches of the simple period, by parameter."""
+        return self._extrema(-1)
+
+    def _extrema(self, sign: int) -> tuple[Extremum, ...]:
+        found = [e for branch in self.branches if branch.turns == 1 for e in extrema(branch, sign)]
+        found.sort(key=lambda e: (e.parameter, e.amplitude))
+        # a curve that is followed from both ends and arrives at neither has its extrema on both branches
+        reach = 1e-5 * (self.high - self.low)
+        return tuple(
+            e
+            for before, e in zip([None, *found], found)
+            if before is None
+            or abs(e.parameter - before.parameter) > reach
+            or abs(e.amplitude - before.amplitude) > 1e-6 * abs(e.amplitude)
+        )
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write all branches as one table, numbered in the first column; see `Branch.columns`."""
+        tables = [branch.columns() for branch in self.branches]
+        columns = {"branch": np.concatenate([np.full(len(b), float(i + 1)) for i, b in enumerate(self.branches)])}
+        columns |= {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+        return write_csv(path, columns)
+
+
+class ResponseInterrupted(Interrupted):
+    """Ctrl-C: the branches that had been followed are in ``response``."""
+
+    def __init__(self, response: Response) -> None:
+        self.response = response
+        super().__init__(
+            f"interrupted with {len(response.branches)} branches followed, the last in part; they are kept"
+        )
+
+
+@takes_published(drive=published_drive)
+def frequency_response(
+    parameters: Parameters,
+    low: Amount,
+    high: Amount,
+    *,
+    drive: Drive | None = None,
+    vary: str = "drive.speed",
+    start: ArrayLike | None = None,
+    doublings: int = 1,
+    most_points: int = 5000,
+    greatest_step: float = 5e-3,
+    progress: bool = False,
+) -> Response:
+    """Follow the periodic motions of the full nonlinear plant over a range of speeds, or of another parameter.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+        Or a published set or its name.
+    low, high : float or str
+        Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract; or text such as "420 rpm".
+    drive : Drive, optional
+        What drives the plant; needed where another parameter than the speed varies. A published set is driven at its speed.
+    vary : str
+        ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or whatever
+        `Family` can vary.
+    start : array_like, optional
+        Guess of the orbit's start at the low end; see `find_orbit`.
+    doublings : int
+        How often in a row the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for those
+        of four times as well, and so on. From the second on a branch is left where its multiplier passes `STRAYED`.
+    most_points : int
+        Points of a branch at most.
+    greatest_step : float
+        Greatest step of the parameter, relative to the range. Narrow resonances need small ones.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Response
+        What could not be followed is in ``problems``: never a silent gap.
+
+    Raises
+    ------
+    OrbitError
+        If there is no periodic motion to begin with at either end.
+    InputError
+        If the range is not one.
+    ResponseInterrupted
+        On Ctrl-C, with the branches that there are.
+
+    Examples
+    --------
+    >>> from analysis import frequency_response
+    >>> response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doublings=0)
+    >>> [f"{100.0 * peak.amplitude:.3f} cm" for peak in response.maxima()]
+    ['1.715 cm']
+    """
+    unit = unit_of(mechanism_of(parameters), vary)
+    low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
+    if drive is None:
+        if vary != "drive.speed":
+            raise InputError(
+                f"{vary} varies: say what drives the plant with drive=Drive(speed=...) or Drive(torque=...)"
+            )
+        drive = Drive(speed=low)
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InputError(f"the range is {low} to {high}: it must be finite and increasing")
+    family = Family(parameters=parameters, drive=drive, vary=vary)
+    with interruptible() as interrupted, shown(progress, high - low, "following the response") as show:
+        search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
+        search.follow_from_both_ends(start, most_points, show)
+        if not interrupted:
+            search.follow_doublings(doublings)
+    if not search.branches:
+        raise search.failures[0]
+    response = Response(branches=tuple(search.branches), low=low, high=high, problems=tuple(search.problems))
+    if interrupted:
+        raise ResponseInterrupted(response)
+    return response
+
+
+@dataclass(slots=True)
+class _Search:
+    """The branches of a response as they are followed, and what went wrong on the way."""
+
+    family: Family
+    low: float
+    high: float
+    greatest: float
+    stop: Callable[[], bool]
+    branches: list[Branch] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    failures: list[OrbitError] = field(default_factory=list)
+
+    def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
+        """The branch from the low end, and that from the high end if it is another."""
+        done = 0.0
+
+        def watch(value: float) -> None:
+            nonlocal done
+            done = max(done, value - self.low)
+            show(done)
+
+        for value, direction, guess in ((self.low, 1, start), (self.high, -1, None)):
+            at, driven = self.family.at(value)
+            if direction < 0 and not driven.speed_drive and self.branches:
+                # there is no guess of the speed at the other end
+                break
+            try:
+                orbit = orbit_of(at, driven, start=guess)
+            except OrbitError as error:
+                self.failures.append(error)
+                self.problems.append(f"at {self.family.format_value(value)}: {error}")
+                continue
+            if any(_passes(branch, value, orbit) for branch in self.branches):
+                continue
+            self._keep(
+                follow(
+                    self.family,
+                    orbit,
+                    value,
+                    low=self.low,
+                    high=self.high,
+                    direction=direction,
+                    greatest=self.greatest,
+                    most_points=most_points,
+                    watch=watch,
+                    stop=lambda _: self.stop(),
+                )
+            )
+            if self.stop():
+                break
+
+    def follow_doublings(self, times: int) -> None:
+        """The branches of twice the period, so often in a row; one that ends at another doubling is not followed back."""
+        ends: list[tuple[int, float, NDArray[np.float64]]] = []
+
+        def is_end(special: SpecialPoint) -> bool:
+            orbit, reach = special.orbit, 1e-3 * (self.high - self.low)
+            scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+            return any(
+                turns == 2 * orbit.turns
+                and abs(value - special.parameter) < reach
+                and np.abs((y - orbit.start) / scale).max() < 0.1
+                for turns, value, y in ends
+            )
+
+        doubled = self.branches
+        for largest in (GREATEST_MULTIPLIER, *[STRAYED] * (times - 1))[:times]:
+            points = [s for branch in doubled for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
+            doubled = []
+            for special in points:
+                if is_end(special):
+                    continue
+                try:
+                    branch = switch(
+                        self.family,
+                        special,
+                        low=self.low,
+                        high=self.high,
+                        greatest=self.greatest,
+                        largest=largest,
+                        stop=lambda _: self.stop(),
+                    )
+                except (OrbitError, ContinuationError) as error:
+                    place = self.family.format_value(special.parameter)
+                    self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
+                    continue
+                self._keep(branch, largest)
+                doubled.append(branch)
+                ends.append((branch.turns, float(branch.parameter[-1]), branch.orbits[-1].start))
+                if self.stop():
+                    return
+
+    def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
+        self.branches.append(branch)
+        left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
+        if not (branch.reached or left):
+            self.problems.append(ended(branch))
+
+
+def ended(branch: Branch) -> str:
+    """That a branch was not followed to its end, and why."""
+    first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
+    period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
+    return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
+
+
+def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
+    """Whether a branch goes through an orbit at one of its ends."""
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    return any(
+        abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
+        and float(np.abs((branch.orbits[i].start - orbit.start) / scale).max()) < SAME
+        for i in (0, -1)
+    )
+
+
+#: Largest multiplier with which a motion of several turns is followed.
+GREATEST_OF_SEVERAL = 100.0
+
+
+def with_isolas(
+    response: Response, *, places: int = 5, turns: int = 1, greatest_step: float = 5e-3, progress: bool = False
+) -> Response:
+    """A response with the motions that are connected with none of its branches.
+
+    All motions are sought at some values of the parameter; one that lies on no branch begins another, which is followed to both
+    sides until it closes or ends. None is begun from a motion so unstable that deviations grow a thousandfold in a turn.
+
+    Motions of several turns are stable in narrow ranges only, between a fold and a period doubling. Beyond the doubling they go
+    on, less and less stable, over a range some ten times as wide: what has to be met is that. None of these is followed where
+    deviations grow more than `GREATEST_OF_SEVERAL` times in a period.
+
+    Parameters
+    ----------
+    response : Response
+    places : int
+        Values of the parameter, evenly spaced inside the range, at which all motions are sought.
+    turns : int
+        Motions of up to so many turns of the crank are sought.
+    greatest_step, progress
+        See `frequency_response`.
+
+    Raises
+    ------
+    InputError
+        If there are no places, or no turns.
+    ResponseInterrupted
+        On Ctrl-C, with the branches that there are.
+
+    Examples
+    --------
+    >>> from analysis import frequency_response, with_isolas
+    >>> response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doublings=0)
+    >>> len(with_isolas(response, places=2).branches)
+    1
+    """
+    if places < 1:
+        raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
+    require_turns(turns)
+    search = _Isolas(response, greatest_step)
+    with interruptible() as interrupted, shown(progress, float(places * turns), "seeking closed branches") as show:
+        values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
+        for number, (value, period) in enumerate(product(values, range(1, turns + 1)), start=1):
+            search.seek(value, period, lambda: bool(interrupted))
+            show(float(number))
+            if interrupted:
+                break
+    result = replace(response, branches=tuple(search.branches), problems=tuple(search.problems))
+    if interrupted:
+        raise ResponseInterrupted(result)
+    return result
+
+
+class _Isolas:
+    """The branches of a response, to which are added those that no other leads to."""
+
+    def __init__(self, response: Response, greatest: float) -> None:
+        self.response, self.greatest = response, greatest
+        self.branches, self.problems = list(response.branches), list(response.problems)
+
+    def seek(self, value: float, turns: int, stop: Callable[[], bool]) -> None:
+        """Seek the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
+        family = self.response.family
+        parameters, drive = family.at(value)
+        start = None
+        if not drive.speed_drive:
+            # under a torque there is no guess of the speed but that of a known motion
+            simple = [b for b in self.branches if b.turns == 1]
+            points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
+            start = min(points, key=lambda point: float(point[0]))[1].start
+        limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
+        for orbit in orbits_of(parameters, drive, turns=turns, start=start).orbits:
+            if stop() or orbit.largest > limit or self._knows(orbit, value):
+                continue
+            branch = follow_both(
+                family,
+                orbit,
+                value,
+                low=self.response.low,
+                high=self.response.high,
+                greatest=self.greatest,
+                stop=lambda orbit: stop() or (turns > 1 and orbit.largest > limit),
+            )
+            self.branches.append(branch)
+            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
+            if not (branch.reached or strayed):
+                self.problems.append(ended(branch))
+
+    def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
+        """Whether a branch passes a motion, whichever of its turns that begins with."""
+        width = self.response.high - self.response.low
+        starts = passages(orbit)
+        own = [branch for branch in self.branches if branch.turns == orbit.turns]
+        return any(passes(branch, value, start, width) for branch in own for start in starts)

@@ -1,0 +1,499 @@
+"""What the nonlinear mechanism does where its linearisation does not decide: normal forms, and long runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from math import exp, log, sqrt
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, LinkworkError
+
+from ...mechanisms import Parameters, mechanism_of
+from ...run import simulate, takes_published
+from ..motion.discretisation import OrbitError, period_from
+from ..motion.drive import Drive, scale_of
+from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict
+from ..motion.orbit import PeriodicOrbit, orbit_of
+from ..motion.variables import Family
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SpecialPoint:
+    """Where a multiplier crosses the unit circle on a branch.
+
+    Attributes
+    ----------
+    kind : Crossing
+        FOLD, PERIOD_DOUBLING or TORUS.
+    parameter : float
+    orbit : PeriodicOrbit
+    after : int
+        Number of the branch's point after which it lies.
+    """
+
+    kind: Crossing
+    parameter: float
+    orbit: PeriodicOrbit
+    after: int
+
+
+#: Step of the differences, relative to the scale of y, the relative uncertainty down to which it is halved, and how often at
+#: most: the map over many turns bends within a thousandth of the scale, that next to the limit of assembly within a millionth.
+_STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
+
+#: Distance of the multiplier from where it crosses the unit circle up to which the point counts as located: next to the limit
+#: of assembly it crosses from -1 to 1 within the rounding of the parameter.
+_LOCATED = 1e-2
+
+#: Relative difference of the coefficients with the whole and the half step above which its sign is not settled.
+UNSETTLED = 0.5
+
+_UNSETTLED = "not settled"
+
+#: Distance of the multiplier from the unit circle at which a run confirms a normal form, at least and at most, the square of
+#: the distance from the old motion that it is chosen for, and turns.
+_BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
+
+FloatArray = NDArray[np.float64]
+
+Form = Callable[..., NDArray[np.complex128]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NormalForm:
+    """The normal form at a special point of a branch.
+
+    Attributes
+    ----------
+    kind : Crossing
+    coefficient : float
+        In the scale of y: of a fold half the second derivative along the eigenvector, of a period doubling the cubic
+        coefficient, positive where it is supercritical, of a torus the first Lyapunov coefficient, negative where it is.
+    uncertainty : float
+        Change of the coefficient when the step of the differences is halved; infinite where the point is not located.
+    words : str
+        "supercritical", "subcritical", or "not settled", where the coefficient is not certain or the multiplier crosses the
+        circle too fast for the point to be located; of a fold on which side of it the two motions are.
+    """
+
+    kind: Crossing
+    coefficient: float
+    uncertainty: float
+    words: str
+
+
+class Forms:
+    """The multilinear forms of a map about its fixed point at zero, by differences.
+
+    Parameters
+    ----------
+    of : callable
+        The map, (n,) to (n,).
+    matrix : ndarray, shape (n, n)
+        Its derivative at zero.
+    """
+
+    def __init__(self, of: Callable[[FloatArray], FloatArray], matrix: FloatArray) -> None:
+        self.of = of
+        self.matrix = matrix
+
+    def second(self, x: FloatArray, h: float) -> FloatArray:
+        """B(x, x)."""
+        return (self.of(h * x) + self.of(-h * x) - 2.0 * self.of(0.0 * x)) / h**2
+
+    def third(self, x: FloatArray, h: float) -> FloatArray:
+        """C(x, x, x)."""
+        of = self.of
+        return (of(2.0 * h * x) - 2.0 * of(h * x) + 2.0 * of(-h * x) - of(-2.0 * h * x)) / (2.0 * h**3)
+
+    def complex(self, h: float) -> tuple[Form, Form]:
+        """B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real ones."""
+
+        def b_real(u: FloatArray, v: FloatArray) -> FloatArray:
+            return (self.second(u + v, h) - self.second(u - v, h)) / 4.0
+
+        def c_real(u: FloatArray, v: FloatArray, w: FloatArray) -> FloatArray:
+            return (
+                self.third(u + v + w, h)
+                - self.third(u + v - w, h)
+                - self.third(u - v + w, h)
+                + self.third(u - v - w, h)
+            ) / 24.0
+
+        return _of_complex(b_real, 2), _of_complex(c_real, 3)
+
+
+def _forms(orbit: PeriodicOrbit) -> Forms:
+    """Those of the map over a period, in scaled components from the orbit."""
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+
+    def after(x: FloatArray) -> FloatArray:
+        return x + period_from(orbit.parameters, orbit.drive, orbit.start + scale * x, orbit.turns).shift / scale
+
+    return Forms(after, orbit.monodromy * scale / scale[:, None])
+
+
+def _of_complex(form: Callable[..., FloatArray], count: int) -> Form:
+    """A real multilinear form of complex vectors."""
+
+    def of(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        total = np.zeros(len(vectors[0]), dtype=complex)
+        for number in range(2**count):
+            parts = [(v.imag, 1j) if number >> n & 1 else (v.real, 1.0) for n, v in enumerate(vectors)]
+            if all(np.any(part) for part, _ in parts):
+                total += np.prod([factor for _, factor in parts]) * form(*(part for part, _ in parts))
+        return total
+
+    return of
+
+
+def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
+    """Right and left eigenvectors of the multiplier nearest to ``value``, the right of length 1, their product 1; it."""
+    values, right = np.linalg.eig(matrix.astype(complex))
+    n = int(np.abs(values - value).argmin())
+    adjoint, left = np.linalg.eig(matrix.T.astype(complex))
+    m = int(np.abs(adjoint - values[n].conjugate()).argmin())
+    q = right[:, n] / np.linalg.norm(right[:, n])
+    p = left[:, m]
+    return q, p / np.conj(np.vdot(p, q)), complex(values[n])
+
+
+def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
+    """The normal form at a special point of a branch.
+
+    Raises
+    ------
+    OrbitError
+        If the map cannot be followed next to the point.
+    """
+    of = _forms(special.orbit)
+    multiplier = complex(special.orbit.multipliers[0])
+    crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
+    if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
+        return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
+    coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
+    if not uncertainty < UNSETTLED * abs(coefficient):
+        words = _UNSETTLED
+    elif special.kind is Crossing.FOLD:
+        words = f"both motions at {'lower' if coefficient * _slope(family, of, special) > 0.0 else 'higher'} values"
+    else:
+        gentle = coefficient > 0.0 if special.kind is Crossing.PERIOD_DOUBLING else coefficient < 0.0
+        words = "supercritical" if gentle else "subcritical"
+    return NormalForm(kind=special.kind, coefficient=coefficient, uncertainty=uncertainty, words=words)
+
+
+def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
+    """A coefficient at the step zero and its uncertainty, from that at a step and half of it: the most certain of them."""
+    found: list[tuple[float, float]] = []
+    values: list[float] = []
+    change = 0.0
+    for number in range(_HALVINGS + 1):
+        try:
+            values.append(at(_STEP * 0.5**number))
+        except OrbitError as error:
+            # so far from the motion the links come to the limit of assembly; just within, two values may agree by chance
+            failure, change = error, np.inf
+            continue
+        if len(values) > 1:
+            whole, half = values[-2:]
+            # the differences are of second order: each change is a quarter of the one before
+            before, change = change, abs(half - whole)
+            found.append(((4.0 * half - whole) / 3.0, max(change, 0.25 * before)))
+            if found[-1][1] < _CERTAIN * abs(found[-1][0]):
+                break
+    if not found:
+        raise failure
+    return min(found, key=lambda pair: pair[1] / max(abs(pair[0]), 1e-300))
+
+
+def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
+    """Kuznetsov's (5.25), (5.27) and (5.28): see `NormalForm`.
+
+    Parameters
+    ----------
+    of : Forms
+    kind : Crossing
+    multiplier : complex
+        Of a torus, one of the pair on the unit circle.
+    h : float
+        Step of the differences.
+    """
+    matrix, unit = of.matrix, np.eye(len(of.matrix))
+    if kind is Crossing.TORUS:
+        v, left, found = _eigenvectors(matrix, complex(multiplier.real, abs(multiplier.imag)))
+        turn = found / abs(found)
+        b, c = of.complex(h)
+        inner = (
+            c(v, v, v.conj())
+            + 2.0 * b(v, np.linalg.solve(unit - matrix, b(v, v.conj())))
+            + b(v.conj(), np.linalg.solve(turn**2 * unit - matrix, b(v, v)))
+        )
+        return float(0.5 * (np.vdot(left, inner) / turn).real)
+    sign = 1.0 if kind is Crossing.FOLD else -1.0
+    right, left, _ = _eigenvectors(matrix, sign)
+    q, p = (np.array(vector.real, dtype=float) for vector in (right, left))
+    second = of.second(q, h)
+    if kind is Crossing.FOLD:
+        return float(0.5 * p @ second)
+    # B(q, w) by polarisation, with steps of one length
+    w = np.linalg.solve(unit - matrix, second)
+    length = float(np.linalg.norm(w)) or 1.0
+    mixed = length * (of.second(q + w / length, h) - of.second(q - w / length, h)) / 4.0
+    return float(p @ (of.third(q, h) + 3.0 * mixed)) / 6.0
+
+
+def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
+    """Derivative of the map with respect to the parameter along the left eigenvector of a fold."""
+    _, p, _ = _eigenvectors(of.matrix, 1.0)
+    parameters, drive = family.at(special.parameter)
+    reach = 1e-3 * max(abs(special.parameter), 1e-9)
+    direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
+    slope = period_from(parameters, drive, special.orbit.start, special.orbit.turns, direction).slope
+    return float(p.real @ (slope / scale_of(parameters, drive, special.orbit.start)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FormRun:
+    """A run next to a period doubling or a torus point, on the side where the old motion is unstable.
+
+    Attributes
+    ----------
+    parameter : float
+        Where it was run.
+    distance : float
+        Greatest distance from the old motion, in the scale of y, over the last turns; infinite if the run ended before.
+    expected : float
+        The distance that the normal form gives for a supercritical point.
+    """
+
+    parameter: float
+    distance: float
+    expected: float
+
+    def agrees(self, form: NormalForm) -> bool:
+        """Whether the run does what the normal form says: stays at the distance, to a factor of two, or leaves."""
+        if form.words == "supercritical":
+            return 0.5 * self.expected < self.distance < 2.0 * self.expected
+        return form.words == "subcritical" and self.distance > 3.0 * self.expected
+
+
+def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
+    """Run the mechanism next to a special point, from a small deviation, on the side where the old motion is unstable.
+
+    Raises
+    ------
+    InputError
+        If the point is a fold, beyond which there is no old motion.
+    LinkworkError
+        If the old motion does not become unstable to either side.
+    """
+    if special.kind is Crossing.FOLD:
+        raise InputError("beyond a fold there is no old motion to deviate from")
+    step = 1e-3 * max(abs(special.parameter), 1e-9)
+    sides: list[tuple[float, PeriodicOrbit]] = []
+    for sign in (-1.0, 1.0):
+        value = special.parameter + sign * step
+        parameters, drive = family.at(value)
+        sides.append(
+            (sign, orbit_of(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False))
+        )
+    rates = [(orbit.largest - special.orbit.largest) / step for _, orbit in sides]
+    sign, rate = max(zip((-1.0, 1.0), rates), key=lambda pair: pair[1])
+    if rate <= 0.0:
+        raise LinkworkError(f"the motion at {family.format_value(special.parameter)} is unstable on neither side")
+    beyond = float(np.clip(_SMALL * abs(form.coefficient), *_BEYOND))
+    value = special.parameter + sign * beyond / rate
+    parameters, drive = family.at(value)
+    old = orbit_of(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
+    scale = scale_of(parameters, drive, old.start)
+    expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
+    q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
+    y = old.start + 0.2 * expected * scale * q / np.linalg.norm(q)
+    distances = []
+    for _ in range(_TURNS):
+        try:
+            y = y + period_from(parameters, drive, y, old.turns).shift
+        except LinkworkError:
+            return FormRun(parameter=value, distance=np.inf, expected=expected)
+        distances.append(float(np.linalg.norm((y - old.start) / scale)))
+        if distances[-1] > 10.0 * expected:
+            break
+    return FormRun(parameter=value, distance=max(distances[-20:]), expected=expected)
+
+
+# Long runs
+
+
+class Outcome(Enum):
+    """What a deviation did in a long run."""
+
+    DECAYS = "decays"
+    BOUNDED = "stays bounded"
+    GROWS = "grows"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Confirmation:
+    """A verdict beside a long run of the nonlinear mechanism from close to its periodic orbit.
+
+    Attributes
+    ----------
+    verdict : StabilityVerdict
+        By the multipliers of the orbit.
+    outcome : Outcome
+    growth : float
+        Factor a turn of the deviation along the leading multiplier's direction, by regression over the turns up to the first
+        at which it is lost in noise or greater than a hundredth of the crank.
+    deviations : ndarray, shape (n,)
+        Distance from the orbit at the crank angle 0 of each turn, relative to that at the start. It ends before the others
+        if the run does.
+    message : str
+        Why the run ended early; empty if it did not.
+    """
+
+    verdict: StabilityVerdict
+    outcome: Outcome
+    growth: float
+    deviations: NDArray[np.float64]
+    message: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the run does what the verdict says; a marginal motion must neither decay nor grow.
+
+        A margin too small for the turns that were run is judged by the measured growth, which must be that of the multiplier.
+        """
+        expected = {
+            Stability.STABLE: Outcome.DECAYS,
+            Stability.UNSTABLE: Outcome.GROWS,
+            Stability.MARGINAL: Outcome.BOUNDED,
+        }
+        if self.outcome is expected[self.verdict.stability]:
+            return True
+        margin = abs(self.verdict.margin)
+        return self.outcome is Outcome.BOUNDED and abs(self.growth - 1.0 + self.verdict.margin) < 0.1 * margin
+
+
+#: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
+DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
+
+#: Turns of a run at least, and at most.
+FEWEST_TURNS, MOST_TURNS = 1000, 20_000
+
+#: Growth or decay over a run, of the envelope, from which it counts.
+NOTABLE = 3.0
+
+
+@takes_published()
+def confirm(
+    parameters: Parameters,
+    drive: Drive,
+    *,
+    turns: int | None = None,
+    start: ArrayLike | None = None,
+    disturbance: float = DISTURBANCE,
+    tolerance: float = TOLERANCE,
+) -> Confirmation:
+    """Run the nonlinear mechanism for many turns from a slightly disturbed periodic orbit.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    turns : int, optional
+        At least 20. Without it 1000, and up to 20000 where the margin is too small to distinguish growth from decay.
+    start : array_like, shape (n,), optional
+        Guess of the orbit.
+    disturbance : float
+        Distance from the orbit at the start relative to the crank's length, in the direction that grows most.
+    tolerance : float
+        Of the verdict.
+
+    Raises
+    ------
+    OrbitError
+        If there is no periodic orbit.
+    InputError
+        If the number of turns or the disturbance is not usable.
+    LinkworkError
+        If the deviation grows or dies too fast to be measured.
+    """
+    if (turns is not None and turns < 20) or not NOISE < disturbance < LINEAR:
+        raise InputError(
+            f"{turns} turns from a disturbance of {disturbance}: 20 and more, and between {NOISE:g} and {LINEAR:g}"
+        )
+    orbit = orbit_of(parameters, drive, start=start)
+    verdict = orbit.verdict(tolerance)
+    if turns is None:
+        # as many as change the deviation by more than NOTABLE, where that can be had
+        turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
+    scale = scale_of(parameters, drive, orbit.start)
+    direction, measure = _leading(orbit, scale)
+    begin = orbit.start + disturbance * scale * direction
+    passed, message = _passages(parameters, drive, begin, turns)
+    away = (passed - orbit.start) / scale
+    size = np.linalg.norm(away, axis=1)
+    outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
+    used = np.abs(away @ measure)[: outside[0] if len(outside) else None]
+    growth = _growth(used)
+    factor = growth ** len(used)
+    if factor > NOTABLE or size.max() > NOTABLE * LINEAR:
+        outcome = Outcome.GROWS
+    else:
+        outcome = Outcome.DECAYS if factor < 1.0 / NOTABLE else Outcome.BOUNDED
+    return Confirmation(verdict=verdict, outcome=outcome, growth=growth, deviations=size / size[0], message=message)
+
+
+def _passages(
+    parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int
+) -> tuple[NDArray[np.float64], str]:
+    """y at crank angle 0 of each turn, and why the run ended early, if it did."""
+    if drive.speed is not None:
+        mechanism = mechanism_of(parameters)
+        flow = drive.flow(mechanism)
+        x, count = flow.state(start, drive.vector(mechanism)), len(mechanism.freedoms)
+        initial: dict[str, float] = {}
+        for number, freedom in enumerate(mechanism.freedoms):
+            initial |= dict(zip(freedom.initial, (x[number], x[count + number])))
+        turn = flow.period / drive.speed
+        run = simulate(
+            parameters,
+            drive.inputs(mechanism),
+            initial=mechanism.initial(**initial),
+            samples=turn * np.arange(turns + 1),
+            stop_time=turn * turns,
+            tolerance=1e-12,
+        )
+        return np.column_stack([run[name] for name, _ in flow.components]), run.message
+    passed = [start]
+    for _ in range(turns):
+        try:
+            passed.append(passed[-1] + period_from(parameters, drive, passed[-1], 1).shift)
+        except OrbitError as error:
+            return np.array(passed), str(error)
+    return np.array(passed), ""
+
+
+def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Direction that grows most, of unit length, and what its growth is measured with, both in scaled components.
+
+    The product with the left eigenvector of the largest multiplier takes that factor each turn, of a complex pair too, where
+    the distance itself swings.
+    """
+    scaled = orbit.monodromy * scale / scale[:, None]
+    values, left, right = scipy.linalg.eig(scaled, left=True)
+    leading = int(np.argmax(np.abs(values)))
+    direction = right[:, leading].real
+    return direction / np.linalg.norm(direction), left[:, leading].conj()
+
+
+def _growth(size: NDArray[np.float64]) -> float:
+    """Factor a turn, by regression of the logarithms."""
+    if len(size) < 2:
+        raise LinkworkError("the deviation leaves the range of linear growth within a turn: take a smaller disturbance")
+    return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

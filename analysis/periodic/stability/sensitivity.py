@@ -1,0 +1,552 @@
+"""How periodic motions, and the speeds at which they resonate or lose their stability, change with every parameter.
+
+By the implicit function theorem on the variational equations (`variations`): a motion moves so that it stays periodic, the
+place of a fold, a period doubling or a torus point so that the multiplier stays on the unit circle, that of a resonance so
+that the amplitude stays stationary. For the conditions see Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed.,
+Springer 2004, chapter 10. All derivatives are exact, up to the resolution of the collocation; none is a difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, LinkworkError
+
+from ...files import unknown_name
+from ...mechanisms import mechanism_of
+from ..motion.discretisation import period_from
+from ..motion.floquet import Crossing
+from ..motion.orbit import PeriodicOrbit, orbit_from, orbit_of
+from ..motion.variables import along_parameters, gradient_names, require_variable, stacked, value_of, with_values
+from .variations import Place, Variations
+
+FloatArray = NDArray[np.float64]
+
+#: Newton's steps to a special point at most, the step that is the last, and how far it may be, relative to the parameter.
+_STEPS, _LAST, _FAR = 12, 1e-7, 0.25
+
+#: Product of unit eigenvectors below which a multiplier is a double one, and has no derivative.
+_DOUBLE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Gradient:
+    """A quantity with its derivatives with respect to parameters.
+
+    Attributes
+    ----------
+    value : float
+    names : tuple of str
+        FMI names of the parameters.
+    by : ndarray, shape (m,)
+        The derivatives, in SI units.
+    at : ndarray, shape (m,)
+        Values of the parameters.
+
+    Notes
+    -----
+    ``gradient["slider.damping"]`` is one derivative.
+    """
+
+    value: float
+    names: tuple[str, ...]
+    by: FloatArray
+    at: FloatArray
+
+    def __getitem__(self, name: str) -> float:
+        if name not in self.names:
+            raise unknown_name(name, self.names)
+        return float(self.by[self.names.index(name)])
+
+    @property
+    def elasticities(self) -> dict[str, float]:
+        """Percent by which the quantity changes for a percent of each parameter; 0 for a parameter that is 0.
+
+        Raises
+        ------
+        InputError
+            If the quantity is 0.
+        """
+        if self.value == 0.0:
+            raise InputError("a quantity that is 0 has no elasticities")
+        return dict(zip(self.names, (self.by * self.at / self.value).tolist()))
+
+    def movers(self, count: int = 3) -> tuple[str, ...]:
+        """The parameters that move the quantity most, by their elasticities, the strongest first."""
+        shares = {name: abs(value) for name, value in self.elasticities.items() if value != 0.0}
+        return tuple(sorted(shares, key=lambda name: -shares[name])[:count])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PointGradient:
+    """How a special point of a branch moves: a resonance, a fold, a period doubling or a torus point.
+
+    Attributes
+    ----------
+    along : str
+        FMI name of the parameter of the branch, such as ``drive.speed``.
+    place : Gradient
+        Its value there, by the other parameters.
+    amplitude : Gradient
+        Of the motion there, which moves with the point.
+    orbit : PeriodicOrbit
+        The motion.
+    """
+
+    along: str
+    place: Gradient
+    amplitude: Gradient
+    orbit: PeriodicOrbit
+
+
+class MotionGradient:
+    """How a periodic motion changes with parameters; see `motion_gradient`. Each quantity is computed when it is asked for.
+
+    Attributes
+    ----------
+    orbit : PeriodicOrbit
+    names : tuple of str
+        FMI names of the m parameters.
+    values : ndarray, shape (m,)
+        What they are.
+    along : ndarray, shape (c, m)
+        Derivatives of the numbers of the drive and, after them, of the constants of the equations.
+    """
+
+    def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
+        parameters, drive = orbit.parameters, orbit.drive
+        self.orbit = orbit
+        self.names = gradient_names(parameters, drive) if names is None else tuple(names)
+        for name in self.names:
+            require_variable(parameters, drive, name)
+        self.values = np.array([value_of(parameters, drive, name) for name in self.names])
+        own = along_parameters(parameters, self.names)
+        self.along = stacked(orbit.flow, self.names, own.p)
+        mechanism = mechanism_of(parameters)
+        place = mechanism.switch_place
+        self._switched = mechanism.switched(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
+
+    @cached_property
+    def variations(self) -> Variations:
+        """The variational equations of the motion."""
+        return Variations(self.orbit, self._switched, self.along)
+
+    @property
+    def forcing(self) -> FloatArray:
+        """Derivatives of the rates with respect to the parameters, the motion held; shape (k, s, n, m)."""
+        return self.variations.forcing
+
+    @cached_property
+    def _solution(self) -> tuple[FloatArray, FloatArray]:
+        return self.variations.periodic(self.forcing)
+
+    def _gradient(self, value: float, by: FloatArray) -> Gradient:
+        return Gradient(value=float(value), names=self.names, by=by, at=self.values)
+
+    # The motion
+
+    @property
+    def start(self) -> FloatArray:
+        """Derivatives of y at the crank angle 0, shape (n, m)."""
+        return self._solution[1]
+
+    @cached_property
+    def period(self) -> Gradient:
+        """Of the period (s)."""
+        v, flow = self.variations, self.orbit.flow
+        if flow.command is not None:
+            speed, by = np.full(v.angles.shape, float(self.orbit.drive.speed or 0.0)), self.along[flow.command]
+        else:
+            speed, by = v.y[..., -1], self._solution[0][..., -1, :]
+        return self._gradient(float(v.integral(1.0 / speed)), v.integral(-by / speed[..., None] ** 2))
+
+    @property
+    def speed(self) -> Gradient:
+        """Of the mean speed of the crank (rad/s), which is part of the motion under a torque."""
+        way = self.orbit.flow.period * self.orbit.turns
+        return self._gradient(way / self.period.value, -way / self.period.value**2 * self.period.by)
+
+    @cached_property
+    def _swing(self) -> tuple[tuple[float, float, Place], ...]:
+        """Sign, value and place of the greatest and the least of the first component of y."""
+        found = []
+        for sign in (1.0, -1.0):
+            value, place = self.variations.greatest(sign * self.variations.y[..., 0])
+            found.append((sign, sign * value, place))
+        return tuple(found)
+
+    @cached_property
+    def amplitude(self) -> Gradient:
+        """Of half the range of the first free coordinate over the period, as `PeriodicOrbit.amplitude`."""
+        return self.amplitude_along(self._solution[0])
+
+    def amplitude_along(self, solution: FloatArray) -> Gradient:
+        """The same, the derivatives of the motion given, shape (k, s, n, m)."""
+        # where a value is greatest its place does not count
+        by = [0.5 * sign * place.weights @ solution[place.panel, :, 0, :] for sign, _, place in self._swing]
+        return self._gradient(0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
+
+    def amplitude_curvature(self, along: str) -> Gradient:
+        """Of the derivative of the amplitude with respect to one of the parameters."""
+        v, solution = self.variations, self._solution[0]
+        number = self.names.index(along)
+        by_y, by_constant = v.second(solution[..., number], self.along[:, number])
+        twice = along_parameters(self.orbit.parameters, self.names, along).p_along
+        forcing = by_y @ solution + by_constant @ self.along + v.by_constant @ stacked(self.orbit.flow, (), twice)
+        second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
+        total = np.zeros(len(self.names))
+        for sign, _, place in self._swing:
+            # the place moves so that the rate there stays zero
+            curvature = v.slope(place.panel, v.rates[place.panel, :, 0], place.position)
+            rate = place.weights @ rates[place.panel, :, 0, :]
+            total += 0.5 * sign * (place.weights @ second[place.panel, :, 0, :] - rate[number] * rate / curvature)
+        return self._gradient(self.amplitude[along], total)
+
+    # Outputs
+
+    def greatest(self, name: str) -> Gradient:
+        """Of the greatest value of an output over the period, by its FMI name."""
+        return self._extreme(self._numbers(name, False), 1.0)
+
+    def least(self, name: str) -> Gradient:
+        """Of the least value of an output."""
+        return self._extreme(self._numbers(name, False), -1.0)
+
+    def peak(self, name: str) -> Gradient:
+        """Of the greatest modulus of an output, or of the force in a joint, such as ``drive.applied_torque`` or ``pin.A``."""
+        return self._extreme(self._numbers(name, True), 0.0)
+
+    def _numbers(self, name: str, joints: bool) -> list[int]:
+        outputs = self.orbit.flow.mechanism.output_names
+        if name in outputs:
+            return [outputs.index(name)]
+        parts = [outputs.index(part) for axis in "xyz" if (part := f"{name}.f{axis}") in outputs]
+        if joints and parts:
+            return parts
+        own = [output.removesuffix(".fx") for output in outputs if output.endswith(".fx")] if joints else []
+        raise unknown_name(name, (*outputs, *own))
+
+    @cached_property
+    def _outputs(self) -> FloatArray:
+        return self.variations.outputs()
+
+    def _extreme(self, numbers: list[int], sign: float) -> Gradient:
+        """Of the greatest (sign 1) or least (-1) of an output, or of the greatest modulus (0) of one or several together."""
+        values = self._outputs[..., numbers]
+        value, place = self.variations.greatest(sign * values[..., 0] if sign else values)
+        by = np.zeros(len(self.names))
+        for column, number in enumerate(numbers):
+            by_y, by_constant = self.variations.output_derivatives(place.panel, number)
+            change = np.einsum("sn,snm->sm", by_y, self._solution[0][place.panel]) + by_constant @ self.along
+            # where a value is greatest its place does not count
+            share = sign or place.weights @ values[place.panel, :, column] / value
+            by += share * (place.weights @ change)
+        return self._gradient(value, by) if sign == 0.0 else self._gradient(sign * value, sign * by)
+
+    # Stability
+
+    @cached_property
+    def monodromy(self) -> FloatArray:
+        """Derivatives of the monodromy matrix, shape (n, n, m)."""
+        v, solution = self.variations, self._solution[0]
+        columns = []
+        for column in range(self.orbit.flow.size):
+            by_y, by_constant = v.second(v.fundamental[..., column])
+            columns.append(v.after(by_y @ solution + by_constant @ self.along))
+        return np.stack(columns, axis=1)
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Derivatives of the Floquet multipliers in the order of the orbit's, shape (n, m).
+
+        Raises
+        ------
+        LinkworkError
+            If two multipliers coincide: they have no derivatives there.
+        """
+        scale, matrix = self.variations.scale, self.orbit.monodromy
+        values, right = np.linalg.eig((matrix * scale / scale[:, None]).astype(complex))
+        left = np.linalg.inv(right)
+        if not _DOUBLE * np.linalg.norm(left, axis=1).max() < 1.0:
+            raise LinkworkError(f"two of the multipliers {values} coincide: they have no derivatives")
+        scaled = self.monodromy * scale[:, None] / scale[:, None, None]
+        found = np.einsum("ia,abm,bi->im", left, scaled, right)
+        order = [int(np.abs(values - value).argmin()) for value in self.orbit.multipliers]
+        return np.asarray(found[order])
+
+    def test(self, kind: Crossing) -> Gradient:
+        """Of a function that is zero where a multiplier crosses the unit circle in this way: see `crossing_test`.
+
+        It is smooth where two multipliers meet too, as their moduli are not.
+        """
+        matrix, by = _singular(self.orbit.monodromy, self.monodromy, kind)
+        total = np.zeros(len(self.names))
+        for column in range(len(matrix)):
+            # the determinant is linear in each column
+            replaced = np.repeat(matrix[None], len(self.names), axis=0)
+            replaced[:, :, column] = by[:, column].T
+            total += np.linalg.det(replaced)
+        return self._gradient(float(np.linalg.det(matrix)), total)
+
+    @property
+    def largest(self) -> Gradient:
+        """Of the modulus of the largest multiplier."""
+        value = self.orbit.multipliers[0]
+        return self._gradient(abs(value), np.real(np.conj(value) * self.multipliers[0]) / abs(value))
+
+
+def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
+    """How a periodic motion changes with parameters.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+    names : sequence of str, optional
+        FMI names of the parameters; by default all, see `gradient_names`.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of a name.
+    InputError
+        If one does not act in this drive.
+    LinkworkError
+        If the variational equations cannot be resolved.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from analysis import find_orbit
+    >>> from analysis.periodic import motion_gradient
+    >>> motion = motion_gradient(find_orbit("rig-2-spring-c", speed=500 * pi / 30))
+    >>> motion.amplitude.movers()
+    ('drive.speed', 'slider.stiffness', 'rocker.length')
+    """
+    return MotionGradient(orbit, names)
+
+
+def extremum_orbit(orbit: PeriodicOrbit, along: str) -> PeriodicOrbit:
+    """The motion at an extremum of the amplitude over a parameter, from one near to it; see `extremum_gradient`."""
+    return _located(orbit, along, _to_extremum, "extremum of the amplitude")
+
+
+def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None) -> PointGradient:
+    """How a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A motion near to it: Newton's method leads from it to where the derivative of the amplitude is zero.
+    along : str
+        FMI name of the parameter, such as ``drive.speed``.
+    names : sequence of str, optional
+
+    Raises
+    ------
+    LinkworkError
+        If there is no extremum near the motion.
+    """
+    others = _others(orbit, along, names)
+    motion = MotionGradient(extremum_orbit(orbit, along), (*others, along))
+    slopes = motion.amplitude_curvature(along).by
+    # at the extremum the amplitude does not change with its place
+    amplitude, at = motion.amplitude, motion.values[:-1]
+    return PointGradient(
+        along=along,
+        place=Gradient(value=float(motion.values[-1]), names=others, by=-slopes[:-1] / slopes[-1], at=at),
+        amplitude=Gradient(value=amplitude.value, names=others, by=amplitude.by[:-1], at=at),
+        orbit=motion.orbit,
+    )
+
+
+def crossing_gradient(
+    orbit: PeriodicOrbit, kind: Crossing, along: str, names: Sequence[str] | None = None
+) -> PointGradient:
+    """How a fold, a period doubling or a torus point, a point of a boundary of a chart, moves along one parameter with others.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A motion near to it: Newton's method leads from it to where a multiplier is on the unit circle.
+    kind : Crossing
+    along : str
+        FMI name of the parameter along which it moves.
+    names : sequence of str, optional
+
+    Raises
+    ------
+    LinkworkError
+        If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
+        two folds meet, or a branch is crossed.
+    """
+    others = _others(orbit, along, names)
+    orbit = _located(orbit, along, _to_fold if kind is Crossing.FOLD else partial(_to_crossing, kind=kind), kind.value)
+    motion = MotionGradient(orbit, (*others, along))
+    test = _test(motion, kind)
+    if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
+        raise LinkworkError(f"the {kind.value} does not move along {along}: its place there has no derivative")
+    shift = -test[:-1] / test[-1]
+    amplitude = motion.amplitude_along(_fold_motion(motion, shift)) if kind is Crossing.FOLD else motion.amplitude
+    by = amplitude.by[:-1] + amplitude.by[-1] * shift
+    at = motion.values[:-1]
+    return PointGradient(
+        along=along,
+        place=Gradient(value=float(motion.values[-1]), names=others, by=shift, at=at),
+        amplitude=Gradient(value=amplitude.value, names=others, by=by, at=at),
+        orbit=orbit,
+    )
+
+
+def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
+    """Normal of the boundary on which a multiplier stays on the unit circle, in the space of parameters, at one of its points.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        The motion with a multiplier on the unit circle, as a `CrossingCurve` has them.
+    kind : Crossing
+    names : sequence of str
+        The parameters, such as both of a chart's axes.
+
+    Returns
+    -------
+    Gradient
+        Of a function that is zero on the boundary: of a period doubling or torus point `MotionGradient.test`; of a fold the
+        shift of the map over a period along the left eigenvector.
+    """
+    motion = MotionGradient(orbit, names)
+    return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
+
+
+def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
+    require_variable(orbit.parameters, orbit.drive, along)
+    names = gradient_names(orbit.parameters, orbit.drive) if names is None else names
+    return tuple(name for name in names if name != along)
+
+
+#: One of Newton's steps from a motion to a special point along a parameter: of the start and of the parameter.
+_Step = Callable[[MotionGradient], tuple[FloatArray, float]]
+
+
+def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
+    """The motion at the special point near a motion, by Newton's method.
+
+    Raises LinkworkError if Newton's method goes elsewhere.
+    """
+    begun = value_of(orbit.parameters, orbit.drive, along)
+    for _ in range(_STEPS):
+        motion = MotionGradient(orbit, (along,))
+        try:
+            change, step = step_of(motion)
+        except (np.linalg.LinAlgError, ZeroDivisionError):
+            # what is sought does not depend on the parameter
+            break
+        value = float(motion.values[0]) + step
+        if not abs(value - begun) < _FAR * abs(begun):
+            break
+        parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
+        start = orbit.start + change
+        if step_of is _to_fold:
+            orbit = orbit_from(
+                parameters, drive, start, orbit.turns, period_from(parameters, drive, start, orbit.turns)
+            )
+        else:
+            orbit = orbit_of(parameters, drive, turns=orbit.turns, start=start, settle=False)
+        if abs(step) <= _LAST * abs(value):
+            return orbit
+    raise LinkworkError(f"no {what} along {along} was found near {begun:.9g}")
+
+
+def _to_extremum(motion: MotionGradient) -> tuple[FloatArray, float]:
+    (along,) = motion.names
+    size, slope, curvature = motion.amplitude.value, motion.amplitude[along], motion.amplitude_curvature(along)[along]
+    # on the flanks of a resonance 1 / amplitude^2 is nearly a parabola, about a minimum amplitude^2 is
+    peaked = 3.0 * slope**2 - size * curvature
+    step = slope * size / (peaked if peaked > 0.0 else -(slope**2) - size * curvature)
+    return motion.start[:, 0] * step, step
+
+
+def _to_crossing(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, float]:
+    test = motion.test(kind)
+    step = -test.value / float(test.by[0])
+    return motion.start[:, 0] * step, step
+
+
+def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
+    """To where the map over a period has a fixed point and the least singular value of its derivative less one is zero."""
+    v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
+    left, right = _null_vectors(v)
+    by_y, by_constant = v.second(v.fundamental @ right)
+    # of the motion, by its start and by the parameter
+    columns = np.concatenate([v.fundamental, v.from_start(np.zeros((n, 1)), v.forcing)], axis=-1)
+    along = np.hstack([np.zeros((len(motion.along), n)), motion.along])
+    matrix = np.vstack(
+        [
+            np.hstack([v.monodromy - np.eye(n), v.after(v.forcing)]),
+            left @ v.after(by_y @ columns + by_constant @ along),
+        ]
+    )
+    shift = period_from(orbit.parameters, orbit.drive, orbit.start, orbit.turns).shift
+    test = left @ (v.monodromy - np.eye(n)) @ right
+    step = np.linalg.solve(matrix, -np.append(shift, test))
+    return step[:n], float(step[n])
+
+
+def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
+    """Derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
+    if kind is Crossing.FOLD:
+        left, _ = _null_vectors(motion.variations)
+        return left @ motion.variations.after(motion.forcing)
+    return motion.test(kind).by
+
+
+def _singular(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
+    """A matrix that is singular at a crossing, and its derivatives, from the monodromy matrix and its: (n, n), (n, n, m)."""
+    if kind is not Crossing.TORUS:
+        sign = 1.0 if kind is Crossing.FOLD else -1.0
+        return np.eye(len(matrix)) - sign * matrix, -sign * by
+    # the second compound matrix has the products of two multipliers as eigenvalues
+    i, j = np.triu_indices(len(matrix), 1)
+
+    def minors(a: FloatArray, b: FloatArray) -> FloatArray:
+        return a[np.ix_(i, i)] * b[np.ix_(j, j)] - a[np.ix_(i, j)] * b[np.ix_(j, i)]
+
+    whole = matrix[:, :, None]
+    return minors(matrix, matrix) - np.eye(len(i)), minors(by, whole) + minors(whole, by)
+
+
+def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
+    """Left and right eigenvectors of the monodromy matrix for the multiplier +1."""
+    left, _, right = np.linalg.svd(v.monodromy * v.scale / v.scale[:, None] - np.eye(len(v.scale)))
+    return left[:, -1] / v.scale, right[-1] * v.scale
+
+
+def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
+    """Derivatives of the motion at a fold that moves with the parameters by ``shift`` along the last; shape (k, s, n, m).
+
+    The equations of the first order leave a multiple of the eigenvector open, which those of the second settle: the multiplier
+    stays +1. The last column is zero.
+    """
+    v, n, m = motion.variations, len(motion.variations.scale), len(shift)
+    left, right = _null_vectors(v)
+    moved = np.vstack([np.eye(m), shift]) if m else np.zeros((1, 0))
+    forcing, along = v.forcing @ moved, motion.along @ moved
+    # bordered by both vectors the matrix is regular
+    matrix = np.block(
+        [[v.monodromy - np.eye(n), (left * v.scale**2)[:, None]], [(right / v.scale**2)[None, :], np.zeros((1, 1))]]
+    )
+    start = np.linalg.solve(matrix, np.vstack([-v.after(forcing), np.zeros(m)]))[:n]
+    particular = v.from_start(start, forcing)
+    free = v.fundamental @ right
+    by_y, by_constant = v.second(free)
+    open_ = left @ v.after(by_y @ free[..., None])
+    if open_[0] == 0.0:
+        raise LinkworkError("two folds meet: the motion there has no derivatives")
+    share = -(left @ v.after(by_y @ particular + by_constant @ along)) / open_
+    found = particular + free[..., None] * share
+    return np.concatenate([found, np.zeros_like(free[..., None])], axis=-1)

@@ -1,0 +1,417 @@
+"""The variational equations of a periodic motion, with parameters and to second order, by Gauss's collocation.
+
+The turn is divided into panels in each of which the motion is a polynomial as far as the numbers can tell. On a panel the
+linear equations d' = A d + r are solved at Gauss's points for any number of right-hand sides at once, by the implicit Runge-
+Kutta method of those points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section
+II.7); the panels are joined by the condition that the motion is periodic, so that a motion is no harder for being unstable.
+The derivatives A of the rates, those with respect to what is constant, and the second derivatives along a direction are
+traced from the equations.
+"""
+
+from __future__ import annotations
+
+from functools import cache, reduce
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from linkwork.errors import LinkworkError
+
+from ...mechanisms import mechanism_of
+from ...numerics import symbolic
+from ...numerics.codegen import MAKING, MachineCode
+from ...numerics.gauss import gauss
+from ...run import expressions
+from ...run.compiled import rows
+from ..motion import kernels
+from ..motion.discretisation import failure, section_of
+from ..motion.drive import scale_of
+from ..motion.flow import PLAIN, STATE, Flow
+from ..motion.kernels import Status
+from ..motion.orbit import PeriodicOrbit
+
+FloatArray = NDArray[np.float64]
+
+#: Gauss's points of a panel; panels of a turn to begin with; how often a panel is halved at most.
+_POINTS, _PANELS, _HALVINGS = 8, 32, 16
+
+#: Size of the last coefficients over a panel above which it is halved: of the rates and their derivatives, in the scale of y,
+#: and of the effect of a parameter, relative to its greatest.
+_RESOLVED, _EFFECT = 1e-10, 1e-8
+
+#: Imaginary part below which a root is a real one.
+_REAL = 1e-9
+
+#: Difference of the monodromy matrix from that of the orbit, relative to its greatest entry, above which something is wrong.
+_AGREES = 1e-6
+
+#: Least singular value, relative to the norm, up to which a matrix has none but of rounding.
+_ROUNDING = 1e-15
+
+_GAUSS = gauss(_POINTS)
+
+#: Legendre's polynomials on a grid of a panel with both ends.
+_GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
+
+
+class Place(NamedTuple):
+    """A place of the turn: its panel, where in that on -1 to 1, and the weights of the panel's nodes in what is there."""
+
+    panel: int
+    position: float
+    weights: FloatArray
+
+
+class Variations:
+    """A periodic motion with its variational equations.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+    switched : bool
+        Whether the mechanism's switch is taken as on: as it is, or because a derivative with respect to it is wanted.
+    along : ndarray, shape (c, m)
+        Derivatives of the numbers of the drive and, after them, of the constants with respect to parameters: what is to be
+        resolved beside the motion.
+
+    Attributes
+    ----------
+    h : ndarray, shape (k,)
+        Lengths of the panels (rad).
+    angles : ndarray, shape (k, s)
+        Crank angles of the nodes.
+    y, rates : ndarray, shape (k, s, n)
+        The motion and its derivative by the angle.
+    by_y : ndarray, shape (k, s, n, n)
+        Derivatives of the rates.
+    by_constant : ndarray, shape (k, s, n, c)
+        The same with respect to the numbers of the drive and, after them, the constants.
+    forcing : ndarray, shape (k, s, n, m)
+        Derivatives of the rates with respect to the parameters, the motion held.
+    monodromy : ndarray, shape (n, n)
+    """
+
+    def __init__(self, orbit: PeriodicOrbit, switched: bool, along: FloatArray) -> None:
+        self.orbit, self.switched, self.flow = orbit, switched, orbit.flow
+        mechanism = mechanism_of(orbit.parameters)
+        self._drive, self._p = orbit.drive.vector(mechanism), np.array(orbit.parameters.constants())
+        self.scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        self._divide(along)
+        self._solve_panels()
+        wrong = float(np.abs(self.monodromy - orbit.monodromy).max() / max(1.0, np.abs(orbit.monodromy).max()))
+        if not wrong < _AGREES * max(1.0, *(self.scale[:, None] / self.scale).ravel()):
+            raise LinkworkError(
+                f"variational equations on {len(self.h)} panels: the monodromy matrix differs from the orbit's by {wrong:.2g}"
+            )
+
+    def _divide(self, along: FloatArray) -> None:
+        """Choose the panels."""
+        flow = self.flow
+        edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.turns + 1)
+        if self.orbit.stations is not None:
+            edges = np.union1d(edges, self.orbit.stations.angles)
+        relative = self.scale[:, None] / self.scale
+        for _ in range(_HALVINGS):
+            self.h = np.diff(edges)
+            self.angles = edges[:-1, None] + self.h[:, None] * _GAUSS.nodes
+            self.y = self._sampled()
+            self.rates, first = self._first()
+            self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
+            self.forcing = self.by_constant @ along
+            # a parameter counts by its greatest effect
+            effect = np.abs(self.forcing / self.scale[:, None]).max(axis=(0, 1, 2), initial=1e-300)
+            rough = np.zeros(len(self.h), dtype=bool)
+            for values, size in (
+                (self.rates, self.scale),
+                (self.by_y, relative),
+                (self.forcing, self.scale[:, None] * effect * (_EFFECT / _RESOLVED)),
+            ):
+                last = np.abs(np.einsum("is,ks...->k...i", _GAUSS.coefficients[-2:], values / size))
+                rough |= self.h * last.reshape(len(self.h), -1).max(axis=1, initial=0.0) > _RESOLVED
+            if not rough.any():
+                break
+            edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
+
+    def _sampled(self) -> FloatArray:
+        """The motion at the nodes, shape (k, s, n)."""
+        orbit, flow = self.orbit, self.flow
+        stations, starts = np.zeros(1), orbit.start[None, :].copy()
+        if orbit.stations is not None:
+            stations, starts = orbit.stations.angles[:-1].copy(), orbit.stations.starts
+        found = np.empty((self.angles.size, flow.mechanism.size + flow.inputs))
+        section = section_of(orbit.parameters, orbit.drive, orbit.start, PLAIN, STATE)
+        status = kernels.sample(section, stations, starts, self.angles.ravel(), found)
+        if status != Status.DONE:
+            raise failure(status, flow, orbit.start)
+        return found[:, flow.places].reshape(*self.angles.shape, flow.size)
+
+    def _call(self, name: str, rows_of_arguments: FloatArray, along: FloatArray, size: int) -> FloatArray:
+        """A function of `_code` at the nodes: its values, shape (k s, size)."""
+        count, d = len(rows_of_arguments), self.flow.drive_size
+        drive = np.concatenate([self._drive, along[:d]])
+        values = np.empty((count, size))
+        rows(
+            _code(self.flow, self.switched, name).addresses[name],
+            np.array(self.flow.modes, dtype=float),
+            np.concatenate([self._p, along[d:]]),
+            np.ascontiguousarray(rows_of_arguments),
+            np.tile(drive, (count, 1)),
+            values,
+        )
+        return values
+
+    @property
+    def constants(self) -> int:
+        """How many numbers of the drive and constants there are."""
+        return self.flow.drive_size + len(self._p)
+
+    def _first(self) -> tuple[FloatArray, FloatArray]:
+        n, shape = self.flow.size, self.angles.shape
+        arguments = np.concatenate([self.y, np.zeros_like(self.y), self.angles[..., None]], axis=-1)
+        width = n + self.constants
+        found = self._call("first", arguments.reshape(-1, 2 * n + 1), np.zeros(self.constants), n * (1 + width))
+        return found[:, :n].reshape(*shape, n), found[:, n:].reshape(*shape, width, n).swapaxes(-1, -2)
+
+    def second(self, direction: FloatArray, along: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of ``by_y`` and of ``by_constant`` along a direction.
+
+        Parameters
+        ----------
+        direction : ndarray, shape (k, s, n)
+            Of the motion.
+        along : ndarray, shape (c,), optional
+            Of the numbers of the drive and the constants.
+        """
+        n, shape = self.flow.size, self.angles.shape
+        arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1).reshape(-1, 2 * n + 1)
+        width = n + self.constants
+        along = np.zeros(self.constants) if along is None else along
+        found = self._call("second", arguments, along, n * width).reshape(*shape, width, n).swapaxes(-1, -2)
+        return found[..., :n], found[..., n:]
+
+    # Linear equations
+
+    def _solve_panels(self) -> None:
+        """Solve d' = A d + r on each panel, for what d is at its beginning and for r."""
+        n, k = self.flow.size, len(self.h)
+        size = _POINTS * n
+        integrals = self.h[:, None, None] * _GAUSS.integrals
+        matrix = np.eye(size) - np.einsum("kij,kjab->kiajb", integrals, self.by_y).reshape(k, size, size)
+        inverse = np.linalg.inv(matrix)
+        #: from r, and from d at the beginning, to d at the nodes
+        self._to_nodes = np.einsum("kxia,kij->kxja", inverse.reshape(k, size, _POINTS, n), integrals).reshape(
+            k, size, size
+        )
+        self._from_start = inverse.reshape(k, size, _POINTS, n).sum(axis=2)
+        weights = self.h[:, None] * _GAUSS.weights
+        weighted = np.einsum("ki,kiab->kaib", weights, self.by_y).reshape(k, n, size)
+        #: from r, and from d at the beginning, to d at the end
+        self._to_end = weighted @ self._to_nodes + np.einsum("ki,ab->kaib", weights, np.eye(n)).reshape(k, n, size)
+        self.steps = np.eye(n) + weighted @ self._from_start
+        starts = np.empty((k, n, n))
+        matrix = np.eye(n)
+        for panel, step in enumerate(self.steps):
+            starts[panel] = matrix
+            matrix = step @ matrix
+        self.monodromy = matrix
+        #: dy/dy(0) at the nodes, (k, s, n, n)
+        self.fundamental = (self._from_start @ starts).reshape(k, _POINTS, n, n)
+
+    def _gains(self, forcing: FloatArray) -> FloatArray:
+        k, n = len(self.h), self.flow.size
+        gains: FloatArray = self._to_end @ forcing.reshape(k, _POINTS * n, -1)
+        return gains
+
+    def _at_nodes(self, starts: FloatArray, forcing: FloatArray) -> FloatArray:
+        k, n = len(self.h), self.flow.size
+        found = self._from_start @ starts + self._to_nodes @ forcing.reshape(k, _POINTS * n, -1)
+        return np.asarray(found.reshape(k, _POINTS, n, -1))
+
+    def after(self, forcing: FloatArray) -> FloatArray:
+        """d after the period, shape (n, m), for d' = A d + r from d = 0; r has the shape (k, s, n, m)."""
+        gains = self._gains(forcing)
+        d = np.zeros_like(gains[0])
+        for step, gain in zip(self.steps, gains):
+            d = step @ d + gain
+        return np.asarray(d)
+
+    def from_start(self, start: FloatArray, forcing: FloatArray) -> FloatArray:
+        """d at the nodes, shape (k, s, n, m), for d' = A d + r from d = ``start``, (n, m)."""
+        gains = self._gains(forcing)
+        starts = np.empty((len(self.h), *start.shape))
+        d = start
+        for panel, (step, gain) in enumerate(zip(self.steps, gains)):
+            starts[panel] = d
+            d = step @ d + gain
+        return self._at_nodes(starts, forcing)
+
+    def periodic(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The periodic solution of d' = A d + r: at the nodes, shape (k, s, n, m), and at the crank angle 0, (n, m).
+
+        Raises
+        ------
+        LinkworkError
+            If there is none, exactly at a fold.
+        """
+        starts = _round(self.steps, self._gains(forcing))
+        return self._at_nodes(starts, forcing), starts[0]
+
+    # What is read off
+
+    def integral(self, values: FloatArray) -> FloatArray:
+        """Integral over the period of what has the shape (k, s, ...)."""
+        found: FloatArray = np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
+        return found
+
+    def slope(self, panel: int, values: FloatArray, position: float) -> float:
+        """Derivative by the angle of values at the nodes of a panel, shape (s,)."""
+        series = legendre.legder(_GAUSS.coefficients @ values)
+        return float(legendre.legval(position, series) * 2.0 / self.h[panel])
+
+    def greatest(self, values: FloatArray) -> tuple[float, Place]:
+        """The greatest value over the period of what has the values (k, s) at the nodes, and its place.
+
+        Of vectors, shape (k, s, c), the greatest modulus.
+        """
+        vectors = values.ndim == 3
+        coefficients = np.einsum("is,ks...->ki...", _GAUSS.coefficients, values)
+        on_grid = np.einsum("gi,ki...->kg...", _GRID, coefficients)
+        first = int(((on_grid**2).sum(axis=-1) if vectors else on_grid).max(axis=1).argmax())
+        found = []
+        # next to an end of a panel the rounding decides which one it is
+        for panel in (first - 1, first, (first + 1) % len(self.h)):
+            series = coefficients[panel]
+            if vectors:
+                series = reduce(legendre.legadd, (legendre.legmul(part, part) for part in series.T))
+            turning = legendre.legroots(legendre.legder(series)) if np.any(series[1:]) else np.zeros(0)
+            real = turning[np.abs(turning.imag) < _REAL].real
+            places = np.append(real[np.abs(real) < 1.0], [-1.0, 1.0])
+            there = legendre.legval(places, series)
+            found.append((float(there.max()), panel % len(self.h), float(places[there.argmax()])))
+        value, panel, position = max(found)
+        weights = legendre.legvander(np.array([position]), _POINTS - 1)[0] @ _GAUSS.coefficients
+        return sqrt(value) if vectors else value, Place(panel, position, weights)
+
+    def outputs(self) -> FloatArray:
+        """All outputs at the nodes, shape (k, s, outputs)."""
+        n, count = self.flow.size, len(self.flow.mechanism.output_names)
+        arguments = np.concatenate([self.y, np.zeros_like(self.y), self.angles[..., None]], axis=-1)
+        found = self._call("outputs", arguments.reshape(-1, 2 * n + 1), np.zeros(self.constants), count)
+        return found.reshape(*self.angles.shape, count)
+
+    def output_derivatives(self, panel: int, number: int) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of an output at the nodes of a panel with respect to y, (s, n), and to what is constant, (s, c)."""
+        n = self.flow.size
+        function = _output_derivatives(self.flow, self.switched, number)
+        found = [
+            np.asarray(function(angle, y, list(self.flow.modes), self._drive, self._p)).ravel()
+            for angle, y in zip(self.angles[panel], self.y[panel])
+        ]
+        return np.array(found)[:, :n], np.array(found)[:, n:]
+
+
+def _round(steps: FloatArray, gains: FloatArray) -> FloatArray:
+    """What d is at the beginning of each panel, shape (k, n, m), if it is at the end of each what it is at the next, and round.
+
+    Two panels at a time become one: rotations take what is between them out of their equations, so that neither what grows
+    nor what decays is multiplied up.
+    """
+    count, n, _ = gains.shape
+    # panels on which nothing happens make their number a power of two
+    more = (1 << (count - 1).bit_length()) - count
+    whole = np.broadcast_to(np.eye(n), (count + more, n, n))
+    # a d + b (d at the next) = right
+    a, b = np.concatenate([-steps, -whole[:more]]), whole
+    right = np.pad(gains, ((0, more), (0, 0), (0, 0)))
+    levels = []
+    while len(a) > 1:
+        none = np.zeros_like(a[::2])
+        turned, triangle = np.linalg.qr(np.concatenate([b[::2], a[1::2]], axis=1), mode="complete")
+        rows = [np.concatenate(row, axis=2) for row in ((a[::2], none, right[::2]), (none, b[1::2], right[1::2]))]
+        outer = turned.swapaxes(1, 2) @ np.concatenate(rows, axis=1)
+        levels.append((triangle[:, :n], outer[:, :n]))
+        a, b, right = np.split(outer[:, n:], (n, 2 * n), axis=2)
+    if np.linalg.norm(a[0] + b[0], -2) <= _ROUNDING * np.linalg.norm(np.hstack([a[0], b[0]])):
+        raise LinkworkError("the motion is at a fold: it has no derivatives by the parameters")
+    found = np.linalg.solve(a + b, right)
+    for triangle, outer in reversed(levels):
+        beside = np.concatenate([found, np.roll(found, -1, axis=0)], axis=1)
+        between = np.linalg.solve(triangle, outer[:, :, 2 * n :] - outer[:, :, : 2 * n] @ beside)
+        found = np.stack([found, between], axis=1).reshape(-1, *gains.shape[1:])
+    return np.asarray(found[:count])
+
+
+class _Symbols(NamedTuple):
+    """Symbols, and a flow's functions of them."""
+
+    y: Any
+    dy: Any
+    angle: Any
+    modes: Any
+    drive: Any
+    d_drive: Any
+    p: Any
+    d_p: Any
+    rates: Any
+    outputs: Any
+
+
+@cache
+def _symbols(flow: Flow, switched: bool) -> _Symbols:
+    casadi = symbolic.library()
+    plain, state = flow.function(PLAIN, switched), flow.function(STATE, switched)
+    n, size = flow.size, plain.size1_in(4) // 2
+    y, dy = casadi.SX.sym("y", n), casadi.SX.sym("dy", n)
+    angle, modes = casadi.SX.sym("angle"), casadi.SX.sym("modes", len(flow.mechanism.modes))
+    drive, d_drive = casadi.SX.sym("drive", flow.drive_size), casadi.SX.sym("d_drive", flow.drive_size)
+    p, d_p = casadi.SX.sym("p", size), casadi.SX.sym("d_p", size)
+    arguments = (
+        angle,
+        casadi.vertcat(y, casadi.SX.zeros(n * (n + 1))),
+        modes,
+        casadi.vertcat(drive, casadi.SX.zeros(flow.drive_size)),
+        casadi.vertcat(p, casadi.SX.zeros(size)),
+    )
+    x, u = state(*arguments)
+    trace = expressions(flow.mechanism, switched)
+    outputs = casadi.Function("outputs", [*trace.symbols], [trace.outputs])(x, modes, u, casadi.vertcat(p, 0.0))
+    return _Symbols(y, dy, angle, modes, drive, d_drive, p, d_p, plain(*arguments), outputs)
+
+
+@cache
+def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
+    """Machine code of the rates with their first derivatives, of these along a direction, or of the outputs.
+
+    All are functions of (y, a direction of it, the angle), modes, drive and constants with their directions.
+    """
+    casadi = symbolic.library()
+    with MAKING:
+        s = _symbols(flow, switched)
+        of = casadi.vertcat(s.y, s.drive, s.p)
+        jacobian = casadi.jacobian(s.rates, of)
+        if name == "first":
+            results = [s.rates, jacobian]
+        elif name == "second":
+            along = casadi.jtimes(casadi.vec(jacobian), of, casadi.vertcat(s.dy, s.d_drive, s.d_p))
+            results = [casadi.reshape(along, *jacobian.shape)]
+        else:
+            results = [s.outputs]
+        arguments = [
+            casadi.SX.sym("t"),
+            casadi.vertcat(s.y, s.dy, s.angle),
+            s.modes,
+            casadi.vertcat(s.drive, s.d_drive),
+            casadi.vertcat(s.p, s.d_p),
+        ]
+        return MachineCode([casadi.Function(name, arguments, [casadi.densify(r) for r in results], {"cse": True})])
+
+
+@cache
+def _output_derivatives(flow: Flow, switched: bool, number: int) -> Any:
+    casadi = symbolic.library()
+    s = _symbols(flow, switched)
+    gradient = casadi.jacobian(s.outputs[number], casadi.vertcat(s.y, s.drive, s.p))
+    return casadi.Function("gradient", [s.angle, s.y, s.modes, s.drive, s.p], [casadi.densify(gradient)], {"cse": True})
