@@ -34,7 +34,6 @@ from analysis.periodic import (
     follow,
     frequency_response,
     gradient_names,
-    gradients,
     motion_gradient,
     orbit_of,
     special_gradient,
@@ -42,6 +41,7 @@ from analysis.periodic import (
 from analysis.periodic.motion.discretisation import period_from, pieces_from
 from analysis.periodic.motion.drive import scale_of
 from analysis.periodic.motion.variables import unit_of, value_of, with_values
+from analysis.periodic.stability import sensitivity as gradients
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 from linkwork.slider_crank import published as rahman

@@ -23,9 +23,9 @@ from analysis.periodic import (
     find_orbit,
     frequency_response,
     natural_frequency,
-    resonance,
     sweep,
 )
+from analysis.periodic.response import frequency as resonance
 from analysis.youssef import approximations
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
