@@ -41,7 +41,6 @@ _CONSTRAINTS: Mapping[str, Any] = {"largest_link": "1 m", "least_transmission_an
 _REQUIRED: Mapping[str, Mapping[str, Any]] = {
     "trade_off": {"over": "size", "limits": ["50 cm", "1 m"]},
     "strategy": {"tolerance": "1 deg"},
-    "least_effort": {"bound": "0.2 deg"},
     "drive": {"speed": "120 rpm"},
     "slider": {"harmonics": [2], "stroke": "60 mm"},
 }
@@ -164,7 +163,7 @@ def _tuning(file: str) -> Iterator[str]:
 def _synthesis(kind: str, file: str) -> Iterator[str]:
     """A task with its tables; of a slider's motion those of both."""
     from ..files import Quantity, entries, line
-    from ..motion import TABLES as MOTION
+    from ..slider import TABLES as MOTION
     from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES
 
     moved = kind == SLIDER_MOTION

@@ -13,7 +13,7 @@ from linkwork.errors import ParameterError
 
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
 from ..mechanisms import require_five_bar
-from ..motion import inverse_dynamics, motion_of_plant, slider_motion
+from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..notebook import format_count
 from ..run import Case, case_from
 from ..studio import state_of

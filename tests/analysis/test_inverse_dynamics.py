@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from analysis import Inputs, simulate
-from analysis.motion import best_spring, inverse_dynamics
-from analysis.motion.inverse import NAMES
+from analysis.slider import best_spring, inverse_dynamics
+from analysis.slider.inverse import NAMES
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import find_orbit
 from analysis.run import table

@@ -18,7 +18,7 @@ from analysis.linear import (
     linearise,
     linearise_along,
 )
-from analysis.motion import TrackingController, inverse_dynamics, track
+from analysis.slider import TrackingController, inverse_dynamics, track
 from analysis.numerics.fourier import FourierSeries
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
