@@ -28,9 +28,9 @@ from .common import (
 from .design import leave_if_stopped, overrides_of, search_options, write_described
 
 if TYPE_CHECKING:
-    from ..slider import SliderCase, SliderDrive
     from ..numerics.fourier import FourierSeries
-    from ..synthesis import Linkage, Solution
+    from ..slider import SliderCase, SliderDrive
+    from ..synthesis import Solution
 
 
 @click.command("slider-motion")
@@ -183,8 +183,8 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
     """Force, torque and pin forces; a case that runs; and the run under control, where asked for."""
     from ..files import write_csv, write_tables
-    from ..slider import run_case
     from ..run import save_parameters
+    from ..slider import run_case
     from ..synthesis import SliderMotion
 
     title = chosen.synthesis.title

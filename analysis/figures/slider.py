@@ -1,4 +1,4 @@
-"""Pictures of the slider's motion: what it takes to drive it, how well it is followed, and what less effort looks like."""
+"""Pictures of the slider's motion: position, force and power over the turn, and how well the motion is tracked."""
 
 from __future__ import annotations
 

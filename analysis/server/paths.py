@@ -13,9 +13,9 @@ from linkwork.errors import ParameterError
 
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
 from ..mechanisms import require_five_bar
-from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..notebook import format_count
 from ..run import Case, case_from
+from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..studio import state_of
 from ..synthesis import (
     Constraint,

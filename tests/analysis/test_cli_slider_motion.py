@@ -12,11 +12,10 @@ import pytest
 import tomli_w
 from click.testing import CliRunner, Result
 
-from analysis import cli
-from analysis import slider
-from analysis.slider import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
+from analysis import cli, slider
 from analysis.numerics.fourier import FourierSeries
 from analysis.run import load_case, load_parameters, simulate
+from analysis.slider import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.synthesis import (
     Linkage,
     Search,
