@@ -262,7 +262,7 @@ def stability_chart(
     mechanism = mechanism_of(parameters)
     if drive is None:
         raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
-    names = names or (speed_name(mechanism) or "drive.speed", damping_name(mechanism))
+    names = names or (speed_name(mechanism, drive) or "drive.speed", damping_name(mechanism))
     spans = tuple(
         default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
         for n, name in enumerate(names)
@@ -509,7 +509,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
         If there is no value, or no such axis.
     """
     require_variable(parameters, drive, name)
-    if name == speed_name(mechanism_of(parameters)):
+    if name in speed_names(mechanism_of(parameters)):
         try:
             natural = natural_frequency(parameters)
         except ParameterError:

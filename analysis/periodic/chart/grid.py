@@ -92,8 +92,8 @@ def largest_multipliers(
     """
     mechanism = mechanism_of(rows[0])
     flow = drives[0].flow(mechanism)
-    if any(drive.flow(mechanism).modes != flow.modes for drive in drives):
-        raise InputError("a row has both drives by speed and by torque, or other modes: it must have one kind")
+    if any(drive.flow(mechanism) is not flow for drive in drives):
+        raise InputError("a row has both drives by speed and by torque, or other modes or ratios: it must have one kind")
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
     n, first = flow.size, starting[0]

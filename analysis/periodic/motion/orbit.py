@@ -295,7 +295,7 @@ class PeriodicOrbit(Shown):
         """
         flow, turn, mechanism = self.flow, self.turn(samples), mechanism_of(self.parameters)
         drive, p = self.drive.vector(mechanism), list(self.parameters.constants())
-        y = turn.states[:, flow.places].T
+        y = flow.unknowns(turn.states, drive).T
         traces = flow.jacobian_trace(mechanism.switched(p)).map(samples)(
             turn.angle[None, :], y, list(flow.modes), drive, p
         )
@@ -410,6 +410,10 @@ def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.fl
                     f"under a torque alone the {flow.labels[-1]} is needed: give start = ({', '.join(flow.labels)})"
                 )
             guess[-1] = drive.motor.synchronous_speed * (1.0 - 0.5 * drive.motor.breakdown_slip)
+        speed, rates = drive.speed or guess[-1], len(flow.mechanism.freedoms)
+        for number, ratio in drive.turning(flow.mechanism).items():
+            if number in flow.free:
+                guess[flow.places.index(rates + number)] = ratio * speed
         return guess
     guess = np.array(start, dtype=float)
     if guess.shape != (flow.size,) or not np.isfinite(guess).all():

@@ -316,7 +316,7 @@ def _in_pieces(family: Family, last: Point, settings: Settings) -> tuple[Followe
     """The same curve from its last point on, the period followed in pieces in each of which deviations grow alike."""
     orbit: PeriodicOrbit = last.data
     count = _PLACES * orbit.turns
-    places = orbit.turn(count).states[:, orbit.flow.places]
+    places = orbit.flow.unknowns(orbit.turn(count).states, orbit.drive.vector(orbit.flow.mechanism))
     angles = np.linspace(0.0, orbit.flow.period * orbit.turns, count + 1)
     matrices = pieces_from(orbit.parameters, orbit.drive, angles, places)[1]
     scale = scale_of(orbit.parameters, orbit.drive, orbit.start)

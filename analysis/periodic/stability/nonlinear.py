@@ -460,7 +460,7 @@ def _passages(
         initial: dict[str, float] = {}
         for number, freedom in enumerate(mechanism.freedoms):
             initial |= dict(zip(freedom.initial, (x[number], x[count + number])))
-        turn = flow.period / drive.speed
+        vector, turn = drive.vector(mechanism), flow.period / drive.speed
         run = simulate(
             parameters,
             drive.inputs(mechanism),
@@ -469,7 +469,9 @@ def _passages(
             stop_time=turn * turns,
             tolerance=1e-12,
         )
-        return np.column_stack([run[name] for name, _ in flow.components]), run.message
+        names = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
+        states = np.column_stack([run[name] for name in (*names[::2], *names[1::2])])
+        return flow.unknowns(states, vector), run.message
     passed = [start]
     for _ in range(turns):
         try:

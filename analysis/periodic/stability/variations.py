@@ -146,7 +146,7 @@ class Variations:
         status = kernels.sample(section, stations, starts, self.angles.ravel(), found)
         if status != Status.DONE:
             raise failure(status, flow, orbit.start)
-        return found[:, flow.places].reshape(*self.angles.shape, flow.size)
+        return flow.unknowns(found, self._drive).reshape(*self.angles.shape, flow.size)
 
     def _call(self, name: str, rows_of_arguments: FloatArray, along: FloatArray, size: int) -> FloatArray:
         """A function of `_code` at the nodes: its values, shape (k s, size)."""
