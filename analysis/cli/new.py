@@ -122,7 +122,6 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     published = next(iter(mechanism.published.values()))
     meaning = {v.name: v.description for v in mechanism.variables}
     words = {c.argument: meaning[c.name] for c in mechanism.channels}
-    command = next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
     yield "# What acts may vary: then it is a table with a kind, such as speed = { kind = ..., ... }."
     of_torques = set(signal_kinds("N.m", Path())) - set(signal_kinds("N", Path()))
     for kind, table in signal_kinds("N.m", Path()).items():
@@ -140,10 +139,10 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
         if not unit:
             rows[name] = line(leaf, True, "true or false, in the place of the others of its table", active=False)
             continue
-        driven = argument == command
-        value = published.crank_speed if driven else 1.0
+        driven = argument in published.drive
+        value = published.drive.get(argument, 1.0)
         rows[name] = line(leaf, in_words(value, unit), words[argument], active=driven)
-    given: dict[str, Any] = {"revolutions": 3.0} if command else {"stop_time": "1 s"}
+    given: dict[str, Any] = {"revolutions": 3.0} if published.drive else {"stop_time": "1 s"}
     yield from _grouped(rows)
     yield "\n[run]"
     yield from entries(RunTable, given)
