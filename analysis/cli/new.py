@@ -49,7 +49,7 @@ _REQUIRED: Mapping[str, Mapping[str, Any]] = {
 #: A wish that is met within seconds.
 _WISH: Mapping[str, Any] = {
     "speeds": ["570 rpm", "600 rpm"],
-    "change": {"slider.stiffness": "20 %"},
+    "change": {"slider.stiffness": "10 %"},
     "no_resonance": True,
 }
 

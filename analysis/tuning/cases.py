@@ -53,7 +53,7 @@ class TuneTable:
     between: tuple[Any, Any] | None = entry(Many(as_it_is, length=2), None)
     turns: int = entry(Whole(least=1), 1)
     no_resonance: bool = entry(flag, False)
-    resonance_margin: float = entry(Quantity("1", least=0.0), 0.05)
+    resonance_margin: float = entry(Quantity("1", least=0.0), 0.02)
     no_jump: bool = entry(flag, False)
     no_unstable: bool = entry(flag, False)
     least_margin: float = entry(Quantity("1", least=0.0), 0.0)

@@ -179,6 +179,10 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     least: tuple[Least, ...] = ()
     if wish.judged or unstable:
         least = tuple(found for branch in branches for found in _least(wish, x, branch))
+    if not wish.judged:
+        # a motion beside a stable one may be unstable
+        without = [found for found in least if any(low <= found.spot.level <= high for low, high in unstable)]
+        least = tuple(found for found in without if found.value < 0.0)
     # that at the least test functions is there to the last digit
     brought = [(found.spot.level, motion(wish, found.spot)) for found in least]
     largest = max((orbit.largest, level) for branch in [*motions, brought] for level, orbit in branch)

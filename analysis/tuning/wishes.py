@@ -123,7 +123,7 @@ class Wish:
     no_resonance : bool
         No maximum of the amplitude of a motion of one turn lies in the range, nor within ``resonance_margin`` of it.
     resonance_margin : float
-        Distance of a resonance from either end of the range, as a share of the value at that end; 0.05 by default.
+        Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
     no_jump : bool
         No fold lies in the range, and nowhere in it there is a second stable motion.
     no_unstable : bool
@@ -150,7 +150,7 @@ class Wish:
     start: Any = None
     turns: int = 1
     no_resonance: bool = False
-    resonance_margin: float = 0.05
+    resonance_margin: float = 0.02
     no_jump: bool = False
     no_unstable: bool = False
     least_margin: float = 0.0
