@@ -1,7 +1,7 @@
 from . import figures as figures
 from . import linear as linear
-from . import motion as motion
 from . import periodic as periodic
+from . import slider as slider
 from . import slider_crank as slider_crank
 from . import synthesis as synthesis
 from . import tuning as tuning
@@ -14,7 +14,6 @@ from .linear import linearise as linearise
 from .mechanisms import PUBLISHED as PUBLISHED
 from .mechanisms import FiveBarParameters as FiveBarParameters
 from .mechanisms import SliderCrankParameters as SliderCrankParameters
-from .motion import slider_motion as slider_motion
 from .periodic import Drive as Drive
 from .periodic import find_orbit as find_orbit
 from .periodic import find_orbits as find_orbits
@@ -48,6 +47,7 @@ from .run import simulate_many as simulate_many
 from .run import steps as steps
 from .run import table as table
 from .run import variant as variant
+from .slider import slider_motion as slider_motion
 from .slider_crank import Tolerance as Tolerance
 from .slider_crank import force_turn as force_turn
 from .slider_crank import monte_carlo as monte_carlo

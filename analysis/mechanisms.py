@@ -12,7 +12,7 @@ from linkwork.five_bar.parameters import FiveBarParameters as FiveBarParameters
 from linkwork.mechanism import PARTS, Channel, Mechanism
 from linkwork.parameters import Rules, fmi_name
 from linkwork.slider_crank.parameters import SliderCrankParameters as SliderCrankParameters
-from linkwork.variables import UNITS, status_variables
+from linkwork.variables import ROLES, UNITS, status_variables
 
 #: Kinds of linkages that a synthesis searches; not each is a mechanism that can be run.
 Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]
@@ -73,6 +73,11 @@ def _faults_of_interface(m: Mechanism) -> Iterator[str]:
             yield f"{v.name} depends on {v.depends!r}: it must be state, speed or all"
         if v.level not in ("position", "velocity", "all", "none"):
             yield f"{v.name} has the level {v.level!r}: it must be position, velocity, all or none"
+    for v in m.variables:
+        if v.role and ROLES.get(v.role, ("",))[0] != v.causality:
+            yield f"{v.name}, a {v.causality}, has the role {v.role!r}: the roles are {', '.join(ROLES)}"
+        if v.role in ("stiffness", "damping", "drive") and v.of not in m.output_names:
+            yield f"{v.name} is the {v.role} of {v.of!r}: it must be that of an output"
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         yield f"two variables are called {name}"
     for name in ("solver.tolerance", *STATUS_NAMES, *(mode.name for mode in m.modes)):
@@ -191,7 +196,7 @@ class _Published(Mapping[str, Any]):
         return sum(len(mechanism.published) for mechanism in MECHANISMS.values())
 
 
-#: The published sets of every mechanism, by name: each has parameters, initial, crank_speed and source.
+#: The published sets of every mechanism, by name: each has parameters, initial, drive and source.
 PUBLISHED: Mapping[str, Any] = _Published()
 
 #: Parameters of a mechanism and its state at the start: instances of `Mechanism.parameters` and `Mechanism.initial`.
@@ -200,10 +205,15 @@ InitialState = Any
 
 
 def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
-    """Name of a channel in case files: that of the input, less its table if there are parameters in that."""
+    """Return the name of a channel in case files.
+
+    It is the name of the input, less its table if there are parameters in that table and no other such input has the same
+    last part.
+    """
     tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
+    bare = [c.name.rpartition(".")[2] for c in mechanism.channels if c.name.rpartition(".")[0] in tables]
     table, _, leaf = channel.name.rpartition(".")
-    return leaf if table in tables else channel.name
+    return leaf if table in tables and bare.count(leaf) == 1 else channel.name
 
 
 def mechanism_of(parameters: Parameters) -> Mechanism:
@@ -231,6 +241,11 @@ def output_units() -> dict[str, str]:
     }
 
 
+def wrapping_outputs() -> frozenset[str]:
+    """Return the names of the outputs that are angles between -pi and pi."""
+    return frozenset(v.name for mechanism in MECHANISMS.values() for v in mechanism.variables if v.wraps)
+
+
 def variable_units() -> dict[str, str]:
     """Unit of every real variable of every mechanism, by its FMI name."""
     # every `Drive` that is made asks for them
@@ -245,32 +260,6 @@ def variable_units() -> dict[str, str]:
 #: What `variable_units` has computed, and of which mechanisms.
 _units: dict[str, str] = {}
 _units_of: list[Mechanism] = []
-
-
-def require_five_bar(parameters: Parameters, what: str) -> None:
-    """Make sure that parameters are those of a five-bar, for an analysis that is of five-bars alone.
-
-    Raises
-    ------
-    InputError
-        If they are not, with ``what`` the analysis is.
-    """
-    if not isinstance(parameters, FIVE_BAR.parameters):
-        raise InputError(
-            f"{what} is of five-bars: the parameters are {type(parameters).__name__}, not FiveBarParameters"
-        )
-
-
-def require_no_contact_friction(p: Any, what: str) -> None:
-    """Make sure that a five-bar has no friction by contact forces, for an analysis that cannot hold it; by its constants.
-
-    Raises
-    ------
-    InputError
-        If it has, with ``what`` the analysis is.
-    """
-    if FIVE_BAR.switched(p):
-        raise InputError(f"slider.friction_coefficient and pin.*_friction_radius must be 0: {what} cannot hold them")
 
 
 for _mechanism in (FIVE_BAR, SLIDER_CRANK):

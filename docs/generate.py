@@ -187,7 +187,7 @@ def hand_drawn_pictures() -> Iterator[Picture]:
     import numpy as np
 
     from analysis import figures as draw
-    from analysis.motion import load_slider_case
+    from analysis.slider import load_slider_case
     from analysis.synthesis import TargetPath, load_synthesis_case
 
     examples = HERE.parent / "examples"

@@ -41,7 +41,6 @@ _CONSTRAINTS: Mapping[str, Any] = {"largest_link": "1 m", "least_transmission_an
 _REQUIRED: Mapping[str, Mapping[str, Any]] = {
     "trade_off": {"over": "size", "limits": ["50 cm", "1 m"]},
     "strategy": {"tolerance": "1 deg"},
-    "least_effort": {"bound": "0.2 deg"},
     "drive": {"speed": "120 rpm"},
     "slider": {"harmonics": [2], "stroke": "60 mm"},
 }
@@ -123,7 +122,6 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     published = next(iter(mechanism.published.values()))
     meaning = {v.name: v.description for v in mechanism.variables}
     words = {c.argument: meaning[c.name] for c in mechanism.channels}
-    command = next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
     yield "# What acts may vary: then it is a table with a kind, such as speed = { kind = ..., ... }."
     of_torques = set(signal_kinds("N.m", Path())) - set(signal_kinds("N", Path()))
     for kind, table in signal_kinds("N.m", Path()).items():
@@ -141,10 +139,10 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
         if not unit:
             rows[name] = line(leaf, True, "true or false, in the place of the others of its table", active=False)
             continue
-        driven = argument == command
-        value = published.crank_speed if driven else 1.0
+        driven = argument in published.drive
+        value = published.drive.get(argument, 1.0)
         rows[name] = line(leaf, in_words(value, unit), words[argument], active=driven)
-    given: dict[str, Any] = {"revolutions": 3.0} if command else {"stop_time": "1 s"}
+    given: dict[str, Any] = {"revolutions": 3.0} if published.drive else {"stop_time": "1 s"}
     yield from _grouped(rows)
     yield "\n[run]"
     yield from entries(RunTable, given)
@@ -164,7 +162,7 @@ def _tuning(file: str) -> Iterator[str]:
 def _synthesis(kind: str, file: str) -> Iterator[str]:
     """A task with its tables; of a slider's motion those of both."""
     from ..files import Quantity, entries, line
-    from ..motion import TABLES as MOTION
+    from ..slider import TABLES as MOTION
     from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES
 
     moved = kind == SLIDER_MOTION

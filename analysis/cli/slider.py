@@ -28,9 +28,9 @@ from .common import (
 from .design import leave_if_stopped, overrides_of, search_options, write_described
 
 if TYPE_CHECKING:
-    from ..motion import SliderCase, SliderDrive
     from ..numerics.fourier import FourierSeries
-    from ..synthesis import Linkage, Solution
+    from ..slider import SliderCase, SliderDrive
+    from ..synthesis import Solution
 
 
 @click.command("slider-motion")
@@ -53,7 +53,7 @@ def slider_motion(
 
     With a table [strategy] the simplest mechanism within a tolerance is sought, with the reason for each step. With [drive] the
     force, torque, power and pin forces of the motion follow, and a case that 'linkwork run' runs; with [tracking] a run under
-    control, with [least_effort] the motion of least effort.
+    control.
 
     \b
     Examples:
@@ -62,7 +62,7 @@ def slider_motion(
       linkwork slider-motion examples/slider-motion.toml --objective worst
     """
     from ..files import write_csv
-    from ..motion import load_slider_case
+    from ..slider import load_slider_case
     from ..synthesis import SecondCrank, SliderMotion
 
     overrides = overrides_of(
@@ -88,7 +88,7 @@ def slider_motion(
 
 def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     """The simplest mechanism within the tolerance; and the interruption of the search, if there was one."""
-    from ..motion import StrategyInterrupted
+    from ..slider import StrategyInterrupted
 
     stopped = None
     try:
@@ -130,7 +130,7 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
     """The fixed pivot and the motions, a row each, in mm and degrees."""
-    from ..motion import greatest
+    from ..slider import greatest
     from ..synthesis import SliderMotion, error_unit, format_transmission, quality_name, quality_unit
 
     task = solutions[0].task
@@ -181,10 +181,10 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 
 
 def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
-    """Force, torque and pin forces; a case that runs; then the run under control and the least effort, where asked for."""
+    """Force, torque and pin forces; a case that runs; and the run under control, where asked for."""
     from ..files import write_csv, write_tables
-    from ..motion import run_case
     from ..run import save_parameters
+    from ..slider import run_case
     from ..synthesis import SliderMotion
 
     title = chosen.synthesis.title
@@ -203,8 +203,6 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
     written += plotted(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
-    if chosen.least_effort is not None:
-        written += _effort(chosen, drive, solution.linkage, folder, plots)
     return written
 
 
@@ -267,33 +265,3 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool)
     }
     written = [write_csv(folder / "tracking.csv", columns)]
     return written + plotted(plots, run, folder / "tracking.png")
-
-
-def _effort(chosen: SliderCase, drive: SliderDrive, linkage: Linkage, folder: Path, plots: bool) -> list[Path]:
-    from ..files import write_csv
-    from ..synthesis import error_unit
-
-    assert chosen.least_effort is not None
-    with console.status("least effort"):
-        least = chosen.relaxed(drive, linkage)
-    scale, unit = error_unit(chosen.synthesis.task)
-    rows = [
-        ("effort minimised", f"{least.cost}: {least.effort:.5g} {'N rms' if least.cost == 'force' else 'W'}"),
-        ("of the motion before", f"{drive.rms_force:.5g} N rms, {drive.mean_power:.5g} W mean"),
-        ("peak force", f"{np.abs(least.force).max():.5g} N"),
-        (
-            "departure allowed, and found by a run",
-            f"{scale * chosen.least_effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
-        ),
-        ("change of effort as the intervals are halved", f"{least.mesh_effort:.1e}"),
-    ]
-    _print_rows("motion of least effort", rows)
-    columns = {
-        "crank angle [rad]": least.crank_angle,
-        "slider position [m]": least.position,
-        "slider velocity [m/s]": least.velocity,
-        "slider force [N]": least.force,
-        f"departure [{'rad' if unit == 'deg' else 'm'}]": least.error,
-    }
-    written = [write_csv(folder / "least-effort.csv", columns)]
-    return written + plotted(plots, least, folder / "least-effort.png", before=drive)

@@ -202,8 +202,7 @@ def _form(family: Any, special: Any) -> str:
 
 def _friction(parameters: Any) -> bool:
     """Whether there is friction that is not viscous."""
-    names = mechanism_of(parameters).mechanism_variables
-    return any(getattr(parameters, field_name(name)) for name in names if "friction" in name)
+    return any(getattr(parameters, field_name(name)) for name in mechanism_of(parameters).names("friction"))
 
 
 def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:

@@ -19,12 +19,11 @@ from .html import require_plotly as require_plotly
 from .html import to_html as to_html
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
-from .motion import plot_drive as plot_drive
-from .motion import plot_least_effort as plot_least_effort
-from .motion import plot_tracking as plot_tracking
 from .response import plot_branches as plot_branches
 from .runs import plot_comparison as plot_comparison
 from .runs import plot_outputs as plot_outputs
+from .slider import plot_drive as plot_drive
+from .slider import plot_tracking as plot_tracking
 from .slider_crank import plot_forces as plot_forces
 from .slider_crank import plot_tolerances as plot_tolerances
 from .slider_crank_picture import animate_mechanism as animate_mechanism

@@ -36,7 +36,7 @@ MODULES = (
     "control",
     "synthesis",
     "guidance",
-    "motion",
+    "slider",
     "slider_crank",
     "slider_crank_picture",
     "tuning",

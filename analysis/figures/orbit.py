@@ -37,8 +37,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     names = [freedom.coordinate for freedom in free]
     if not orbit.drive.speed_drive:
         names.append(crank.rate)
-    if "drive.applied_torque" in turn.names:
-        names.append("drive.applied_torque")
+    names += [name for n in mechanism.cyclic for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)]
 
     def closed(name: str) -> tuple[np.ndarray, str]:
         """An output over the period, its first value once more at the end, as it is drawn, and its label."""

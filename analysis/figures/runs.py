@@ -140,8 +140,8 @@ def _telling(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
     mechanism = _mechanism(run)
     first, *others = mechanism.freedoms
     moving = [freedom.coordinate for freedom in others or (first,)]
-    driven = [name for name in run.names if ".applied_" in name]
-    wanted = dict.fromkeys(("slider.position", *moving, first.rate, *driven, "transmission.angle"))
+    driven, angles = mechanism.names("drive"), mechanism.names("transmission")
+    wanted = dict.fromkeys(("slider.position", *moving, first.rate, *driven, *angles))
     panels = [_output(run, table, name) for name in wanted if name in run.names]
     forces = _magnitudes(run)
     if forces:
@@ -151,12 +151,10 @@ def _telling(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
 
 
 def _magnitudes(run: Trajectory) -> dict[str, FloatArray]:
-    """Magnitudes of the forces of which a run has the components, ``name.fx`` and so on."""
-    stems = [name.removesuffix(".fx") for name in run.names if name.endswith(".fx")]
-    parts = {stem: [f"{stem}.f{axis}" for axis in "xyz" if f"{stem}.f{axis}" in run.names] for stem in stems}
+    """Return the magnitudes of the forces in the joints."""
     return {
-        stem.replace(".", " ").replace("_", " "): np.sqrt(sum(run[name] ** 2 for name in names))
-        for stem, names in parts.items()
+        joint.replace(".", " ").replace("_", " "): np.sqrt(sum(run[name] ** 2 for name in names))
+        for joint, names in _mechanism(run).joints.items()
     }
 
 

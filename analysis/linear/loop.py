@@ -322,14 +322,14 @@ class _Driven:
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
         self.mechanism, self.channel = mechanism, channel
         self._encoded = align(encode(inputs, mechanism), times)
-        self._law = self._encoded.source.law.copy()
+        self._laws = self._encoded.source.laws.copy()
         self.modes = self._encoded.modes
         self.rows: list[Sequence[float]] = []
 
     def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
         """All inputs by their FMI names, the controller's at 0."""
         x = np.array([*measured, 0.0, 0.0])
-        return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._law, ahead=ahead).tolist()))
+        return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
 
 
 class _InProcess(_Driven):
@@ -503,7 +503,7 @@ class _Linear:
         held = self.acting.copy()
         if self.encoded is not None:
             x = np.array([*measured, 0.0, 0.0])
-            held = sample(self.encoded, time, x, self.encoded.source.law)[self.forces]
+            held = sample(self.encoded, time, x, self.encoded.source.laws)[self.forces]
         held[self.own] = force
         self.w = held - self.acting
 

@@ -426,7 +426,7 @@ def channels_along(
     for row in states:
         if not np.all(np.isfinite(row)):
             raise InputError(f"the state {row} is not finite")
-    values = np.array([sample(encoded, float(t), x, encoded.source.law) for t, x in zip(times, states)])
+    values = np.array([sample(encoded, float(t), x, encoded.source.laws) for t, x in zip(times, states)])
     for channel, place, _ in encoded.commands:
         gap = np.abs(values[:, channel] - states[:, place])
         if np.any(gap > SAME_RATE * np.maximum(1.0, np.abs(states[:, place]))):

@@ -38,10 +38,10 @@ class WholeTurns:
         self._since: list[tuple[int, NDArray[np.float64]]] = []
 
     def take(
-        self, x: NDArray[np.float64], u: NDArray[np.float64], law: NDArray[np.float64], first: int, watch: Any = None
+        self, x: NDArray[np.float64], u: NDArray[np.float64], laws: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
         """Take turns off the state x, if they are many; ``first`` is the number of the next sample."""
-        if not self.too_many(x) or law[2] != 0.0:
+        if not self.too_many(x) or laws[:, 2].any():
             return
         period = np.zeros(len(x))
         period[: len(self._periods)] = self._periods

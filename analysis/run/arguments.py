@@ -9,13 +9,11 @@ from typing import Any, TypeVar, cast
 
 from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism, PublishedSet
-from linkwork.parameters import field_name
 
 from .. import files
-from ..files import Quantity, Whole
 from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of
 from ..units import Amount
-from .inputs import Inputs, start_from
+from .inputs import Inputs, parameter_readers, start_from
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 #: What an argument is under a published set: a function of the set and of the argument as it was given, None where it was not.
@@ -98,48 +96,51 @@ def takes_options(kind: type) -> Callable[[_Function], _Function]:
     return decorate
 
 
-def command_of(mechanism: Mechanism) -> str | None:
-    """Name among the inputs of the command of the first freedom, such as the crank's speed."""
-    return next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
-
-
 def driven(known: PublishedSet, inputs: Any) -> Any:
-    """Inputs that turn the crank at the set's speed, unless they drive it themselves."""
-    mechanism = mechanism_of(known.parameters)
-    command, mode = command_of(mechanism), mechanism.freedoms[0].mode
+    """Return inputs that drive each freedom as the published set does, unless they drive it themselves."""
     inputs = Inputs() if inputs is None else inputs
-    if command is None or mode is None or not isinstance(inputs, Inputs) or {*inputs} & {*mode.arguments}:
+    if not isinstance(inputs, Inputs):
         return inputs
-    return inputs.replace(**{command: known.crank_speed})
+    mechanism = mechanism_of(known.parameters)
+    modes = [mode.arguments for mode in mechanism.modes]
+    rivals = {name: next((own for own in modes if name in own), (name,)) for name in known.drive}
+    added = {name: value for name, value in known.drive.items() if not {*inputs} & {*rivals[name]}}
+    return inputs.replace(**added) if added else inputs
 
 
 def started(known: PublishedSet, initial: Any) -> Any:
-    """The state at the start that is given, or else the set's; what a mapping leaves out is the set's."""
+    """Return the state at the start that is given, completed by that of the published set."""
     if isinstance(initial, Mapping):
         return start_from(mechanism_of(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 
 def at_its_speed(known: PublishedSet, speed: Any) -> Any:
-    """The crank speed that is given, or else the set's (rad/s)."""
+    """Return the crank speed that is given, or else that of the published set (rad/s)."""
     return known.crank_speed if speed is None else speed
 
 
-def turn_of(inputs: Inputs, mechanism: Mechanism) -> float | None:
-    """Duration of a turn of the first freedom (s) where it turns at a constant speed."""
-    command, period = command_of(mechanism), mechanism.freedoms[0].period
-    parts = () if command is None else inputs.parts(command)
-    if len(parts) != 1 or not isinstance(parts[0], (int, float)) or parts[0] * period == 0.0:
-        return None
-    return period / abs(parts[0])
+def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] | None:
+    """Return the durations (s) of a turn of the slowest and of the fastest freedom that turns at a constant speed.
+
+    None where there is no such freedom.
+    """
+    found = []
+    for number in mechanism.cyclic:
+        channel = mechanism.channel(number, "command")
+        parts = () if channel is None else inputs.parts(mechanism.channels[channel].argument)
+        if len(parts) == 1 and isinstance(parts[0], (int, float)) and parts[0] != 0.0:
+            found.append(mechanism.freedoms[number].period / abs(parts[0]))
+    return (max(found), min(found)) if found else None
 
 
 def usual_times(
     parameters: Parameters, inputs: Inputs | None, stop_time: float | None, step: float | None
 ) -> tuple[float, float]:
-    """End of a run and distance of its samples (s), by default three turns at a constant speed in 360 steps each.
+    """Return the end of a run and the distance of its samples (s).
 
-    With an end and no step it is 1 ms.
+    By default it has three turns of the slowest crank in steps of a degree of the fastest, at constant speeds. With an end
+    and no step it is 1 ms.
 
     Raises
     ------
@@ -148,12 +149,12 @@ def usual_times(
     """
     if stop_time is not None:
         return stop_time, 1e-3 if step is None else step
-    turn = turn_of(inputs, mechanism_of(parameters)) if isinstance(inputs, Inputs) else None
+    turn = turn_durations(inputs, mechanism_of(parameters)) if isinstance(inputs, Inputs) else None
     if turn is None:
         raise InputError(
             "stop_time is missing: a run has three turns by default only where the crank has a constant speed"
         )
-    return 3.0 * turn, turn / 360.0 if step is None else step
+    return 3.0 * turn[0], turn[1] / 360.0 if step is None else step
 
 
 def variant(of: Any, /, **changes: Amount) -> Any:
@@ -195,15 +196,7 @@ def variant(of: Any, /, **changes: Amount) -> Any:
         base = None
     else:
         mechanism = mechanism_of(base)
-    made = files.read(mechanism.parameters, changes, "", readers=readers_of(mechanism), base=base)
+    made = files.read(mechanism.parameters, changes, "", readers=parameter_readers(mechanism), base=base)
     if known is None:
         return made
     return known._replace(parameters=made, source=f"{known.source}, changed" if changes else known.source)
-
-
-def readers_of(mechanism: Mechanism) -> dict[str, files.Reader]:
-    """Readers of a mechanism's parameters by their fields."""
-    return {
-        field_name(name): Whole() if variable.kind == "Integer" else Quantity(variable.unit)
-        for name, variable in mechanism.mechanism_variables.items()
-    }

@@ -392,6 +392,5 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
         breaks=breaks[which],
         coefficients=coefficients,
         harmonics=harmonics[which],
-        laws=np.array([e.law for e in sources])[which],
-        law_places=np.array([e.law_places for e in sources])[which],
+        laws=np.array([e.laws for e in sources])[which],
     )

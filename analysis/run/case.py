@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from .arguments import driven, published_set, turn_of
+from .arguments import driven, published_set, turn_durations
 from .inputs import Inputs, given
 
 
@@ -40,8 +40,9 @@ class Case:
 
 
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
-    """A published set at its running speed, from where it is published to start; for as long as its FMU runs by default, if
-    nothing commands that speed.
+    """Return the case of a published set, driven as published and from its published start.
+
+    It lasts some revolutions of the slowest crank; where no speed is commanded, as long as the FMU's default experiment.
 
     Raises
     ------
@@ -50,10 +51,10 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
     """
     entry = published_set(name)
     mechanism, inputs = mechanism_of(entry.parameters), driven(entry, None)
-    turn = turn_of(inputs, mechanism)
+    turn = turn_durations(inputs, mechanism)
     _, stop_time, step, _ = mechanism.experiment
     if turn is not None:
-        stop_time, step = revolutions * turn, turn / steps_per_revolution
+        stop_time, step = revolutions * turn[0], turn[1] / steps_per_revolution
     return Case(
         title=entry.source,
         parameters=entry.parameters,

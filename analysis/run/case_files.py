@@ -7,7 +7,7 @@ dimension is checked. Names are those of the FMI contract: ``[slider] stiffness`
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,9 +21,9 @@ from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
 from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
 from ..units import with_unit
-from .arguments import driven, readers_of, turn_of
+from .arguments import driven, turn_durations
 from .case import Case
-from .inputs import Inputs, start_from
+from .inputs import Inputs, parameter_readers, start_from
 from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
 
 # Parameters
@@ -53,7 +53,7 @@ def parameters_from(
     data = {name: value for name, value in data.items() if name != "mechanism"}
     keys = {field_name(name): name for name in mechanism.mechanism_variables}
     made: Parameters = files.read(
-        mechanism.parameters, files.flattened(data), "", readers=readers_of(mechanism), keys=keys, base=base
+        mechanism.parameters, files.flattened(data), "", readers=parameter_readers(mechanism), keys=keys, base=base
     )
     return made
 
@@ -114,10 +114,10 @@ class Acting(NamedTuple):
 
 
 def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
-    """What may act on a mechanism, by its name in case files.
+    """Return what may act on a mechanism, by its name in case files.
 
-    That of a channel is as in `name_in_files`: ``slider.force`` is ``force``. A flag
-    that drives a freedom stands in the table of the freedom's mode: ``axial.groove``.
+    Of a channel it is `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom stands in the table of
+    the freedom's mode: ``axial.groove``.
     """
     units = {variable.name: variable.unit for variable in mechanism.variables}
     found = {}
@@ -142,15 +142,18 @@ class RunTable:
     tolerance: float = entry(Quantity("1"), 1e-9)
 
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
-        """End of the run and distance of the samples (s), by default three turns at a constant speed, in 360 steps each."""
-        turn = turn_of(inputs, mechanism)
-        step = self.step if self.step is not None else 1e-3 if turn is None else turn / 360.0
+        """Return the end of the run and the distance of the samples (s).
+
+        By default three turns of the slowest crank in steps of a degree of the fastest, at constant speeds.
+        """
+        turn = turn_durations(inputs, mechanism)
+        step = self.step if self.step is not None else 1e-3 if turn is None else turn[1] / 360.0
         if self.stop_time is not None:
             if self.revolutions is not None:
                 raise ParameterError("run.revolutions", self.revolutions, "not come together with run.stop_time")
             return self.stop_time, step
         if turn is not None:
-            return (3.0 if self.revolutions is None else self.revolutions) * turn, step
+            return (3.0 if self.revolutions is None else self.revolutions) * turn[0], step
         if self.revolutions is None:
             raise MissingParameterError("run.stop_time")
         raise ParameterError("run.revolutions", self.revolutions, "come with a constant speed; give run.stop_time")
@@ -185,22 +188,15 @@ def case_from(
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
     acting = acting_on(mechanism)
-    tables = {name.partition(".")[0] for name in acting}
-    driving = {mode.name.rpartition(".")[0] for mode in mechanism.modes} & tables
-    data = files.overridden(data, overrides or {}, exclusive=driving)
-    parameters = parameters_from(
-        {name: value for name, value in data.items() if name not in tables and name not in COMMON},
-        None if published is None else published.parameters,
-        mechanism,
-    )
+    data = files.overridden(_without_rivals(data, overrides or {}, mechanism, acting), overrides or {})
+    own, found = _divided(data, mechanism, acting, folder)
+    parameters = parameters_from(own, None if published is None else published.parameters, mechanism)
     base = None if published is None or published.at_rest else published.initial
     initial = start_from(mechanism, data.get("initial", {}), base)
-    readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
-    found = _found(data, readers, driving)
-    inputs = Inputs(**{acting[name].argument: value for name, value in found.items()})
+    inputs = Inputs(**found)
     if published is not None:
         inputs = driven(published, inputs)
-    _check_drives(mechanism, inputs, parameters, initial)
+    _check_drives(mechanism, inputs, parameters, initial, acting)
     run: RunTable = files.read(RunTable, data.get("run", {}), "run")
     stop_time, step = run.times(inputs, mechanism)
     return Case(
@@ -214,20 +210,56 @@ def case_from(
     )
 
 
-def _found(data: Mapping[str, Any], readers: Mapping[str, Reader], driving: Collection[str]) -> dict[str, Any]:
-    """What is said of what acts, by its name in the file; of the tables of ``driving`` one entry may be given."""
-    found = {name: reader(data[name], name) for name, reader in readers.items() if name in data}
-    for group in dict.fromkeys(name.partition(".")[0] for name in readers if "." in name):
+def _without_rivals(
+    data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting]
+) -> dict[str, Any]:
+    """Return the tables without the other ways to drive a freedom that an override drives."""
+    result = dict(data)
+    for name in overrides:
+        chosen = next((a.argument for own, a in acting.items() if f"{name}.".startswith(f"{own}.")), None)
+        rivals = {n for mode in mechanism.modes if chosen in mode.arguments for n in mode.arguments} - {chosen}
+        for rival in (own for own, a in acting.items() if a.argument in rivals):
+            table, _, leaf = rival.rpartition(".")
+            if not table:
+                result.pop(leaf, None)
+            elif isinstance(result.get(table), Mapping):
+                result[table] = {key: value for key, value in result[table].items() if key != leaf}
+    return result
+
+
+def _divided(
+    data: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting], folder: Path
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the tables of the parameters, and the inputs by their arguments.
+
+    The inputs stand at the top, in tables of their own, or beside the parameters in the table of a body.
+    """
+    readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
+    found = {name: readers[name](data[name], name) for name in acting if name in data}
+    own = {name: value for name, value in data.items() if name not in acting and name not in COMMON}
+    bodies = {name.partition(".")[0] for name in mechanism.mechanism_variables if "." in name}
+    for group in dict.fromkeys(name.partition(".")[0] for name in acting if "." in name):
         inside = {name.removeprefix(f"{group}."): r for name, r in readers.items() if name.startswith(f"{group}.")}
-        values: dict[str, Any] = files.read(dict, data.get(group, {}), group, readers=inside)
-        if group in driving and len(values) > 1:
-            raise ParameterError(group, ", ".join(data[group]), f"have only one of {', '.join(inside)}")
+        table = files.table_of(own.pop(group, {}), group)
+        if group in bodies:
+            own[group] = {leaf: value for leaf, value in table.items() if leaf not in inside}
+            table = {leaf: value for leaf, value in table.items() if leaf in inside}
+        values: dict[str, Any] = files.read(dict, table, group, readers=inside)
         found |= {f"{group}.{name}": value for name, value in values.items()}
-    return found
+    for mode in mechanism.modes:
+        rivals = [name for name, (argument, _) in acting.items() if argument in mode.arguments]
+        given = [name for name in found if name in rivals]
+        if len(given) > 1:
+            group = mode.name.partition(".")[0]
+            one, all_of = (", ".join(name.removeprefix(f"{group}.") for name in names) for names in (given, rivals))
+            raise ParameterError(group, one, f"have only one of {all_of}")
+    return own, {acting[name].argument: value for name, value in found.items()}
 
 
-def _check_drives(mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any) -> None:
-    """Make sure that what is said of a freedom has an effect."""
+def _check_drives(
+    mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, Acting]
+) -> None:
+    """Raise ParameterError if a groove or a rate at the start is given that has no effect."""
     if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"

@@ -41,7 +41,7 @@ from .records import (
     released,
     renew,
 )
-from .sources import PLACES, SOURCE, Source, channels_at, find, hold
+from .sources import SOURCE, Source, channels_at, find, hold, unwound, wound
 from .stepping import EXPONENT, STAGES, Flow, attempt, following, interpolate, shorter
 
 #: Share of the kinetic energy up to which the residual of the energy balance is taken out of it: a mechanism at rest has none.
@@ -58,11 +58,11 @@ def _begin_interval(motion):
     x, u, t = motion.x, motion.u, motion.carry.begin
     piece = find(t, source.breaks)
     carry.stop = _end_of_interval(piece, motion)
-    law = source.law
-    if law[2] != 0.0 and x[source.law_places[1]] >= law[1]:
-        law[2] = 0.0
+    for n in range(source.laws.shape[0]):
+        if unwound(n, x, source):
+            source.laws[n, 2] = 0.0
     channels_at(t, 0.0, piece, x, source, u)
-    carry.piece = -1 if problem.hold > 0.0 or (motion.steady and law[2] == 0.0) else piece
+    carry.piece = -1 if problem.hold > 0.0 or (motion.steady and not wound(source.laws)) else piece
     lost = _not_finite(u)
     if problem.hold > 0.0 and lost < 0:
         ahead = carry.stop if t < problem.end else t + problem.hold
@@ -309,18 +309,17 @@ class Batch(NamedTuple):
     coefficients: NDArray[np.float64]
     harmonics: NDArray[np.float64]
     laws: NDArray[np.float64]
-    law_places: NDArray[np.int64]
 
 
 _BATCH = types.NamedTuple(
-    (MATRIX, MATRIX, boolean[::1], int64[:, ::1], MATRIX, float64[:, :, :, ::1], CUBE, MATRIX, PLACES), Batch
+    (MATRIX, MATRIX, boolean[::1], int64[:, ::1], MATRIX, float64[:, :, :, ::1], CUBE, CUBE), Batch
 )
 
 
 def of_one(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], steady: bool) -> Batch:
     """A single run as a batch; its ``laws`` are those of the source."""
     sizes = [[len(source.coefficients), len(source.harmonics)]]
-    inputs = (source.breaks, source.coefficients, source.harmonics, source.law, source.law_places)
+    inputs = (source.breaks, source.coefficients, source.harmonics, source.laws)
     return Batch(p[None], scale[None], np.array([steady]), np.array(sizes), *(values[None] for values in inputs))
 
 
@@ -334,7 +333,7 @@ def _own(i, source, batch):
         batch.harmonics[i, :waves],
         source.places,
         batch.laws[i],
-        batch.law_places[i],
+        source.law_places,
         source.functions,
     )
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..files import unknown_name
-from ..mechanisms import InitialState, Parameters, output_units
+from ..mechanisms import InitialState, Parameters, output_units, wrapping_outputs
 from ..numerics.workers import interruptible
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
@@ -27,10 +27,6 @@ from .prepared import Run, Settings
 from .sampling import named, release, sample
 from .simulation import sample_times
 from .trajectory import Trajectory
-
-#: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
-PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
-
 
 #: Ways of running an FMU: co-simulation with inputs held over each step, the same with inputs that go linearly over it, model
 #: exchange under CVode.
@@ -140,7 +136,7 @@ class _Stepwise:
         self.title = ", linear inputs" if linear else ""
         self.mechanism = prepared.mechanism
         self.start = np.array(self.mechanism.state(prepared.initial))
-        self.law = self.encoded.source.law.copy()
+        self.laws = self.encoded.source.laws.copy()
         self.status, self.message = 0, ""
         names = self.mechanism.output_names
         rate_of = {v.rate_of: v.name for v in self.mechanism.variables if v.rate_of}
@@ -157,23 +153,23 @@ class _Stepwise:
         """The inputs at a communication point and a state, until the next one."""
         times, t = self.times, float(self.times[number])
         if self.linear:
-            release(self.encoded, x, self.law)
+            release(self.encoded, x, self.laws)
             ahead = -np.inf
         else:
             ahead = float(times[number + 1] if number + 1 < len(times) else t + times[1] - times[0])
-        return named(self.encoded, sample(self.encoded, t, x, self.law, ahead=ahead))
+        return named(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
         """How the inputs go from a communication point to the next, where the state is predicted from the outputs."""
         t, ahead = float(self.times[number]), float(self.times[number + 1])
         h, x = ahead - t, self.state(row)
-        n, law = len(self.rates), self.law.copy()
+        n, laws = len(self.rates), self.laws.copy()
         acceleration = np.array([row[i] for i in self.accelerations])
         there = x.copy()
         there[:n] += h * (x[n : 2 * n] + 0.5 * h * acceleration)
         there[n : 2 * n] += h * acceleration
-        release(self.encoded, there, law)
-        change = sample(self.encoded, ahead, there, law, left=True) - sample(self.encoded, t, x, self.law)
+        release(self.encoded, there, laws)
+        change = sample(self.encoded, ahead, there, laws, left=True) - sample(self.encoded, t, x, self.laws)
         change[self.encoded.commands[:, 0]] = 0.0
         return named(self.encoded, change / h)
 
@@ -214,9 +210,9 @@ class _Continuous:
     def first(self) -> dict[str, float]:
         """The inputs at the start."""
         prepared = self.prepared
-        x, law = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.source.law.copy()
-        release(prepared.encoded, x, law)
-        return named(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, law))
+        x, laws = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.source.laws.copy()
+        release(prepared.encoded, x, laws)
+        return named(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
         """Times and outputs, until the end or the limit of assembly, where the last configuration is given, too."""
@@ -320,13 +316,13 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     if len(a) == 0 or len(a) != len(b) or not np.allclose(a.time, b.time, rtol=1e-12, atol=1e-15):
         ends = [f"{len(run)} samples" + (f" to t = {run.time[-1]:.9g} s" if len(run) else "") for run in (a, b)]
         raise InputError(f"the runs cannot be compared: {ends[0]}, and {ends[1]}")
-    units = output_units()
+    units, wrapped = output_units(), wrapping_outputs()
     largest = {name: float(np.max(np.abs(np.nan_to_num(a[name])), initial=0.0)) for name in a.names}
     differences = []
     for name in a.names:
         with np.errstate(invalid="ignore"):
             difference = np.abs(a[name] - b[name])
-            if name in PRINCIPAL_ANGLES:
+            if name in wrapped:
                 difference = np.abs(np.remainder(difference + pi, 2.0 * pi) - pi)
         # what is not a number differs from everything
         difference[np.isnan(difference)] = np.inf

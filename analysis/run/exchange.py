@@ -55,7 +55,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         self.model, self.encoded = model, encoded
         # CVode's time counts from there: at a late time its first steps would be lost in the rounding
         self.origin = self.time = float(times[0])
-        self.law = encoded.source.law.copy()
+        self.laws = encoded.source.laws.copy()
         # the outer pieces go on beyond their ends
         breaks = encoded.source.breaks[1:-1]
         inside = breaks[(breaks > times[0]) & (breaks <= times[-1])]
@@ -64,7 +64,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         super().__init__(
             nx=model.states,
             # the release of a torsion bar is an event of the inputs
-            nz=model.indicators + 1,
+            nz=model.indicators + len(self.laws),
             get_x=lambda x, n: model.get_states(x),
             set_x=lambda x, n: None,
             get_dx=None,
@@ -88,15 +88,14 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
         """All inputs at a time and a state."""
-        return named(self.encoded, sample(self.encoded, t, x, self.law, left=left))
+        return named(self.encoded, sample(self.encoded, t, x, self.laws, left=left))
 
-    def begin(self, *, released: bool = False) -> bool:
-        """An event at the present time, from which on the inputs are smooth again; returns whether the run ends here."""
-        release(self.encoded, self.state, self.law)
-        if released:
-            self.law[2] = 0.0
+    def begin(self, released: Any = ()) -> bool:
+        """Begin an interval of smooth inputs with an event, which releases torsion bars; return whether the run ends here."""
+        release(self.encoded, self.state, self.laws)
+        self.laws[np.flatnonzero(released), 2] = 0.0
         self.ends = [end for end in self.ends if end > self.time]
-        self.still = self.encoded.steady and self.law[2] == 0.0
+        self.still = self.encoded.steady and not self.laws[:, 2].any()
         ended = self.model.event(self.inputs(self.time, self.state))
         self.reset(self.time - self.origin)
         if np.isfinite(self.ends[0]):
@@ -125,7 +124,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
                 raise self._reason(error) from error
         self.time = goal if reached == there else self.origin + reached
         self.put(self.time, self.px)
-        return self.begin(released=bool(roots[-1])) if roots.any() or self.time >= self.ends[0] else False
+        return self.begin(roots[self.model.indicators :]) if roots.any() or self.time >= self.ends[0] else False
 
     def _reason(self, error: Exception) -> Exception:
         """Why CVode failed: because of the inputs, where it was they that could not be had."""
@@ -168,6 +167,8 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
             x = NV_DATA_S(y)
             self.put(self.origin + t, x)
             self.model.get_indicators(gout)
-            gout[self.nz - 1] = self._array(x)[self.encoded.source.law_places[1]] - self.law[1] if self.law[2] else 1.0
+            angles = self._array(x)[self.encoded.source.law_places[:, 1]]
+            for n, (angle, law) in enumerate(zip(angles, self.laws), start=self.model.indicators):
+                gout[n] = angle - law[1] if law[2] else 1.0
 
         return self._tried(work)

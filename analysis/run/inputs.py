@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, ParameterError
 from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
 
 from .. import files
 from ..mechanisms import MECHANISMS, InitialState, variable_units
@@ -174,9 +175,7 @@ def _parts(value: Any) -> tuple[Any, ...]:
 
 
 def _check_channel(name: str, value: Any) -> None:
-    on_shafts = {
-        c.argument for m in MECHANISMS.values() for c in m.channels if c.kind == "force" and _turns(m, c.freedom)
-    }
+    on_shafts = {m.channels[n].argument for m in MECHANISMS.values() for n in m.torques}
     parts = _parts(value)
     kinds = _SIGNALS if name in on_shafts else _SIGNALS[:-2]
     for part in parts:
@@ -193,8 +192,12 @@ def _check_channel(name: str, value: Any) -> None:
             raise InputError(f"{name} has more than one {kind.__name__}: one can be in force at a time")
 
 
-def _turns(mechanism: Mechanism, freedom: int) -> bool:
-    return freedom >= 0 and mechanism.freedoms[freedom].period > 0.0
+def parameter_readers(mechanism: Mechanism) -> dict[str, files.Reader]:
+    """Return the readers of a mechanism's parameters by their fields."""
+    return {
+        field_name(name): files.Whole() if variable.kind == "Integer" else files.Quantity(variable.unit)
+        for name, variable in mechanism.mechanism_variables.items()
+    }
 
 
 def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None) -> InitialState:
@@ -284,7 +287,7 @@ class Encoded:
         slopes, bends = self.source.coefficients[:, :, 1], self.source.coefficients[:, :, 2:]
         return not (
             len(self.source.harmonics)
-            or self.source.law[3]
+            or self.source.laws[:, 3].any()
             or any(chain.from_iterable(self.functions))
             or bends.any()
             or slopes[:, self.source.places[:, 1] < 0].any()
@@ -323,9 +326,9 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
     merged = np.unique(np.concatenate(times)) if times else _NO_BREAKS
     coefficients = np.zeros((len(merged) - 1, len(signals), 4))
     harmonics: list[tuple[float, float, float, float]] = []
-    law = np.zeros(6)
-    law[4] = law[5] = 1.0
-    law_places = np.zeros(3, dtype=np.int64)
+    laws = np.tile((0.0, 0.0, 0.0, 0.0, 1.0, 1.0), (len(mechanism.torques), 1))
+    on = [mechanism.channels[channel].freedom for channel in mechanism.torques]
+    law_places = np.array([(c, n, freedoms + n) for c, n in zip(mechanism.torques, on)], dtype=np.int64).reshape(-1, 3)
     functions: list[tuple[StateFunction | None, StateFunction | None]] = [(None, None)] * len(signals)
     for n, part in pieces:
         if isinstance(part, Piecewise):
@@ -334,11 +337,11 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
             coefficients[:, n, 0] += part.mean
             harmonics += [(float(n), *row) for row in zip(part.amplitudes, part.frequencies, part.phases)]
         elif isinstance(part, (TorsionBar, InductionMotor)):
-            channel = signals[n][1]
-            freedom = mechanism.channels[channel].freedom
-            if law_places[2] and law_places[0] != channel:
-                raise InputError("torsion bar and motor act on different channels: they must act on one")
-            law_places[:] = channel, freedom, freedoms + freedom
+            if signals[n][1] not in mechanism.torques:
+                raise InputError(
+                    f"{signals[n][0]} of a {mechanism.name} is no torque on a freedom that turns: {part!r} is"
+                )
+            law = laws[mechanism.torques.index(signals[n][1])]
             if isinstance(part, TorsionBar):
                 law[0:3] = part.torque, part.release_angle, 1.0
             else:
@@ -357,7 +360,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
         coefficients,
         np.array(harmonics, dtype=float).reshape(-1, 4),
         np.array([row[1:] for row in signals], dtype=np.int64).reshape(-1, 2),
-        law,
+        laws,
         law_places,
         np.zeros((len(signals), 2), dtype=np.int64),
     )
@@ -423,8 +426,8 @@ def _reason(error: Exception) -> str:
 
 
 def compiled_source(encoded: Encoded) -> tuple[Source, list[Any]]:
-    """The inputs as the compiled code reads them, with a law of their own, and what has to stay alive meanwhile."""
+    """The inputs as the compiled code reads them, with laws of their own, and what has to stay alive meanwhile."""
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
-    return encoded.source._replace(law=encoded.source.law.copy(), functions=addresses), kept
+    return encoded.source._replace(laws=encoded.source.laws.copy(), functions=addresses), kept

@@ -1,4 +1,4 @@
-"""Events of a compiled run: the limit of assembly, the torsion bar's release, the user's; where in a step they happen."""
+"""Events of a compiled run: the limit of assembly, the release of torsion bars, the user's; where in a step they happen."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from .records import (
     renew,
     time_at,
 )
+from .sources import unwound
 from .stepping import NODES, interpolant, interpolate, stage
 
 #: Events that one step can bring at most, and the beginning of an interval besides.
@@ -32,7 +33,8 @@ SAME = 1e-9
 
 # What can cut a step short besides a user's event, which goes by its number. Of Python's integers each would be a type of its
 # own to Numba, for which it compiles the functions that take it once more.
-NOTHING, RELEASE, ASSEMBLY = np.arange(-3, 0)
+# Torsion bar n is released at RELEASE - n.
+RELEASE, NOTHING, ASSEMBLY = np.arange(-3, 0)
 
 
 @inner
@@ -41,8 +43,8 @@ def _gap(e, t, x, u, motion):
     watch, source = motion.watch, motion.source
     if e == ASSEMBLY:
         return clearance_at(x, u, motion) - LIMIT_SINE
-    if e == RELEASE:
-        return source.law[1] - x[source.law_places[1]]
+    if e <= RELEASE:
+        return source.laws[RELEASE - e, 1] - x[source.law_places[RELEASE - e, 1]]
     if watch.addresses[e] != 0:
         return call_user(watch.addresses[e], t, x)
     equation(OUTPUTS, t, x, u, motion.room.outputs, motion)
@@ -152,9 +154,11 @@ def locate_events(clearance, h, motion):
         what = ASSEMBLY
         cut = _locate(ASSEMBLY, 0.0, 1.0, h, motion)
     if released(motion.room.y, motion):
-        s = _locate(RELEASE, 0.0, 1.0, h, motion)
-        if s < cut:
-            what, cut = RELEASE, s
+        for n in range(motion.source.laws.shape[0]):
+            if unwound(n, motion.room.y, motion.source):
+                s = _locate(RELEASE - n, 0.0, 1.0, h, motion)
+                if s < cut:
+                    what, cut = RELEASE - n, s
     what, cut = _events_of_step(what, cut, h, motion)
     # times in the place of fractions; what comes after the cut did not happen
     kept = carry.known
@@ -176,21 +180,21 @@ def end_at(what, cut, h, motion):
     t = time_at(cut, h, motion)
     interpolate(cut, x, motion.room.f, motion.room.z)
     copy(motion.room.z, x)
-    if what == RELEASE:
-        x[source.law_places[1]] = source.law[1]
+    if what <= RELEASE:
+        x[source.law_places[RELEASE - what, 1]] = source.laws[RELEASE - what, 1]
     renew(carry.elapsed + cut * h, x, u, motion)
     for e in range(watch.table.shape[0]):
         watch.gaps[e] = _gap(e, t, x, u, motion)
-    status = RUNNING if what == RELEASE else LIMIT if what == ASSEMBLY else EVENT
+    status = RUNNING if what <= RELEASE else LIMIT if what == ASSEMBLY else EVENT
     for n in range(carry.known, carry.found):
         # at the cut itself, but for rounding: it has happened
         e = int(watch.found[n, 0])
         if watch.found[n, 1] >= time_at(cut - SAME, h, motion):
             watch.gaps[e] = 0.0
-            if watch.table[e, STOPS] != 0.0 and what == RELEASE:
+            if watch.table[e, STOPS] != 0.0 and what <= RELEASE:
                 status = EVENT
-    if what == RELEASE:
-        source.law[2] = 0.0
+    if what <= RELEASE:
+        source.laws[RELEASE - what, 2] = 0.0
     carry.begin = t
     carry.elapsed = 0.0
     return status

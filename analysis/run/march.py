@@ -16,11 +16,15 @@ from . import records as k
 from .events import Event, RunInterrupted, shown
 from .locating import SAME
 from .prepared import Run, verdict
-from .sampling import NotFiniteError, sample
+from .sampling import NotFiniteError, release, sample
 from .trajectory import Occurrence, Trajectory
 
 #: Evaluations of inputs that are not finite after which one of SciPy's methods is stopped.
 MOST_LOSSES = 300
+
+#: What ends an interval early: an event of the user, the release of a torsion bar by its number, or None: the limit of
+#: assembly.
+What = Event | int | None
 
 
 def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], progress: bool) -> Trajectory:
@@ -67,9 +71,9 @@ class March:
         self.settings = run.settings
         start = run.start()
         self.x, self.energy, self.scale = start.x, start.energy, start.scale
-        self.law = run.encoded.source.law.copy()
-        #: component of the state that a torsion bar acts by
-        self.angle = int(run.encoded.source.law_places[1])
+        self.laws = run.encoded.source.laws.copy()
+        #: components of the state that torsion bars act by
+        self.angles = run.encoded.source.law_places[:, 1].tolist()
         self.t = float(run.settings.times[0])
         #: what acts on the plant
         self.held: Any = None
@@ -96,9 +100,9 @@ class March:
         e, t, end = self.of.encoded, self.t, self.settings.times[-1]
         if self.settings.hold:
             ahead = stop if t < end else t + self.settings.hold
-            u = sample(e, t, self.x, self.law, ahead=ahead)
+            u = sample(e, t, self.x, self.laws, ahead=ahead)
         else:
-            u = sample(e, t, self.x, self.law)
+            u = sample(e, t, self.x, self.laws)
         self.held = self.of.applied(u)
         return u
 
@@ -108,8 +112,7 @@ class March:
         interval = 0
         while True:
             stop = self._end_of_interval(interval)
-            if self.law[2] and self.x[self.angle] >= self.law[1]:
-                self.law[2] = 0.0
+            release(self.of.encoded, self.x, self.laws)
             u = self._sample(stop)
             if len(self.of.encoded.commands) and self._gaps is not None:
                 self.x = np.array(self.equations.jump(tuple(self.x), self.held, tuple(u), self.of.p))
@@ -147,9 +150,9 @@ class March:
         return float(self.equations.outputs(tuple(x), held, self.energy, self.of.p)[column] - event.level)
 
     def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> Any:
-        if self.settings.hold or (self.of.encoded.steady and not self.law[2]):
+        if self.settings.hold or (self.of.encoded.steady and not self.laws[:, 2].any()):
             return self.held
-        return self.of.applied(sample(self.of.encoded, t, x, self.law, left=t >= stop))
+        return self.of.applied(sample(self.of.encoded, t, x, self.laws, left=t >= stop))
 
     def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
         # where there is no configuration or no input, so large a derivative has the step tried again shorter
@@ -216,15 +219,15 @@ class March:
         for t, x in zip(solution.t, np.ascontiguousarray(np.asarray(solution.y).T)):
             if t < stop:
                 self.rows.append((float(t), x, self._inputs(t, x, stop)))
-        what: str | Event = ""
+        what: What = None
         if solution.status == 1:
             t_cut = happened[-1][0]
             _, what, self.x = next(item for item in happened if item[0] == t_cut and self._ends(item[1]))
             self.t, self.x = t_cut, self.x.copy()
-            if what == "release":
-                self.x[self.angle] = self.law[1]
+            if isinstance(what, int):
+                self.x[self.angles[what]] = self.laws[what, 1]
             else:
-                self.status = k.LIMIT if what == "limit" else k.EVENT
+                self.status = k.EVENT if what else k.LIMIT
         elif solution.status == 0:
             self.t, self.x = stop, solution.y[:, -1].copy()
         else:
@@ -243,16 +246,16 @@ class March:
         self._gaps = [
             0.0 if event in just_now else self._gap(event, self.t - same, before, self.held) for event in self.of.events
         ]
-        if what == "release":
-            self.law[2] = 0.0
+        if isinstance(what, int):
+            self.laws[what, 2] = 0.0
         return bool(solution.status == 0)
 
     @staticmethod
-    def _ends(what: str | Event) -> bool:
-        return isinstance(what, str) or what.stop
+    def _ends(what: What) -> bool:
+        return what.stop if isinstance(what, Event) else True
 
-    def _watched(self, stop: float) -> list[tuple[str | Event, Callable[[float, NDArray[np.float64]], float]]]:
-        """Event functions for `solve_ivp`: the limit of assembly, the torsion bar's release, the user's."""
+    def _watched(self, stop: float) -> list[tuple[What, Callable[[float, NDArray[np.float64]], float]]]:
+        """Return the event functions for `solve_ivp`: the limit of assembly, the release of torsion bars, the user's."""
 
         def limit(t: float, x: NDArray[np.float64]) -> float:
             try:
@@ -260,15 +263,18 @@ class March:
             except (ArithmeticError, ValueError):
                 return -1.0
 
-        def release(t: float, x: NDArray[np.float64]) -> float:
-            return float(x[self.angle] - self.law[1])
+        def unwound(n: int) -> Callable[[float, NDArray[np.float64]], float]:
+            def value(t: float, x: NDArray[np.float64]) -> float:
+                return float(x[self.angles[n]] - self.laws[n, 1])
 
-        watched: list[tuple[str | Event, Any]] = [("limit", limit)]
-        if self.law[2] and not self.settings.hold:
-            watched.append(("release", release))
+            value.direction = 1  # type: ignore[attr-defined]
+            return value
+
+        watched: list[tuple[What, Any]] = [(None, limit)]
+        if not self.settings.hold:
+            watched += [(n, unwound(n)) for n in np.flatnonzero(self.laws[:, 2]).tolist()]
         for _, function in watched:
             function.terminal = True
-        release.direction = 1  # type: ignore[attr-defined]
 
         t0, x0 = self.t, self.x
         # SciPy reports an event that starts at zero: such a one is given the sign of what follows

@@ -86,7 +86,7 @@ class Run:
             If an input is not a finite number.
         """
         x = np.array(self.mechanism.state(self.initial))
-        u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.law)
+        u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.laws)
         for channel, place, _ in self.encoded.commands:
             x[place] = u[channel]
         state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
@@ -120,9 +120,9 @@ class Run:
 
         begun = clock.perf_counter()
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
-        start, law = self.start(), self.encoded.source.law
+        start, laws = self.start(), self.encoded.source.laws
         if turns.too_many(start.x):
-            turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, law), law, 0)
+            turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
             # the balance of energy begins with the angles as they are now
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = problem_of(self.encoded, self.settings, self.mechanism.switched(self.p))
@@ -154,7 +154,7 @@ class Run:
                     carry["found"] = 0
                     show(carry["begin"] + carry["elapsed"] - times[0])
                     if status[0] == k.RUNNING:
-                        turns.take(x, u, source.law, int(carry["sample"]), watch)
+                        turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner
 from .equations import CLEARANCE
-from .sources import ADDRESSES, PLACES, Source, channels_at
+from .sources import ADDRESSES, PLACES, Source, channels_at, unwound
 from .stepping import interpolate
 
 # Status of a run, as the kernels return it: where the run has one, the solver.status of the FMI contract
@@ -179,6 +179,9 @@ def look_inside(s, h, motion):
 
 @inner
 def released(y, motion):
-    """Whether the torsion bar is released in a step that ends at y."""
-    law = motion.source.law
-    return law[2] != 0.0 and motion.problem.hold == 0.0 and y[motion.source.law_places[1]] >= law[1]
+    """Whether a torsion bar is released in a step that ends at y."""
+    if motion.problem.hold == 0.0:
+        for n in range(motion.source.laws.shape[0]):
+            if unwound(n, y, motion.source):
+                return True
+    return False

@@ -25,7 +25,7 @@ def sample(
     encoded: Encoded,
     t: float,
     x: NDArray[np.float64],
-    law: NDArray[np.float64],
+    laws: NDArray[np.float64],
     *,
     left: bool = False,
     ahead: float = -np.inf,
@@ -34,13 +34,13 @@ def sample(
 
     Parameters
     ----------
-    law : ndarray, shape (6,)
-        That of ``encoded``, or what has become of it.
+    laws : ndarray, shape (torques, 6)
+        Those of ``encoded``, or what has become of them.
     left : bool
         Whether the limit from the left is meant where an input jumps.
     ahead : float
         Where it is later than t, the channels are sampled at t and held until then (s): commanded
-        rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``law`` is overwritten
+        rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``laws`` are overwritten
         once it is released.
 
     Raises
@@ -52,8 +52,8 @@ def sample(
 
     x = np.ascontiguousarray(x)
     if ahead > t:
-        release(encoded, x, law)
-    source = encoded.source._replace(law=law)
+        release(encoded, x, laws)
+    source = encoded.source._replace(laws=laws)
     u = np.zeros(len(encoded.mechanism.channels))
     channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
     here = np.zeros_like(u)
@@ -77,10 +77,9 @@ def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
     return dict(zip(encoded.mechanism.input_names, u.tolist()))
 
 
-def release(encoded: Encoded, x: NDArray[np.float64], law: NDArray[np.float64]) -> None:
-    """Release a torsion bar, in ``law``, that at state x has turned as far as it was wound."""
-    if law[2] and x[encoded.source.law_places[1]] >= law[1]:
-        law[2] = 0.0
+def release(encoded: Encoded, x: NDArray[np.float64], laws: NDArray[np.float64]) -> None:
+    """Release the torsion bars, in ``laws``, that at state x have turned as far as they were wound."""
+    laws[x[encoded.source.law_places[:, 1]] >= laws[:, 1], 2] = 0.0
 
 
 def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -255,10 +255,11 @@ class Source(NamedTuple):
         Number of the signal, amplitude, frequency, phase.
     places : ndarray of int, shape (signals, 2)
         Numbers of the channels that are a signal and its rate, -1 where it has none.
-    law : ndarray, shape (6,)
-        Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
-    law_places : ndarray of int, shape (3,)
-        Channel on which bar and motor act, and the components of the state that are its freedom's coordinate and rate.
+    laws : ndarray, shape (torques, 6)
+        For each of `Mechanism.torques`, a torsion bar: torque, release angle, 1 while it acts, 0 after its release or where
+        there is none; and a motor: breakdown torque and slip, synchronous speed; a torque of zero where there is none.
+    law_places : ndarray of int, shape (torques, 3)
+        The channels of these torques, and the components of the state that are coordinate and rate of their freedoms.
     functions : ndarray of int, shape (signals, 2)
         Addresses of the user's compiled functions for a signal and its rate, or 0.
     """
@@ -267,6 +268,6 @@ class Source(NamedTuple):
     coefficients: NDArray[np.float64]
     harmonics: NDArray[np.float64]
     places: NDArray[np.int64]
-    law: NDArray[np.float64]
+    laws: NDArray[np.float64]
     law_places: NDArray[np.int64]
     functions: NDArray[np.int64]

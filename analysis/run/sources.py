@@ -14,7 +14,7 @@ _torque_of_motor = inner(kloss)
 
 ADDRESSES = int64[::1]
 PLACES = int64[:, ::1]
-SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, VECTOR, ADDRESSES, PLACES), Source)
+SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, MATRIX, PLACES, PLACES), Source)
 
 
 @inner
@@ -60,18 +60,34 @@ def channels_at(begin, elapsed, piece, x, source, u):
         u[value] += harmonics[k, 1] * cos(phase)
         if rate >= 0:
             u[rate] -= harmonics[k, 1] * harmonics[k, 2] * sin(phase)
-    law = source.law
-    channel, coordinate, speed = source.law_places
-    if law[2] != 0.0:
-        u[channel] += law[0] * (1.0 - x[coordinate] / law[1])
-    if law[3] != 0.0:
-        u[channel] += _torque_of_motor(law[3:6], x[speed])
+    for n in range(source.laws.shape[0]):
+        law = source.laws[n]
+        channel, coordinate, speed = source.law_places[n]
+        if law[2] != 0.0:
+            u[channel] += law[0] * (1.0 - x[coordinate] / law[1])
+        if law[3] != 0.0:
+            u[channel] += _torque_of_motor(law[3:6], x[speed])
     for n in range(source.functions.shape[0]):
         function, of_rate = source.functions[n]
         if function != 0:
             u[source.places[n, 0]] += call_user(function, begin + elapsed, x)
         if of_rate != 0:
             u[source.places[n, 1]] += call_user(of_rate, begin + elapsed, x)
+
+
+@inner
+def wound(laws):
+    """Whether a torsion bar acts."""
+    for n in range(laws.shape[0]):  # noqa: SIM110 - Numba compiles no generators  # noqa: SIM110 - Numba compiles no generators
+        if laws[n, 2] != 0.0:
+            return True
+    return False
+
+
+@inner
+def unwound(n, x, source):
+    """Whether a torsion bar acts and has turned, at state x, as far as it was wound."""
+    return source.laws[n, 2] != 0.0 and x[source.law_places[n, 1]] >= source.laws[n, 1]
 
 
 @inner
@@ -103,9 +119,10 @@ def hold(t, ahead, x, source, commands, u, there):
     A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets
     the command again at the next point of the grid.
     """
-    if source.law[2] != 0.0:
-        channel, coordinate, speed = source.law_places
-        u[channel] += _held_bar(source.law, x[coordinate], x[speed], ahead - t)
+    for n in range(source.laws.shape[0]):
+        if source.laws[n, 2] != 0.0:
+            channel, coordinate, speed = source.law_places[n]
+            u[channel] += _held_bar(source.laws[n], x[coordinate], x[speed], ahead - t)
     if commands.shape[0] > 0:
         channels_at(ahead, 0.0, _find_before(ahead, source.breaks), x, source, there)
         for n in range(commands.shape[0]):

@@ -12,10 +12,9 @@ import numpy as np
 from linkwork.errors import ParameterError
 
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
-from ..mechanisms import require_five_bar
-from ..motion import inverse_dynamics, motion_of_plant, slider_motion
 from ..notebook import format_count
 from ..run import Case, case_from
+from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..studio import state_of
 from ..synthesis import (
     Constraint,
@@ -38,6 +37,7 @@ from ..synthesis import (
     kind_of,
     synthesize,
 )
+from ..youssef import require_five_bar
 from .answers import Answer, FloatArray, chart, file, folder
 
 _POINT = Many(Quantity("m"), length=2)

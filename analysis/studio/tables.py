@@ -61,8 +61,10 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
         "moving": [names.index(name) for name in _moving(mechanism)],
         "charts": _charts(mechanism),
         "natural": _natural(mechanism, reference, crank),
-        "damping": damping_name(mechanism) if crank >= 0 and len(mechanism.freedoms) > 1 else "",
-        "transmission": names.index("transmission.angle") if "transmission.angle" in names else -1,
+        "damping": damping_name(mechanism)
+        if crank >= 0 and len(mechanism.freedoms) > 1 and mechanism.names("damping")
+        else "",
+        "transmission": next((names.index(name) for name in mechanism.names("transmission")), -1),
         "sets": [
             {"name": name, "source": known.source, "values": published_values(mechanism, known)}
             for name, known in mechanism.published.items()
@@ -73,9 +75,7 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
 def published_values(mechanism: Mechanism, known: PublishedSet) -> dict[str, float]:
     """What is given in a published set that is run at its speed, by FMI name."""
     return values_of(mechanism, known.parameters, known.initial) | {
-        channel.name: known.crank_speed
-        for channel in mechanism.channels
-        if channel.kind == "command" and mechanism.freedoms[channel.freedom].period > 0.0
+        channel.name: known.drive[channel.argument] for channel in mechanism.channels if channel.argument in known.drive
     }
 
 
@@ -210,26 +210,20 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
     """
     names, variables = list(mechanism.output_names), {v.name: v for v in mechanism.variables}
     power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())
-    joints = [name.removesuffix("fx") for name in names if name.endswith(".fx")]
     watt = {"unit": "W", "factor": 1.0}
 
     def outputs(title: str, kind: str, of: list[str]) -> dict[str, Any]:
         unit = _unit(variables[of[0]]) if of else watt
         return {"title": title, "kind": kind, **unit, "curves": [{"name": n, "of": [names.index(n)]} for n in of]}
 
-    forces = [
-        {
-            "name": joint.rstrip("."),
-            "of": [names.index(joint + leaf) for leaf in ("fx", "fy", "fz") if joint + leaf in names],
-        }
-        for joint in joints
-    ]
+    forces = [{"name": joint, "of": [names.index(name) for name in parts]} for joint, parts in mechanism.joints.items()]
+    turning = [name for n in mechanism.cyclic for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)]
     powers = [{"name": "of drives and loads", "of": [power + 1]}, {"name": "lost", "of": [power]}]
     found = [
         outputs("Motion", "motion", _moving(mechanism)),
-        outputs("Torque of the drive", "motion", [n for n in names if n == "drive.applied_torque"]),
+        outputs("Torque of the drive", "motion", turning),
         {"title": "Forces in the joints", "kind": "forces", "unit": "N", "factor": 1.0, "curves": forces},
         {"title": "Power", "kind": "power", **watt, "curves": powers},
-        outputs("Transmission angle", "power", [n for n in names if n == "transmission.angle"]),
+        outputs("Transmission angle", "power", list(mechanism.names("transmission"))),
     ]
     return [chart for chart in found if chart["curves"]]

@@ -359,7 +359,7 @@ def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
 def _bound(mechanism: Mechanism, limit: Limit) -> float:
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
-    joints = {n.removesuffix(".fx"): units[n] for n in units if n.endswith(".fx")}
+    joints = {joint: units[parts[0]] for joint, parts in mechanism.joints.items()}
     known = units if name != limit.output else joints | units
     if name not in known:
         raise unknown_name(name, known, f"output {name!r}")

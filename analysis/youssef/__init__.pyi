@@ -27,6 +27,8 @@ from .hill import monodromy as monodromy
 from .hill import perturbed_boundary as perturbed_boundary
 from .hill import perturbed_region as perturbed_region
 from .hill import perturbed_removing_damping as perturbed_removing_damping
+from .premises import require_five_bar as require_five_bar
+from .premises import require_no_contact_friction as require_no_contact_friction
 from .stability import linear_equation as linear_equation
 from .stability import linear_monodromy as linear_monodromy
 from .stability import linear_motion as linear_motion

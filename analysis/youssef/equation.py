@@ -27,13 +27,14 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.limits import LIMIT_SINE
 
-from ..mechanisms import FIVE_BAR, require_no_contact_friction
+from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
 from ..run import constants, takes_published, traced
 from ..units import Amount, in_si
 from . import thesis
 from .hill import PeriodicEquation
+from .premises import require_no_contact_friction
 from .thesis import Form
 
 #: Part of the largest amplitude that the harmonics left out of the exact coefficients have at most.

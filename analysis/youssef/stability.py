@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
-from ..mechanisms import require_five_bar
 from ..numerics.boundaries import Test
 from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, test_of, verdict
 from ..run import takes_published
 from .equation import Load, Variant, slider_equation
 from .hill import PeriodicEquation, monodromy
+from .premises import require_five_bar
 
 
 def load_of(drive: Drive) -> Load:

@@ -32,9 +32,9 @@ from linkwork.errors import InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 
-from ..mechanisms import require_five_bar
 from ..run import takes_published
 from ..units import Amount, in_si
+from .premises import require_five_bar
 
 #: Cells across the area in the first and in the finest grid.
 COARSEST, FINEST = 128, 4096

@@ -188,17 +188,31 @@ class Drawing(NamedTuple):
 
 
 class PublishedSet(NamedTuple):
-    """A mechanism as printed: parameters, state at the start, the rate of the first freedom that it is run at, source.
+    """A mechanism as printed.
 
-    ``at_rest`` says whether the start is one at rest but for that rate: where something else drives the mechanism it starts at
-    rest then, unless a case file says otherwise.
+    Attributes
+    ----------
+    parameters, initial : of the mechanism
+        Parameters and state at the start.
+    drive : mapping of str to float
+        Constant inputs that it is run at, by their arguments, such as ``{"speed": 44.0}``.
+    source : str
+        Where it is printed.
+    at_rest : bool
+        Whether it starts at rest but for what ``drive`` commands: where something else drives the mechanism it then starts at
+        rest, unless a case file says otherwise.
     """
 
     parameters: Any
     initial: Any
-    crank_speed: float
+    drive: Mapping[str, float]
     source: str
     at_rest: bool = False
+
+    @property
+    def crank_speed(self) -> float:
+        """Speed of the one crank (rad/s), ``drive["speed"]``."""
+        return self.drive["speed"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -221,7 +235,7 @@ class Mechanism:
     published : mapping
         `PublishedSet` by name, one at least.
     freedoms : tuple of Freedom
-        The first is the crank, where one turns.
+        Any of them may turn, and any number of them.
     channels : tuple of Channel
         In the order of the FMI inputs.
     variables : tuple of Variable
@@ -308,6 +322,34 @@ class Mechanism:
         self.check_assembly(parameters, x)
         if self.switched(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
             raise JammingError(f"{JAMMING} at {self.where(x)}")
+
+    @cached_property
+    def cyclic(self) -> tuple[int, ...]:
+        """Numbers of the freedoms that turn."""
+        return tuple(number for number, freedom in enumerate(self.freedoms) if freedom.period > 0.0)
+
+    @cached_property
+    def torques(self) -> tuple[int, ...]:
+        """Numbers of the channels that are torques on freedoms that turn."""
+        return tuple(n for n, c in enumerate(self.channels) if c.kind == "force" and c.freedom in self.cyclic)
+
+    def channel(self, freedom: int, kind: str) -> int | None:
+        """Return the number of the channel of a kind that drives a freedom directly; None where there is none."""
+        found = (n for n, c in enumerate(self.channels) if c.kind == kind and c.freedom == freedom)
+        return next(found, None)
+
+    def names(self, role: str, of: str | None = None) -> tuple[str, ...]:
+        """Return the names of the variables that play a role, of a freedom or a joint if one is given."""
+        return tuple(v.name for v in self.variables if v.role == role and of in (None, v.of))
+
+    @cached_property
+    def joints(self) -> dict[str, tuple[str, ...]]:
+        """Names of the outputs that are the components of the force in each joint."""
+        found: dict[str, tuple[str, ...]] = {}
+        for v in self.variables:
+            if v.role == "joint force":
+                found[v.of] = (*found.get(v.of, ()), v.name)
+        return found
 
     @cached_property
     def rules(self) -> Rules:

@@ -41,6 +41,18 @@ UNITS = {
 }
 
 
+#: Roles of variables: their causality, and what they are.
+ROLES = {
+    "stiffness": ("parameter", "stiffness of a spring along a coordinate"),
+    "damping": ("parameter", "viscous damping along a coordinate"),
+    "friction": ("parameter", "level or coefficient of dry friction, which changes fast about rest"),
+    "drive": ("output", "torque or force with which a freedom is driven"),
+    "joint force": ("output", "component of the force in a joint, in the order of the axes"),
+    "guide force": ("output", "force of a guide across it"),
+    "transmission": ("output", "transmission angle: the links lock where its sine is zero"),
+}
+
+
 class Variable(NamedTuple):
     """One scalar variable of an FMI interface.
 
@@ -71,6 +83,10 @@ class Variable(NamedTuple):
         Of an output, the output that it is the time derivative of; empty where it is of none.
     nominal : float or None
         A usual magnitude, where the start value is 0 and 1 would be none.
+    role : str
+        Meaning for the analyses, a key of `ROLES`; empty where they need none.
+    of : str
+        What has that role: the coordinate that a spring, a damper or a drive acts along, or the joint of a force.
     """
 
     name: str
@@ -87,23 +103,43 @@ class Variable(NamedTuple):
     level: str = "all"
     rate_of: str = ""
     nominal: float | None = None
+    role: str = ""
+    of: str = ""
+
+    @property
+    def wraps(self) -> bool:
+        """Whether it is an angle between -pi and pi, which jumps by a turn."""
+        return self.minimum == -pi and self.maximum == pi
 
 
-def parameter(start: Any, name: str, unit: str, description: str, symbol: str = "") -> Variable:
-    """A parameter that starts from the same of ``start``, bounded as its ``RULES`` say; people think of angles in degrees."""
+def parameter(
+    start: Any, name: str, unit: str, description: str, symbol: str = "", role: str = "", of: str = ""
+) -> Variable:
+    """Return a parameter that starts from its value in ``start``, bounded by its ``RULES``; angles are shown in degrees."""
     field = field_name(name)
     minimum = None if field in start.RULES.free_sign else 0.0
     display = "deg" if unit == "rad" else ""
-    return Variable(name, "parameter", unit, description, symbol, getattr(start, field), "Real", minimum, None, display)
+    return Variable(
+        name,
+        "parameter",
+        unit,
+        description,
+        symbol,
+        getattr(start, field),
+        minimum=minimum,
+        display=display,
+        role=role,
+        of=of,
+    )
 
 
 def choice(name: str, description: str, start: int, least: int, greatest: int) -> Variable:
-    """A parameter that is a whole number."""
+    """Return a parameter that is a whole number."""
     return Variable(name, "parameter", "", description, "", start, "Integer", least, greatest)
 
 
 def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
-    """The commanded speed of the crank and its rate; ``angle`` is the symbol of its angle."""
+    """Return the commanded speed of the crank and its rate; ``angle`` is the symbol of its angle."""
     speed = "Crank speed at the start of a step; used where drive.mode is 1"
     rate = "Rate of change of the crank speed over a step; used where drive.mode is 1"
     return (
@@ -113,7 +149,7 @@ def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
 
 
 def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
-    """Angle, speed and acceleration of the crank; ``angle`` is the symbol of its angle."""
+    """Return angle, speed and acceleration of the crank; ``angle`` is the symbol of its angle."""
     return (
         output("crank.angle", "rad", "Crank angle, counted on over full turns", angle, *POSITION, display="deg"),
         output("crank.speed", "rad/s", "Crank speed", rf"\dot{angle}", *RATE, display="rpm", rate_of="crank.angle"),
@@ -122,7 +158,7 @@ def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
 
 
 def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Variable, ...]:
-    """Energies and their balance; in words what has potential energy, what loses work and what does work."""
+    """Return the energies and their balance; the arguments name in words the sources of each."""
     balance = "Energy balance: gained plus dissipated less supplied; zero but for error"
     return (
         output("energy.kinetic", "J", "Kinetic energy of all links", "", *RATE, minimum=0.0),
@@ -145,19 +181,22 @@ def output(
     maximum: float | None = None,
     display: str = "",
     rate_of: str = "",
+    role: str = "",
+    of: str = "",
 ) -> Variable:
-    """A real output."""
+    """Return a real output."""
     return Variable(
-        name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level, rate_of
-    )
+        name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level, rate_of,
+        role=role, of=of,
+    )  # fmt: skip
 
 
-#: What an output depends on that follows from the positions at the start, and one that follows from the rates too.
+#: Dependencies (``depends``, ``level``) of outputs that follow from the positions, and of those that follow from the rates too.
 POSITION, RATE = ("state", "position"), ("speed", "velocity")
 
 
 def tolerance_parameter() -> Variable:
-    """The parameter every slave of ours has: how exact a step is."""
+    """Return the parameter that bounds the error of a step, which every FMU has."""
     return Variable(
         "solver.tolerance",
         "parameter",
@@ -171,9 +210,9 @@ def tolerance_parameter() -> Variable:
 
 
 def status_variables() -> tuple[Variable, Variable]:
-    """The two variables every FMU of ours has: why its last step was refused, if it was.
+    """Return the two variables of every FMU that say whether and why its last step was refused.
 
-    They are local, because there are masters that read every output as a Real.
+    They are local, because some masters read every output as a Real.
     """
     return (
         Variable(

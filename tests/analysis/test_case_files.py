@@ -177,7 +177,7 @@ step = "1 ms"
         ),
         (
             'published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1',
-            "drive is .speed, torque.: it must have only one of",
+            "drive .*only one of torque, speed",
         ),
         ('published = "table-3.1"\n[run]\nrevolutions = 0', r"run\.revolutions is 0: it must be greater than zero"),
         (

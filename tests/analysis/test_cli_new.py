@@ -12,9 +12,9 @@ from analysis.cli.new import case_text, kinds
 from analysis.files import Many, Quantity, Whole, names_of
 from analysis.files.template import example, meanings
 from analysis.mechanisms import MECHANISMS
-from analysis.motion import TABLES as MOTION
-from analysis.motion import SliderCase, load_slider_case
 from analysis.run import RunTable, acting_on, load_case, load_parameters
+from analysis.slider import TABLES as MOTION
+from analysis.slider import SliderCase, load_slider_case
 from analysis.synthesis import BOUNDS, KINDS, TABLES, SynthesisCase, load_synthesis_case
 from analysis.tuning import TuneTable, load_tuning_case
 from analysis.units import quantity

@@ -12,11 +12,10 @@ import pytest
 import tomli_w
 from click.testing import CliRunner, Result
 
-from analysis import cli
-from analysis import motion as control
-from analysis.motion import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
+from analysis import cli, slider
 from analysis.numerics.fourier import FourierSeries
 from analysis.run import load_case, load_parameters, simulate
+from analysis.slider import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.synthesis import (
     Linkage,
     Search,
@@ -212,17 +211,6 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
     assert free.slider_stiffness == free.slider_damping == 0.0
 
 
-def test_least_effort_takes_less(linkwork, tmp_path) -> None:
-    effort = {"bound": "1 mm", "intervals": 20}
-    result = linkwork(tables(drive={"speed": "300 rpm"}, least_effort=effort), "--no-plots")
-    assert result.exit_code == 0, result.output
-    assert "motion of least effort" in result.output
-    least, before = csv(tmp_path / "out" / "least-effort.csv"), csv(tmp_path / "out" / "motion.csv")
-    assert least["departure [m]"].max() < 1.001e-3
-    rms = [np.sqrt(np.mean(f**2)) for f in (before["slider.force [N]"], least["slider force [N]"])]
-    assert rms[1] < 0.97 * rms[0]
-
-
 def test_the_strategy_stops_where_it_is_good_enough_and_says_why(linkwork, tmp_path) -> None:
     strategy = {"tolerance": "0.01 mm", "harmonics": 2, "ratios": [1], "starts": 4}
     result = linkwork(tables(strategy=strategy, slider={"stroke": "60 mm"}), "--no-plots")
@@ -326,13 +314,13 @@ def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:
     done = []
 
     def stopped(task: Any, *arguments: Any, **options: Any) -> Any:
-        found = control.slider_motion(task, *arguments, **options)
+        found = slider.slider_motion(task, *arguments, **options)
         done.append(found)
         if len(done) == 2:
             raise SynthesisInterrupted(found, 3, 6)
         return found
 
-    monkeypatch.setattr("analysis.motion.cases.slider_motion", stopped)
+    monkeypatch.setattr("analysis.slider.cases.slider_motion", stopped)
     case = tables(slider={"harmonics": [1, 2, 3], "starts": 3}, drive={"speed": "60 rpm"})
     result = linkwork(case, "--no-plots")
     assert result.exit_code == cli.INTERRUPTED
@@ -344,10 +332,10 @@ def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:
 
 def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch) -> None:
     def stopped(*arguments: Any, **options: Any) -> Any:
-        found = control.simplest_mechanism(*arguments, **options)
-        raise control.StrategyInterrupted(replace(found, steps=found.steps[:1], met=False))
+        found = slider.simplest_mechanism(*arguments, **options)
+        raise slider.StrategyInterrupted(replace(found, steps=found.steps[:1], met=False))
 
-    monkeypatch.setattr("analysis.motion.cases.simplest_mechanism", stopped)
+    monkeypatch.setattr("analysis.slider.cases.simplest_mechanism", stopped)
     strategy = {"tolerance": "1e-9 mm", "harmonics": 1, "ratios": [], "starts": 2}
     result = linkwork(tables(strategy=strategy), "--no-plots")
     assert result.exit_code == cli.INTERRUPTED
@@ -388,9 +376,6 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"drive": {"speed": "60 rpm"}, "tracking": {"period": "0 s"}}, "tracking.period"),
         ({"drive": {"speed": "60 rpm"}, "tracking": {"mass_error": -1}}, "tracking.mass_error"),
         ({"drive": {"speed": "60 rpm"}, "tracking": {"bandwidth": "-1 rad/s"}}, "tracking.bandwidth"),
-        ({"drive": {"speed": "60 rpm"}, "least_effort": {}}, "least_effort.bound"),
-        ({"drive": {"speed": "60 rpm"}, "least_effort": {"bound": "1 deg"}}, "least_effort.bound"),
-        ({"drive": {"speed": "60 rpm"}, "least_effort": {"bound": "1 mm", "cost": "sweat"}}, "least_effort.cost"),
         ({"strategy": {}}, "strategy.tolerance"),
         ({"strategy": {"tolerance": "1 mm^2"}}, "strategy.tolerance"),
         ({"strategy": {"tolerance": "1 mm", "criterion": "mean"}}, "strategy.criterion"),

@@ -17,8 +17,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from analysis.files import check_fmu, load_array, read_csv, read_points, read_rows, read_tables, save_array
-from analysis.motion.cases import linkage_from_csv, load_slider_case
 from analysis.run import load_case, load_parameters
+from analysis.slider.cases import linkage_from_csv, load_slider_case
 from analysis.synthesis import load_synthesis_case
 from linkwork.errors import LinkworkError
 

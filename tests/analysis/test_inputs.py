@@ -22,7 +22,7 @@ def value(inputs: Inputs, t: float, *, left: bool = False, x: Any = REST) -> dic
     """All channels at a time, and the acceleration."""
     encoded = encode(inputs, FIVE_BAR)
     names = [channel.argument for channel in FIVE_BAR.channels]
-    return dict(zip(names, sample(encoded, t, np.asarray(x, float), encoded.source.law, left=left).tolist()))
+    return dict(zip(names, sample(encoded, t, np.asarray(x, float), encoded.source.laws, left=left).tolist()))
 
 
 def force(signal: Any, t: float, *, left: bool = False) -> float:
@@ -110,11 +110,11 @@ def test_torsion_bar(th2: float, expected: float) -> None:
 
 def test_a_torsion_bar_is_released_where_it_has_turned_as_far_as_it_was_wound() -> None:
     encoded = encode(Inputs(torque=TorsionBar(torque=10.0, release_angle=2.0)), FIVE_BAR)
-    law = encoded.source.law.copy()
-    release(encoded, np.array([1.999, 0, 0, 0]), law)
-    assert law.tolist() == encoded.source.law.tolist()
-    release(encoded, np.array([2.0, 0, 0, 0]), law)
-    assert law.tolist() == [*encoded.source.law[:2], 0.0, *encoded.source.law[3:]]
+    laws = encoded.source.laws.copy()
+    release(encoded, np.array([1.999, 0, 0, 0]), laws)
+    assert laws.tolist() == encoded.source.laws.tolist()
+    release(encoded, np.array([2.0, 0, 0, 0]), laws)
+    assert laws[0].tolist() == [*encoded.source.laws[0, :2], 0.0, *encoded.source.laws[0, 3:]]
 
 
 @pytest.mark.parametrize("speed", [-20.0, 0.0, 30.0, 49.9, 50.0, 80.0])

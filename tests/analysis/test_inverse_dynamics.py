@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from analysis import Inputs, simulate
-from analysis.motion import best_spring, inverse_dynamics
-from analysis.motion.inverse import NAMES
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import find_orbit
 from analysis.run import table
+from analysis.slider import best_spring, inverse_dynamics
+from analysis.slider.inverse import NAMES
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState

@@ -115,7 +115,7 @@ def test_the_multiplier_form_gives_the_same_motion_and_forces(case: str) -> None
 
     def acting(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, float, float, float]:
         x = np.array([q[0], q[3], qd[0], qd[3]])
-        torque, _, _, force, load_x, load_y = sample(encoded, t, x, encoded.source.law)
+        torque, _, _, force, load_x, load_y = sample(encoded, t, x, encoded.source.laws)
         return torque, force, load_x, load_y
 
     speed = SpeedDrive(SPEED) if "speed" in inputs else None
@@ -371,7 +371,7 @@ def test_held_inputs_are_constant_between_the_points_of_the_grid() -> None:
     force = table([0.0, 0.03, 0.08, STOP], [0.0, 4.0, -3.0, 1.0], "cubic")
     held = table_3_1(Inputs(torque=0.5, force=force), hold=4e-3, step=4e-3)
     encoded = encode(Inputs(force=force), FIVE_BAR)
-    values = [sample(encoded, t, np.zeros(4), encoded.source.law)[3] for t in times]
+    values = [sample(encoded, t, np.zeros(4), encoded.source.laws)[3] for t in times]
     stepped = table_3_1(Inputs(torque=0.5, force=steps(times, values)), step=4e-3)
     assert compare(held, stepped, tolerance=1e-12).agrees
 

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
-from analysis.motion import SmoothnessInterrupted, greatest, motion, slider_motion, smoothness_curve
 from analysis.numerics.fourier import FourierSeries
+from analysis.slider import SmoothnessInterrupted, greatest, motion, slider_motion, smoothness_curve
 from analysis.synthesis import (
     ANGLES,
     LENGTHS,

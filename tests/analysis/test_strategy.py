@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.motion import Step, Strategy, StrategyInterrupted, simplest_mechanism
-from analysis.motion import strategy as strategy_module
 from analysis.numerics.fourier import FourierSeries
+from analysis.slider import Step, Strategy, StrategyInterrupted, simplest_mechanism
+from analysis.slider import strategy as strategy_module
 from analysis.synthesis import (
     ANGLES,
     LENGTHS,

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
-from analysis.motion import slider_motion
 from analysis.numerics.fourier import FourierSeries
+from analysis.slider import slider_motion
 from analysis.synthesis import (
     USUAL,
     Assembly,

@@ -18,8 +18,8 @@ from analysis.linear import (
     linearise,
     linearise_along,
 )
-from analysis.motion import TrackingController, inverse_dynamics, track
 from analysis.numerics.fourier import FourierSeries
+from analysis.slider import TrackingController, inverse_dynamics, track
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import InitialState

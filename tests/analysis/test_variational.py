@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.motion import VariationalMotion, variational_motion
-from analysis.motion.variational import _path
 from analysis.numerics.fourier import FourierSeries
+from analysis.slider import VariationalMotion, variational_motion
+from analysis.slider.variational import _path
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion
 from analysis.synthesis.kernels import link_directions
 from linkwork.errors import AssemblyError, InputError, ParameterError

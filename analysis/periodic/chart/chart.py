@@ -523,10 +523,17 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """FMI name of the damping of the first freedom beside the crank, or of the first damping that the mechanism has."""
-    own = mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".damping"
-    names = [name for name in mechanism.mechanism_variables if name.endswith(".damping")]
-    return own if own in names or not names else names[0]
+    """Return the FMI name of the damping of the first freedom beside the crank, or else of the first damping there is.
+
+    Raises
+    ------
+    InputError
+        If the mechanism has no damping.
+    """
+    own = mechanism.names("damping", mechanism.freedoms[first_freedom(mechanism)].coordinate)
+    for name in (*own, *mechanism.names("damping")):
+        return name
+    raise InputError(f"a {mechanism.name} has no damping: name both parameters of the chart")
 
 
 def _axis(mechanism: Mechanism, name: str) -> Axis:

@@ -317,7 +317,7 @@ def is_smooth(parameters: Parameters) -> bool:
     """Whether the rates are smooth over a turn: friction changes fast where a motion turns round, which only an integrator with
     steps of its own is sure to meet."""
     mechanism = mechanism_of(parameters)
-    rough = [name for name in mechanism.mechanism_variables if "friction" in name]
+    rough = mechanism.names("friction")
     return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.switched(
         parameters.constants()
     )

@@ -137,19 +137,23 @@ def _of_a_turn(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], 
     }
     for order in (1, 2, 3):
         columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]
-    if "drive.applied_torque" in first.names:
-        columns["mean crank torque [N.m]"] = lambda turn: float(turn["drive.applied_torque"].mean())
-        columns["greatest crank torque [N.m]"] = lambda turn: float(np.abs(turn["drive.applied_torque"]).max())
-    for joint in dict.fromkeys(name.removesuffix(".fx") for name in first.names if name.endswith(".fx")):
-        parts = [f"{joint}.f{axis}" for axis in "xyz" if f"{joint}.f{axis}" in first.names]
+    for number in mechanism.cyclic:
+        freedom = mechanism.freedoms[number].coordinate
+        what = "crank torque" if len(mechanism.cyclic) == 1 else f"torque on {freedom.partition('.')[0]}"
+        for name in mechanism.names("drive", freedom):
+            columns[f"mean {what} [N.m]"] = lambda turn, name=name: float(turn[name].mean())  # type: ignore[misc]
+            columns[f"greatest {what} [N.m]"] = lambda turn, name=name: float(  # type: ignore[misc]
+                np.abs(turn[name]).max()
+            )
+    for joint, parts in mechanism.joints.items():
         columns[f"{FORCE}{joint.replace('.', ' ')} [N]"] = lambda turn, parts=parts: float(  # type: ignore[misc]
             reduce(np.hypot, (turn[part] for part in parts)).max()
         )
-    if "slider.guide_force" in first.names:
-        columns["greatest guide force [N]"] = lambda turn: float(np.abs(turn["slider.guide_force"]).max())
-    if "transmission.angle" in first.names:
-        columns["least sine of the transmission angle [1]"] = lambda turn: float(
-            np.abs(np.sin(turn["transmission.angle"])).min()
+    for name in mechanism.names("guide force"):
+        columns["greatest guide force [N]"] = lambda turn, name=name: float(np.abs(turn[name]).max())  # type: ignore[misc]
+    for name in mechanism.names("transmission"):
+        columns["least sine of the transmission angle [1]"] = lambda turn, name=name: float(  # type: ignore[misc]
+            np.abs(np.sin(turn[name])).min()
         )
     return columns
 

@@ -53,8 +53,8 @@ def first_freedom(mechanism: Mechanism) -> int:
 
 
 def stiffness_name(mechanism: Mechanism) -> str:
-    """FMI name of the stiffness of the first freedom's spring, as it is where the mechanism has one: ``slider.stiffness``."""
-    return mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".stiffness"
+    """Return the FMI name of the stiffness of the first freedom's spring, such as ``slider.stiffness``; empty without one."""
+    return next(iter(mechanism.names("stiffness", mechanism.freedoms[first_freedom(mechanism)].coordinate)), "")
 
 
 def _means(parameters: Parameters) -> tuple[float, float]:
@@ -113,7 +113,7 @@ def natural_frequency(parameters: Parameters) -> float:
     mass, stiffness = _means(parameters)
     stiffness = stiffness if spring is None else spring
     if stiffness <= 0.0:
-        raise ParameterError(name, stiffness, "be above zero for a natural frequency")
+        raise ParameterError(name or "stiffness", stiffness, "be above zero for a natural frequency")
     return sqrt(stiffness / mass)
 
 

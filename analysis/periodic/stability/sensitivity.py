@@ -225,10 +225,9 @@ class MotionGradient:
         outputs = self.orbit.flow.mechanism.output_names
         if name in outputs:
             return [outputs.index(name)]
-        parts = [outputs.index(part) for axis in "xyz" if (part := f"{name}.f{axis}") in outputs]
-        if joints and parts:
-            return parts
-        own = [output.removesuffix(".fx") for output in outputs if output.endswith(".fx")] if joints else []
+        own = self.orbit.flow.mechanism.joints if joints else {}
+        if name in own:
+            return [outputs.index(part) for part in own[name]]
         raise unknown_name(name, (*outputs, *own))
 
     @cached_property

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...motion import VariationalMotion, slider_motion, variational_motion
 from ...numerics.fourier import FourierSeries
+from ...slider import VariationalMotion, slider_motion, variational_motion
 from ...synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import accessible, accessible_area
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged

@@ -21,8 +21,8 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...linear import Design, design_pid, linearise_along
-from ...motion import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
 from ...numerics.fourier import FourierSeries
+from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
 from .series_2 import rocker_motion
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...motion import slider_motion
 from ...notebook import format_count
 from ...numerics.fourier import FourierSeries
+from ...slider import slider_motion
 from ...synthesis import (
     Linkage,
     RockerFunction,

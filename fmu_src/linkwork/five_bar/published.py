@@ -26,7 +26,7 @@ RAD_S_PER_RPM = pi / 30.0
 def _at(crank_speed_rpm: float, parameters: FiveBarParameters, source: str) -> PublishedSet:
     """A set with the thesis's start: th2 = u = u' = 0 at the running speed."""
     speed = crank_speed_rpm * RAD_S_PER_RPM
-    return PublishedSet(parameters, InitialState(crank_speed=speed), speed, source, at_rest=True)
+    return PublishedSet(parameters, InitialState(crank_speed=speed), {"speed": speed}, source, at_rest=True)
 
 
 def _from_cgs(

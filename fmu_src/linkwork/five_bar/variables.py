@@ -25,6 +25,7 @@ from .published import SETS
 
 _SET = SETS["table-3.1"]
 _parameter = partial(parameter, _SET.parameters)
+_SLIDE = "slider.position"
 
 PARAMETERS = (
     _parameter(
@@ -52,12 +53,18 @@ PARAMETERS = (
     _parameter("coupler.cog_angle", "rad", "Direction of the coupler's centre of mass from B to C", "\\nu_3"),
     _parameter("rocker.cog_angle", "rad", "Direction of the rocker's centre of mass from D to C", "\\nu_4"),
     _parameter("slider.guide_angle", "rad", "Direction of the slider's guide from the ground link", "\\alpha"),
-    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "k"),
+    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "k", "stiffness", _SLIDE),
     _parameter("slider.spring_free_position", "m", "Slider position at which the spring is free", "u_0"),
-    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "\\mu"),
-    _parameter("slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", "F_c"),
+    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "\\mu", "damping", _SLIDE),
     _parameter(
-        "slider.friction_coefficient", "1", "Friction of the guide relative to its force, smooth about rest", "\\mu_g"
+        "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", "F_c", "friction"
+    ),
+    _parameter(
+        "slider.friction_coefficient",
+        "1",
+        "Friction of the guide relative to its force, smooth about rest",
+        "\\mu_g",
+        "friction",
     )._replace(nominal=0.1),
     *(
         _parameter(
@@ -65,6 +72,7 @@ PARAMETERS = (
             "m",
             f"Moment of friction in pin {pin} relative to its force: coefficient of friction times radius",
             f"\\rho_{pin}",
+            "friction",
         )._replace(nominal=1e-3)
         for pin in "ABCD"
     ),
@@ -108,8 +116,16 @@ INPUTS = (
 
 def _pin(pin: str, description: str) -> tuple[Variable, Variable]:
     return (
-        output(f"pin.{pin}.fx", "N", f"Force of {description}, along the ground link"),
-        output(f"pin.{pin}.fy", "N", f"Force of {description}, to the left of the ground link"),
+        output(
+            f"pin.{pin}.fx", "N", f"Force of {description}, along the ground link", role="joint force", of=f"pin.{pin}"
+        ),
+        output(
+            f"pin.{pin}.fy",
+            "N",
+            f"Force of {description}, to the left of the ground link",
+            role="joint force",
+            of=f"pin.{pin}",
+        ),
     )
 
 
@@ -134,12 +150,24 @@ OUTPUTS = (
     output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u", rate_of="slider.velocity"),
     output("coupler.point.x", "m", "Coupler point P, along the ground link from A", "x", *POSITION),
     output("coupler.point.y", "m", "Coupler point P, to the left of the ground link", "y", *POSITION),
-    output("drive.applied_torque", "N.m", "Torque on the crank; in speed drive the torque that holds the speed", "T_1"),
+    output(
+        "drive.applied_torque",
+        "N.m",
+        "Torque on the crank; in speed drive the torque that holds the speed",
+        "T_1",
+        role="drive",
+        of="crank.angle",
+    ),
     *_pin("A", "the ground on the crank"),
     *_pin("B", "the crank on the coupler"),
     *_pin("C", "the rocker on the coupler"),
     *_pin("D", "the slider on the rocker"),
-    output("slider.guide_force", "N", "Force of the guide on the slider, to the left of its direction of travel"),
+    output(
+        "slider.guide_force",
+        "N",
+        "Force of the guide on the slider, to the left of its direction of travel",
+        role="guide force",
+    ),
     *energy_outputs(
         "spring and gravity, the latter zero with every centre of mass at A",
         "damper, guide and pins",
@@ -155,6 +183,7 @@ OUTPUTS = (
         minimum=0.0,
         maximum=pi,
         display="deg",
+        role="transmission",
     ),
     *status_variables(),
 )

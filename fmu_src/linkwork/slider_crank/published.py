@@ -55,7 +55,7 @@ def initial(shift_in: float = 0.0) -> InitialState:
 
 def _case(offset_in: float, shift_in: float, twist_deg: float) -> PublishedSet:
     source = f"Rahman, section 3.1: a4 = {offset_in:g} in, S1 = {shift_in:g} in, alpha4 = {twist_deg:g} deg"
-    return PublishedSet(parameters(offset_in, twist_deg), initial(shift_in), CRANK_SPEED, source)
+    return PublishedSet(parameters(offset_in, twist_deg), initial(shift_in), {"speed": CRANK_SPEED}, source)
 
 
 #: The ideal slider-crank and the cases of figures 5 to 38, by name: offset and shift in inches, twist in degrees.

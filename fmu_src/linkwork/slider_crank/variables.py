@@ -51,13 +51,17 @@ PARAMETERS = (
     _parameter(
         "slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide against its position (k)"
     ),
-    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider"),
+    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "", "stiffness", "slider.position"),
     _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free"),
-    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider"),
-    _parameter("slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest"),
-    _parameter("shift.stiffness", "N/m", "Stiffness of the spring on the axial shift"),
+    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "", "damping", "slider.position"),
+    _parameter(
+        "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", "", "friction"
+    ),
+    _parameter(
+        "shift.stiffness", "N/m", "Stiffness of the spring on the axial shift", "", "stiffness", "shift.position"
+    ),
     _parameter("shift.spring_free_position", "m", "Axial shift at which its spring is free"),
-    _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift"),
+    _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift", "", "damping", "shift.position"),
     _parameter("groove.amplitude", "m", "Amplitude of the shift that a groove makes; axial.mode 2", "S_{S1}"),
     _parameter("groove.ratio", "1", "Periods of that shift in a turn of the crank; axial.mode 2", "\\alpha"),
     _parameter("gravity.x", "m/s2", "Acceleration of gravity along x of the ground frame"),
@@ -128,13 +132,13 @@ INPUTS = (
 )
 
 
-def _vector(
-    prefix: str, unit: str, description: str, depends: str = "all", level: str = "all", symbols: str = "   "
-) -> tuple[Variable, ...]:
-    """Three outputs, the components of a vector along x, y and z of the ground frame."""
+def _vector(prefix: str, unit: str, description: str, depends: str = "all", level: str = "all") -> tuple[Variable, ...]:
+    """Return three outputs, the components of a vector along x, y and z of the ground frame."""
+    joint = prefix.removesuffix(".f")
+    role, of = ("joint force", joint) if joint != prefix else ("", "")
     return tuple(
-        output(f"{prefix}{axis}", unit, f"{description}, along {axis}", symbol.strip(), depends, level)
-        for axis, symbol in zip("xyz", symbols)
+        output(f"{prefix}{axis}", unit, f"{description}, along {axis}", "", depends, level, role=role, of=of)
+        for axis in "xyz"
     )
 
 
@@ -151,10 +155,19 @@ OUTPUTS = (
     *_vector("slider_pin.", "m", "Slider pin", *POSITION),
     *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", *RATE),
     output(
-        "drive.applied_torque", "N.m", "Torque of the drive; where drive.mode is 1 the torque that holds the speed", "T"
+        "drive.applied_torque",
+        "N.m",
+        "Torque of the drive; where drive.mode is 1 the torque that holds the speed",
+        "T",
+        role="drive",
+        of="crank.angle",
     ),
     output(
-        "axial.applied_force", "N", "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it"
+        "axial.applied_force",
+        "N",
+        "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it",
+        role="drive",
+        of="shift.position",
     ),
     *_vector("bearing.f", "N", "Force on the crank of bearing, axial drive, shift spring and damper together"),
     *_vector("bearing.m", "N.m", "Moment about O on the crank of bearing, drive and groove together"),
@@ -177,6 +190,7 @@ OUTPUTS = (
         minimum=0.0,
         maximum=0.5 * pi,
         display="deg",
+        role="transmission",
     ),
     output(
         "assembly.margin",

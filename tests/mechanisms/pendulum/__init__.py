@@ -46,7 +46,16 @@ class Initial:
 VARIABLES = (
     Variable("pendulum.inertia", "parameter", "kg.m2", "Moment of inertia", start=0.1, minimum=0.0),
     Variable("pendulum.weight", "parameter", "N.m", "Greatest moment of its weight", start=2.0, minimum=0.0),
-    Variable("pendulum.damping", "parameter", "1", "Damping (N.m.s/rad)", start=0.02, minimum=0.0),
+    Variable(
+        "pendulum.damping",
+        "parameter",
+        "1",
+        "Damping (N.m.s/rad)",
+        start=0.02,
+        minimum=0.0,
+        role="damping",
+        of="pendulum.angle",
+    ),
     Variable("initial.pendulum_angle", "parameter", "rad", "Angle at the start"),
     Variable("initial.pendulum_speed", "parameter", "rad/s", "Speed at the start"),
     tolerance_parameter(),
@@ -70,7 +79,7 @@ MECHANISM = Mechanism(
         "pendulum-demo": PublishedSet(
             Parameters(pendulum_inertia=0.1, pendulum_weight=2.0, pendulum_damping=0.02),
             Initial(pendulum_speed=30.0),
-            30.0,
+            {},
             "made up for the tests",
         )
     },

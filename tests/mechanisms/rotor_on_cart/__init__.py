@@ -63,8 +63,9 @@ _DEMO = Parameters(
 _SPEED = 20.0
 
 
-def _p(name: str, unit: str, description: str) -> Variable:
-    return Variable(name, "parameter", unit, description, start=getattr(_DEMO, name.replace(".", "_")), minimum=0.0)
+def _p(name: str, unit: str, description: str, role: str = "") -> Variable:
+    start, of = getattr(_DEMO, name.replace(".", "_")), "cart.position" if role else ""
+    return Variable(name, "parameter", unit, description, start=start, minimum=0.0, role=role, of=of)
 
 
 VARIABLES = (
@@ -72,8 +73,8 @@ VARIABLES = (
     _p("rotor.radius", "m", "Its distance from the axis"),
     _p("rotor.inertia", "kg.m2", "Moment of inertia about the mass"),
     _p("cart.mass", "kg", "Mass of the cart"),
-    _p("cart.stiffness", "N/m", "Stiffness of its spring"),
-    _p("cart.damping", "N.s/m", "Its viscous damping"),
+    _p("cart.stiffness", "N/m", "Stiffness of its spring", "stiffness"),
+    _p("cart.damping", "N.s/m", "Its viscous damping", "damping"),
     _p("gravity", "m/s2", "Acceleration of gravity"),
     Variable("drive.mode", "parameter", "", "0: torque; 1: speed", "", 1, "Integer", 0, 1),
     Variable("initial.rotor_angle", "parameter", "rad", "Angle at the start"),
@@ -91,7 +92,7 @@ VARIABLES = (
     output("cart.position", "m", "Position of the cart", "", "state", "position"),
     output("cart.velocity", "m/s", "Velocity of the cart", "", "speed", "velocity", rate_of="cart.position"),
     output("cart.acceleration", "m/s2", "Acceleration of the cart", rate_of="cart.velocity"),
-    output("drive.applied_torque", "N.m", "Torque on the rotor"),
+    output("drive.applied_torque", "N.m", "Torque on the rotor", role="drive", of="rotor.angle"),
     output("energy.residual", "J", "Energy balance", "", "speed"),
     *status_variables(),
 )
@@ -104,7 +105,9 @@ MECHANISM = Mechanism(
     notes=("The rotor turns in the vertical plane of the cart's motion.",),
     parameters=Parameters,
     initial=Initial,
-    published={"rotor-demo": PublishedSet(_DEMO, Initial(rotor_speed=_SPEED), _SPEED, "made up for the tests")},
+    published={
+        "rotor-demo": PublishedSet(_DEMO, Initial(rotor_speed=_SPEED), {"speed": _SPEED}, "made up for the tests")
+    },
     freedoms=(
         Freedom(
             "rotor.angle",

@@ -60,14 +60,14 @@ class Initial:
         check_initial(self)
 
 
-def _p(name: str, unit: str, description: str) -> Variable:
-    return Variable(name, "parameter", unit, description)
+def _p(name: str, unit: str, description: str, role: str = "") -> Variable:
+    return Variable(name, "parameter", unit, description, role=role, of="rotor.angle" if role else "")
 
 
 VARIABLES = (
     Variable("rotor.inertia", "parameter", "kg.m2", "Moment of inertia", start=1.0, minimum=0.0),
-    _p("rotor.damping", "1", "Viscous damping (N.m.s/rad)"),
-    _p("rotor.stiffness", "1", "Stiffness of the torsion spring (N.m/rad)"),
+    _p("rotor.damping", "1", "Viscous damping (N.m.s/rad)", "damping"),
+    _p("rotor.stiffness", "1", "Stiffness of the torsion spring (N.m/rad)", "stiffness"),
     _p("rotor.cubic_stiffness", "1", "Its torque with the third power of the angle (N.m/rad3)"),
     _p("rotor.modulation", "1", "Amplitude of the stiffness over a turn of the crank (N.m/rad)"),
     _p("rotor.weight", "N.m", "Greatest moment of the rotor's weight"),
@@ -99,7 +99,11 @@ MECHANISM = Mechanism(
     notes=("The crank turns at a commanded speed.",),
     parameters=Parameters,
     initial=Initial,
-    published={"torsion-demo": PublishedSet(Parameters(rotor_stiffness=1.0), Initial(), 1.0, "made up for the tests")},
+    published={
+        "torsion-demo": PublishedSet(
+            Parameters(rotor_stiffness=1.0), Initial(), {"speed": 1.0}, "made up for the tests"
+        )
+    },
     freedoms=(
         Freedom("crank.angle", "crank.speed", ("crank_angle", "crank_speed"), period=2.0 * pi),
         Freedom("rotor.angle", "rotor.speed", ("rotor_angle", "rotor_speed")),

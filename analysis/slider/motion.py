@@ -2,7 +2,7 @@
 
 The rocker pivot of a given linkage is moved so that it does its task better: mean, harmonics and the guide's angle are sought
 with exact Jacobians from several starts, within bounds of stroke, speed and acceleration; or the links together with them. The
-optimum at every crank angle by itself is in `analysis.motion.variational`; it may jump, a Fourier series cannot.
+optimum at every crank angle by itself is in `analysis.slider.variational`; it may jump, a Fourier series cannot.
 """
 
 from __future__ import annotations

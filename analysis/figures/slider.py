@@ -1,11 +1,11 @@
-"""Pictures of the slider's motion: what it takes to drive it, how well it is followed, and what less effort looks like."""
+"""Pictures of the slider's motion: position, force and power over the turn, and how well the motion is tracked."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..motion import LeastEffort, SliderDrive, TrackingResult
+from ..slider import SliderDrive, TrackingResult
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 
@@ -43,21 +43,3 @@ def plot_tracking(run: TrackingResult, *, title: str = "") -> Figure:
         )
     ]
     return plot_curves(panels, title=title or f"Tracking: {run.method}", size=(6.4, 2.2))
-
-
-@plot.register
-def plot_least_effort(least: LeastEffort, *, before: SliderDrive, title: str = "Motion of least effort") -> Figure:
-    """Position and force of least effort beside those of the motion before."""
-    x, old = np.degrees(least.crank_angle), np.degrees(before.crank_angle)
-    panels = [
-        Panel(
-            x_label="crank angle [deg]",
-            y_label=label,
-            curves=[Curve(x=old, y=first, label="before"), Curve(x=x, y=second, label="least effort")],
-        )
-        for label, first, second in (
-            ("slider position [mm]", 1e3 * before.states[:, 1], 1e3 * least.position),
-            ("control force [N]", before.force, least.force),
-        )
-    ]
-    return plot_curves(panels, title=title, size=(6.4, 2.6))

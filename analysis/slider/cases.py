@@ -9,8 +9,6 @@ from math import inf, isfinite, pi
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
-
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import (
@@ -55,9 +53,7 @@ from ..synthesis import (
     synthesize,
 )
 from ..units import with_unit
-from .collocation import Collocation, Effort, MotionLimits
 from .inverse import SliderDrive, best_spring, inverse_dynamics
-from .least_effort import LeastEffort, least_effort
 from .motion import motion_of_plant, slider_motion
 from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
 from .tracking import TrackingController, TrackingResult, track
@@ -157,17 +153,6 @@ class TrackingWanted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EffortWanted:
-    """Arguments of `least_effort`: bound in m or rad."""
-
-    bound: float = entry(as_it_is)
-    cost: Effort = entry(Choice(get_args(Effort)), "force")
-    force: float = entry(Quantity("N", above=0.0), inf)
-    speed: float = entry(Quantity("m/s", above=0.0), inf)
-    intervals: int = entry(Whole(4), 40)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
     """Load at P (N), along the ground link and to its left."""
 
@@ -187,7 +172,7 @@ class SliderCase:
         The one whose pivot is moved; None if it is to be found first.
     slider : SliderTable
         The motion that is sought.
-    strategy, drive, tracking, least_effort
+    strategy, drive, tracking
         What is asked for besides; None for what is not.
     load : Load, optional
     """
@@ -199,7 +184,6 @@ class SliderCase:
     drive: DriveWanted | None = entry(Table(DriveWanted), None)
     load: Load | None = entry(Table(Load), None)
     tracking: TrackingWanted | None = entry(Table(TrackingWanted), None)
-    least_effort: EffortWanted | None = entry(as_it_is, None)
 
     def __post_init__(self) -> None:
         if self.linkage is not None and not self.free and self.synthesis.bounds:
@@ -207,7 +191,7 @@ class SliderCase:
             raise ParameterError(
                 f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
             )
-        if self.drive is None and any((self.load, self.tracking, self.least_effort)):
+        if self.drive is None and any((self.load, self.tracking)):
             raise MissingParameterError("drive.speed")
 
     @property
@@ -311,33 +295,6 @@ class SliderCase:
             load=drive.load,
         )
 
-    def relaxed(self, drive: SliderDrive, linkage: Linkage) -> LeastEffort:
-        """The motion of least effort that stays within a bound of what the motion found does.
-
-        Of a rocker function the rocker's angle, else the coupler point.
-        """
-        wanted = self.least_effort
-        assert wanted is not None
-        if drive.crank_speed < 0.0:
-            raise InputError("least effort is for a crank that turns counter-clockwise; this task is done clockwise")
-        if isinstance(self.synthesis.task, RockerFunction):
-            target = np.unwrap(drive["rocker.angle"])
-        else:
-            target = np.column_stack([drive["coupler.point.x"], drive["coupler.point.y"]])
-        ground = linkage.ground_length
-        low, high = self.slider.position or (-ground, ground)
-        return least_effort(
-            drive.parameters,
-            drive.crank_speed,
-            target,
-            wanted.bound,
-            cost=wanted.cost,
-            limits=MotionLimits(stroke=(low, high), speed=wanted.speed, force=wanted.force),
-            load=drive.load,
-            collocation=Collocation(intervals=wanted.intervals),
-            guess=drive.slider,
-        )
-
 
 def _kept(linkage: Linkage) -> dict[str, tuple[float, float]]:
     """Bounds that fix the dimensions of a linkage."""
@@ -378,7 +335,6 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
 #: The tables of a case beside those of a synthesis, for `linkwork new`.
 TABLES: Mapping[str, type] = {
     "slider": SliderTable, "strategy": StrategyWanted, "drive": DriveWanted, "load": Load, "tracking": TrackingWanted,
-    "least_effort": EffortWanted,
 }  # fmt: skip
 
 
@@ -425,7 +381,6 @@ def slider_case_from(
         raise MissingParameterError("slider")
     synthesis = synthesis_case_from({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, RockerFunction)
-    bound = Quantity("rad" if angular else "m", above=0.0)
     return read(
         SliderCase,
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
@@ -433,7 +388,6 @@ def slider_case_from(
         readers={
             "linkage": partial(_linkage, folder=folder),
             "strategy": partial(_strategy, angular=angular),
-            "least_effort": lambda value, name: read(EffortWanted, value, name, readers={"bound": bound}),
         },
     )
 

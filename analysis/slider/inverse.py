@@ -24,10 +24,11 @@ from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
-from ..mechanisms import FIVE_BAR, output_units, require_no_contact_friction
+from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
 from ..run import at_its_speed, outputs_of, takes_published
 from ..units import Amount, in_si
+from ..youssef import require_no_contact_friction
 
 FloatArray = NDArray[np.float64]
 #: Force at P (N, N): constant, or a function of the crank angle (rad).
