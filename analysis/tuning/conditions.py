@@ -22,12 +22,12 @@ from ..periodic import (
     Crossing,
     Family,
     Gradient,
+    OrbitEquations,
     PeriodicOrbit,
     Turn,
     Variations,
     extremum_gradient,
     motion_gradient,
-    orbit_equations,
     scale_of,
 )
 from .wishes import AMPLITUDE, Limit, Wish
@@ -101,7 +101,7 @@ def spot_of(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     """The motion that begins there, as far as it closes."""
-    orbit: PeriodicOrbit = orbit_equations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    orbit: PeriodicOrbit = OrbitEquations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
@@ -293,7 +293,7 @@ class Place:
         z = np.append(begin.y, begin.level)
         first = z = z if slope is None else z + ahead * slope
         n = len(begin.y)
-        evaluate = orbit_equations(family_at(self.wish, x), begin.turns, *self.wish.span)
+        evaluate = OrbitEquations(family_at(self.wish, x), begin.turns, *self.wish.span)
         size = np.inf
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
