@@ -1,4 +1,4 @@
-"""Operating points at rest: equilibria of a mechanism, free or with some of its freedoms held.
+"""Equilibria of a mechanism, free or with some of its freedoms held.
 
 They are found by Newton's method on the generalised forces at rest, M a, with exact derivatives by CasADi
 (`analysis.run.expressions`).
@@ -36,12 +36,12 @@ MOST_ITERATIONS = 60
 
 
 class EquilibriumError(LinkworkError):
-    """There is no equilibrium, or none was found from where the search began."""
+    """No equilibrium was found."""
 
 
 @cache
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
-    """Two functions of coordinates, channels and constants.
+    """Return two CasADi functions of coordinates, channels and constants: statics alone, and with derivatives.
 
     Of both the first result is the generalised forces at rest on the freedoms that are free; the others are the clearance,
     and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels. Nothing that a
@@ -112,19 +112,19 @@ class Equilibrium:
 
     @property
     def state(self) -> tuple[float, ...]:
-        """The state of the plant there."""
+        """State of the plant in this configuration."""
         return mechanism_of(self.parameters).state(self.initial)
 
     @property
     def initial(self) -> InitialState:
-        """The start of a run there."""
+        """Start of a run in this configuration."""
         mechanism = mechanism_of(self.parameters)
         names = [freedom.initial[0] for freedom in mechanism.freedoms]
         return mechanism.initial(**dict(zip(names, self.coordinates.tolist())))
 
     @property
     def stable(self) -> bool:
-        """Whether it is a minimum of the potential energy of springs, gravity and constant forces in the free freedoms."""
+        """Whether the potential energy of springs, gravity and constant forces has a minimum in the free freedoms."""
         balance = _Balance.of(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
@@ -145,7 +145,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
-    """The equations of rest: forces over the freedoms that are free, made comparable by the mechanism's own scales.
+    """Equations of rest: generalised forces on the free freedoms, scaled by the mechanism's own scales.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ class _Balance:
         return np.array([*self.parameters.constants(), 0.0])
 
     def imbalance(self, coordinates: FloatArray) -> FloatArray:
-        """Norms of the forces over the free freedoms at coordinates, shape (freedoms, n); infinite beyond the limit."""
+        """Return norms of the forces on the free freedoms at coordinates (freedoms, n), infinite beyond the limit."""
         n = coordinates.shape[1]
         columns = (np.tile(value[:, None], n) for value in (self.channels, self.constants))
         forces, clearance = map(np.asarray, _statics(self.mechanism, self.modes)[0].map(n)(coordinates, *columns))
@@ -206,7 +206,7 @@ class _Balance:
         return np.where(joined, norms, np.inf)
 
     def solve(self, guess: FloatArray) -> Equilibrium:
-        """Newton's method with halved steps where the imbalance would grow.
+        """Find an equilibrium by Newton's method, with halved steps where the imbalance would grow.
 
         Raises EquilibriumError if it does not converge.
         """
@@ -236,7 +236,7 @@ class _Balance:
         )
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
-        """Magnitude of the generalised forces that have to balance (N.m)."""
+        """Return the magnitude of the generalised forces that have to balance (N.m)."""
         # what comes round again has no displacement that a spring would feel
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
@@ -263,7 +263,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Points of a grid over all configurations where the imbalance is less than at their neighbours."""
+        """Return the points of a grid over all configurations with less imbalance than their neighbours."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)
@@ -286,7 +286,7 @@ class _Balance:
 def _held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
-    """The equations of rest, and coordinates that are zero but for those of freedoms that are held."""
+    """Return the equations of rest, and coordinates with the values of held freedoms and zero elsewhere."""
     mechanism = mechanism_of(parameters)
     inputs, _ = given(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
@@ -306,7 +306,7 @@ def _held(
 def find_equilibria(
     parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """All equilibria that a search from a grid over the configurations finds, the one of least potential energy first.
+    """Find equilibria from a grid over all configurations, sorted by potential energy.
 
     Parameters
     ----------
@@ -356,7 +356,7 @@ def find_equilibrium(
     held: Mapping[str, Amount] | None = None,
     guess: ArrayLike | None = None,
 ) -> Equilibrium:
-    """An equilibrium of a mechanism at rest: hanging freely, or with some of its freedoms held.
+    """Find an equilibrium of a mechanism, hanging freely or with some of its freedoms held.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Both force problems of the generalised slider-crank, over the turn: all joint forces and moments for a given motion.
+"""Both force problems of the generalised slider-crank: all joint forces and moments of a given motion over the turn.
 
 Crank and shift move as prescribed, so that the axial force on the crank is an unknown (Rahman prescribes it, erratum 7).
 Then either the slider's load L is given and the crank's torque T sought, or the torque is given and the force on the slider
@@ -66,7 +66,7 @@ TORQUE, SLIDER_FORCE = "torque", "slider force"
 
 
 class Solution(NamedTuple):
-    """What `solve` finds: `Position`, `Coefficients`, `Motion` and `Reactions` of the kind of numbers that it was given."""
+    """Result of `solve`: `Position`, `Coefficients`, `Motion` and `Reactions`, of the given kind of numbers."""
 
     position: Any
     coefficients: Any
@@ -185,12 +185,12 @@ class ForceTurn:
 
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
-        """Configurations between the first and the last angle at which the slider turns back, located to the last digit."""
+        """Dead centres of the slider between the first and the last angle, located to the last digit."""
         return self._course.dead_centres(*self._span)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
-        """Configurations between the first and the last angle at which the torque does not determine the slider's force.
+        """Configurations between the first and last angle at which the torque does not determine the slider force.
 
         The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
         """
@@ -198,7 +198,7 @@ class ForceTurn:
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
-        """Crank angles (rad) from the first to the last that was asked for at which a range of assembly ends.
+        """Crank angles (rad) between the first and last given one at which a range of assembly ends.
 
         There rod and guide are perpendicular, and velocity, acceleration and all forces grow without bound.
         """
@@ -207,7 +207,7 @@ class ForceTurn:
 
     @cached_property
     def breaks(self) -> tuple[int, ...]:
-        """Index of each angle between which and the next the mechanism cannot be assembled."""
+        """Indices of angles between which and the next one the mechanism cannot be assembled."""
         outside = np.sort(np.concatenate([self.unreachable, self.limits]))
         low, high = np.minimum(self.angle[:-1], self.angle[1:]), np.maximum(self.angle[:-1], self.angle[1:])
         between = np.searchsorted(outside, high) - np.searchsorted(outside, low, side="right")
@@ -215,7 +215,7 @@ class ForceTurn:
 
     @property
     def without_lever(self) -> bool:
-        """Whether the slider's force is sought and has no lever on the crank at any angle."""
+        """Whether the slider force is unknown and has no lever on the crank at any angle."""
         return bool(np.ma.getmaskarray(self.slider_force).all()) and not self.singularities
 
     @property
@@ -227,7 +227,7 @@ class ForceTurn:
 
     @cached_property
     def masked(self) -> tuple[str, ...]:
-        """What is masked and why, in sentences, one for each run of angles."""
+        """Sentences about masked values and the reasons, one for each run of angles."""
         sentences = [NO_LEVER] if self.without_lever else []
         dead = np.ma.getmaskarray(self.slider_force) & (not sentences)
         for flags, what, why in (
@@ -243,7 +243,7 @@ class ForceTurn:
         return tuple(sentences)
 
     def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
-        """Which angles (n,) are further than ``degrees`` from where forces grow without bound.
+        """Return which angles (n,) are further than ``degrees`` from poles of the forces.
 
         That is at the limits of assembly and, where the slider's force is sought, at ``singularities``; without ``poles``
         the limits alone. What is beyond the first and the last angle counts.
@@ -259,7 +259,7 @@ class ForceTurn:
         return np.asarray((distances > away).all(axis=1))
 
     def vector(self, name: str, frame: int = 1) -> MaskedArray:
-        """Components of a force or moment, masked where it is not determined.
+        """Return the components of a force or moment, masked where it is undetermined.
 
         Parameters
         ----------
@@ -299,7 +299,7 @@ class ForceTurn:
         return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
-        """Everything by name with unit, as for a file; NaN where a value is masked; the last two columns say why.
+        """Return all values by name with unit, as for a file: NaN for masked values, the last two columns say why.
 
         Parameters
         ----------
@@ -356,7 +356,7 @@ def force_turn(
     torque: ArrayLike | Amount = None,
     partial: bool = False,
 ) -> ForceTurn:
-    """Forces and moments in all joints over the turn, for a prescribed motion of crank and shift.
+    """Compute forces and moments in all joints over the turn for a prescribed motion of crank and shift.
 
     Parameters
     ----------
@@ -451,7 +451,7 @@ def force_turn(
 
 
 def _crank_angles(angles: ArrayLike | None) -> FloatArray:
-    """Crank angles (n,) as they are asked for, by default over a turn."""
+    """Return the given crank angles (n,), or those of a turn by default."""
     if angles is None:
         return np.linspace(0.0, tau, SAMPLES)
     message = "the angles must be a list of finite numbers (rad), at least one"
@@ -462,7 +462,7 @@ def _crank_angles(angles: ArrayLike | None) -> FloatArray:
 
 
 def _joined(vector: Vector, n: int) -> FloatArray:
-    """Components as an array (n, 3)."""
+    """Return the components as an array (n, 3)."""
     return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
 
 
@@ -473,7 +473,7 @@ def _deg(angle: float) -> str:
 def _not_assembled(
     parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, s1: FloatArray, reached: NDArray[np.bool_]
 ) -> AssemblyError:
-    """What to raise where the rod does not reach the guide at all angles."""
+    """Return the error for angles at which the rod does not reach the guide."""
     p = parameters.constants()
     square = on_arrays().assembly_square(th, s1, p)
     worst = int(np.argmin(square))
@@ -495,6 +495,6 @@ def _not_assembled(
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each run of true values."""
+    """Return first and last index of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]

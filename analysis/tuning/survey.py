@@ -1,4 +1,4 @@
-"""What lies in a range of speeds: the response followed anew, and on it resonances, lost stability and greatest outputs."""
+"""Survey of a range of speeds: resonances, lost stability and greatest outputs on the response followed over it."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Region:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Least:
-    """Where a test function is least along a branch inside the range, at a fixed level; see `places.margin_of`."""
+    """Minimum of a test function along a branch inside the range, at a fixed level; see `conditions.margin_of`."""
 
     kind: Crossing
     spot: Spot
@@ -91,7 +91,7 @@ class Least:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Greatest:
-    """The greatest value of an output in the range, at a level and crank angles."""
+    """Maximum of an output in the range, at a level and crank angles."""
 
     limit: Limit
     value: float
@@ -101,7 +101,7 @@ class Greatest:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Survey:
-    """What lies in the range of a wish with some changes.
+    """Survey of the range of a wish with some changes.
 
     Attributes
     ----------
@@ -135,12 +135,12 @@ class Survey:
 
     @property
     def folds(self) -> tuple[Region, ...]:
-        """Where the response jumps."""
+        """Regions between folds, where the response jumps."""
         return tuple(region for region in self.regions if region.kind is Crossing.FOLD)
 
 
 def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Survey:
-    """Follow the response with some changes and look at what lies in the range.
+    """Follow the response with some changes and survey the range.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def _in(wish: Wish, level: Any) -> Any:
 
 
 def _ends(wish: Wish, beside: float) -> tuple[float, float]:
-    """The range with so much beside it, relative to its width, on the same side of zero."""
+    """Return the range widened by a share of its width, on the same side of zero."""
     low, high = wish.span
     wide = beside * (high - low)
     return max(low - wide, 0.5 * low) if low > 0.0 else low - wide, min(
@@ -237,7 +237,7 @@ def _ends(wish: Wish, beside: float) -> tuple[float, float]:
 
 
 def reaches(wish: Wish, low: float, high: float) -> bool:
-    """Whether an interval of levels has more than a point in common with the inside of the range."""
+    """Return whether an interval of levels overlaps the inside of the range."""
     return _overlap(wish, low, high, wish.span)
 
 
@@ -247,7 +247,7 @@ def _overlap(wish: Wish, low: float, high: float, span: tuple[float, float]) -> 
 
 
 def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
-    """The response with the branch of a motion that it does not meet, followed both ways."""
+    """Return the response with the branch of a motion on no other branch, followed both ways."""
     if _meets(wish, response, orbit):
         return response
     level, (low, high) = wish.level_of(orbit), _ends(wish, FAR)
@@ -260,7 +260,7 @@ def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
 
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
-    """Whether a motion is on one of the branches; one of several turns may have begun at any of them."""
+    """Return whether a motion is on one of the branches; one of several turns may begin at any of them."""
     level, width = wish.level_of(orbit), response.high - response.low
     starts = [orbit.start]
     for _ in range(orbit.turns - 1):
@@ -277,7 +277,7 @@ def _tests(branch: Branch, kind: Crossing, radius: float = 1.0) -> FloatArray:
 
 
 def _kinds(branch: Branch) -> Iterator[Crossing]:
-    """The ways in which multipliers can cross: with one multiplier there is no pair."""
+    """Yield the ways in which multipliers can cross: a pair needs two multipliers."""
     for kind in Crossing:
         if kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1:
             yield kind
@@ -286,7 +286,7 @@ def _kinds(branch: Branch) -> Iterator[Crossing]:
 def _parts(
     wish: Wish, branch: Branch, kind: Crossing, response: Response
 ) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
-    """The parts of a branch without a point where a test function changes its sign, each with the points at its ends."""
+    """Yield the parts of a branch between sign changes of a test function, with the points at their ends."""
     special = [s for s in branch.special if s.kind is kind]
     ends = [-1, *(s.after for s in special), len(branch) - 1]
     points: list[SpecialPoint | None] = [None, *special, None]
@@ -303,7 +303,7 @@ def _parts(
 
 
 def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
-    """The period doubling next to a motion at which its branch begins; None where it is none."""
+    """Return the period doubling near a motion, from which its branch begins; None if there is none."""
     for branch in response.branches:
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
             there = point.orbit
@@ -315,7 +315,7 @@ def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPo
 
 
 def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> Iterator[Region]:
-    """Where the test functions are negative along a branch."""
+    """Yield the regions of negative test functions along a branch."""
     for kind in _kinds(branch):
         tests = _tests(branch, kind)
         for first, part, last in _parts(wish, branch, kind, response):
@@ -339,7 +339,7 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
 def _lowest(
     wish: Wish, x: FloatArray, branch: Branch, kind: Crossing, i: int, radius: float, *, at_level: bool
 ) -> tuple[Spot, Across, float]:
-    """The least value of a test function about a point of a branch: at fixed levels of the range, or across it."""
+    """Find the minimum of a test function near a point of a branch: at fixed levels of the range, or across it."""
     orbit, before, after = branch.orbits[i], max(i - 1, 0), min(i + 1, len(branch) - 1)
     spot = spot_of(wish, x, orbit)
     scale = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), wish.size)
@@ -373,7 +373,7 @@ def _lowest(
 
 
 def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
-    """The least values of the test functions along a branch in the range, at fixed levels."""
+    """Yield the minima of the test functions along a branch in the range, at fixed levels."""
     inside = np.flatnonzero(_in(wish, branch.parameter))
     if not len(inside):
         return
@@ -408,7 +408,7 @@ def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
 def _greatest(
     wish: Wish, x: FloatArray, limit: Limit, motions: Sequence[Sequence[tuple[float, PeriodicOrbit]]]
 ) -> Iterator[Greatest]:
-    """The greatest values of an output in the range: of each branch those that are greatest about them, brought to rest."""
+    """Yield the local maxima of an output in the range, refined over the level."""
     found = []
     for branch in motions:
         values = [greatest(sampled(orbit), limit)[0] for _, orbit in branch]
@@ -421,7 +421,7 @@ def _greatest(
 
 
 def _at_rest(wish: Wish, limit: Limit, near: Spot) -> Greatest:
-    """The greatest value of an output next to a motion, over the level."""
+    """Find the maximum of an output over the level near a motion."""
     step = 2.0 * STEP * (wish.span[1] - wish.span[0])
     low, high = max(wish.span[0], near.level - step), min(wish.span[1], near.level + step)
     found: list[Greatest] = []
@@ -445,7 +445,7 @@ def _at_rest(wish: Wish, limit: Limit, near: Spot) -> Greatest:
 
 
 def others(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]:
-    """Of all motions at `SOUGHT` levels of the range those on no branch, and the levels with two stable ones."""
+    """Search all motions at `SOUGHT` levels: return those on no branch, and the levels with two stable ones."""
     wish = found.wish
     new: list[PeriodicOrbit] = []
     several: list[float] = []
@@ -462,7 +462,7 @@ def others(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]
 
 
 def _start_near(wish: Wish, response: Response, level: float) -> FloatArray | None:
-    """The start of the motion of one turn next to a level: under a torque the crank speed has to be guessed."""
+    """Return the start of the one-turn motion nearest to a level; None at a prescribed speed, which needs no guess."""
     if wish.over == speed_name(wish.mechanism):
         return None
     known = [orbit for branch in response.branches if branch.turns == 1 for orbit in branch.orbits]
@@ -470,7 +470,7 @@ def _start_near(wish: Wish, response: Response, level: float) -> FloatArray | No
 
 
 def charted(found: Survey) -> tuple[float, float, int]:
-    """The largest multiplier in a row of a chart over the range, infinite where no motion is found, its level, and how many."""
+    """Compute a row of a chart over the range: largest multiplier (infinite without a motion), its level, point count."""
     wish = found.wish
     levels = np.linspace(*wish.span, _CHARTED)
     rows: list[Any] = []
