@@ -23,7 +23,7 @@ from linkwork.errors import InputError, LinkworkError
 from ..files import unknown_name
 from ..run import Function
 from ..units import Amount, in_si
-from .model import FloatArray, LinearModel, LinearModelError, by_magnitude, signal_name
+from .model import FloatArray, LinearModel, LinearModelError, signal_name, sorted_by_magnitude
 
 
 class DesignError(LinkworkError):
@@ -98,7 +98,7 @@ class Design:
     def closed(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
         """Return the closed loop, from a disturbing force to outputs by FMI name, by default the controlled coordinate."""
         chosen = (self.coordinate,) if outputs is None else outputs
-        a, b, row = self.plant.fed_back(self.gains, self.integral_gain)
+        a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
         whole = self.model.to_state_space(chosen, (self.channel,))
         c = np.hstack([whole.C, np.zeros((len(chosen), a.shape[0] - whole.nstates))]) - whole.D @ row
         names = {"inputs": [signal_name(self.channel)], "outputs": [signal_name(name) for name in chosen]}
@@ -117,7 +117,7 @@ class Design:
         closed[n, n] = 1.0
         # without integral action nothing depends on the integral
         kept = closed if self.integral_gain else closed[:n, :n]
-        return by_magnitude(np.linalg.eigvals(kept))
+        return sorted_by_magnitude(np.linalg.eigvals(kept))
 
     def continuous(self, reference: float) -> Function:
         """Return the law without sampling, as the force among `analysis.run.Inputs`.
@@ -129,7 +129,7 @@ class Design:
         """
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
-        gains = tuple(self.on_plant(self.gains).tolist())
+        gains = tuple(self.plant_values(self.gains).tolist())
         step = reference - float(self.target[self.plant.place])
         bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
 
@@ -141,7 +141,7 @@ class Design:
 
         return Function(force)
 
-    def on_plant(self, values: FloatArray) -> FloatArray:
+    def plant_values(self, values: FloatArray) -> FloatArray:
         """Return values by the model's state as values by all coordinates and rates, zero for states it lacks."""
         whole = np.zeros(2 * len(self.model.mechanism.freedoms))
         whole[self.model.places] = values
@@ -168,14 +168,14 @@ class _Plant:
         whole[n, self.place] = 1.0
         return whole, np.vstack([self.b, [[0.0]]])
 
-    def fed_back(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return A, B and the row of the gains, with the integral as the last state if it has a gain."""
         if integral_gain:
             return *self.integrating(), np.append(gains, integral_gain)[None, :]
         return self.a, self.b, gains[None, :]
 
     def loop(self, gains: FloatArray, integral_gain: float) -> control.StateSpace:
-        a, b, row = self.fed_back(gains, integral_gain)
+        a, b, row = self.feedback_matrices(gains, integral_gain)
         return control.ss(a, b, row, 0.0, inputs=[signal_name(self.channel)], outputs=["feedback"])
 
 
@@ -191,7 +191,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
     if not (np.all(np.isfinite(gains)) and isfinite(integral_gain)):
         raise DesignError(f"{method}: the gains {gains} and {integral_gain} are not finite")
     loop = plant.loop(gains, integral_gain)
-    poles = by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
+    poles = sorted_by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
     if poles.real.max() >= -1e-9 * np.abs(poles).max():
         raise DesignError(
             f"{method}: the closed loop is not stable, its poles are {np.array2string(poles, precision=4)} 1/s"
@@ -292,7 +292,7 @@ def design_lqr(
     plant = _Plant(model, channel)
     if integral:
         weights = np.block([[weights, np.zeros((n, 1))], [np.zeros((1, n)), np.array([[integral]])]])
-    a, b, _ = plant.fed_back(np.zeros(n), integral)
+    a, b, _ = plant.feedback_matrices(np.zeros(n), integral)
     try:
         gains = np.asarray(control.lqr(a, b, weights, [[r]])[0])[0]
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:

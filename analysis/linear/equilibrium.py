@@ -26,7 +26,7 @@ from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
 from ..run import Inputs, expressions, given, takes_published
 from ..units import Amount, in_si
-from .model import FloatArray, Layout, Modes, channels_along, layout
+from .model import FloatArray, Layout, Modes, layout, sampled_channels
 
 #: Points of the search for equilibria along a freedom that comes round again, over a turn, and along another, over its reach.
 GRID = (48, 81)
@@ -105,7 +105,7 @@ class Equilibrium:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
             raise unknown_name(name, mechanism.output_names, f"output {name!r}")
-        modes, channels = channels_along(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
+        modes, channels = sampled_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
         applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
         outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)
         return float(outputs[mechanism.output_names.index(name)])
@@ -175,7 +175,7 @@ class _Balance:
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
         still = np.zeros((1, mechanism.size))
-        modes, channels = channels_along(mechanism, inputs, np.zeros(1), still)
+        modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), still)
         forces = {channel.argument for channel in mechanism.channels if channel.kind == "force"}
         held = layout(mechanism, modes).commanded
         loose = list(modes)
@@ -283,7 +283,7 @@ class _Balance:
         return list(columns[:, (np.isfinite(values) & (values <= least)).ravel()].T)
 
 
-def _held(
+def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
     """Return the equations of rest, and coordinates with the values of held freedoms and zero elsewhere."""
@@ -328,7 +328,7 @@ def find_equilibria(
     InputError
         If a force is not constant, a freedom that is held moves or is driven by a force, or nothing is free.
     """
-    balance, coordinates = _held(parameters, inputs, held)
+    balance, coordinates = _balance_with_held(parameters, inputs, held)
     found: list[Equilibrium] = []
     for start in balance.starts(coordinates):
         try:
@@ -383,7 +383,7 @@ def find_equilibrium(
     '5.557 mm'
     """
     if guess is not None:
-        balance, coordinates = _held(parameters, inputs, held)
+        balance, coordinates = _balance_with_held(parameters, inputs, held)
         start = np.array(guess, dtype=float)
         if start.shape != coordinates.shape or not np.all(np.isfinite(start)):
             raise InputError(f"a guess {guess}: it must be {len(coordinates)} finite numbers")

@@ -46,7 +46,7 @@ FINE_STEP = 0.03
 AT_REST = 1e-6
 
 
-def limited(force: float, limit: float) -> float:
+def saturate(force: float, limit: float) -> float:
     """Return a force clipped to a limit either way."""
     return min(max(force, -limit), limit)
 
@@ -94,9 +94,9 @@ class SampledController:
         self.integral = 0.0
         self.channel = design.channel
         self._place = design.freedom
-        self._gains: list[float] = design.on_plant(design.gains).tolist()
-        self._target: list[float] = design.on_plant(design.target).tolist()
-        self._slope: list[float] = design.on_plant(design.target_slope).tolist()
+        self._gains: list[float] = design.plant_values(design.gains).tolist()
+        self._target: list[float] = design.plant_values(design.target).tolist()
+        self._slope: list[float] = design.plant_values(design.target_slope).tolist()
 
     def reset(self) -> None:
         """Set the integral to zero."""
@@ -134,7 +134,7 @@ class SampledController:
         # a force beyond the limit is not asked for still louder
         if abs(wanted) <= self.limit or wanted * d.integral_gain * error > 0.0:
             self.integral += self.period * error
-        return limited(wanted, self.limit)
+        return saturate(wanted, self.limit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

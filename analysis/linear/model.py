@@ -275,7 +275,7 @@ class LinearModel(Matrices):
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of A (1/s), by magnitude."""
-        return by_magnitude(np.linalg.eigvals(self.A))
+        return sorted_by_magnitude(np.linalg.eigvals(self.A))
 
     @property
     def natural_frequencies(self) -> FloatArray:
@@ -344,7 +344,7 @@ class LinearModel(Matrices):
         )
 
 
-def by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
+def sorted_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
     """Return complex numbers sorted by magnitude, conjugate pairs by their imaginary parts."""
     whole = np.asarray(values, dtype=complex)
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
@@ -403,7 +403,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
     }
 
 
-def whole_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
+def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
     """Return states (n, 2 f) or (n, 2 f + 2) as full states, with zero work if they have none."""
     array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
@@ -414,7 +414,7 @@ def whole_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
     return np.hstack([array, np.zeros((len(array), mechanism.size - array.shape[1]))])
 
 
-def channels_along(
+def sampled_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
     """Return modes and channels (s, channels) for inputs at times and states.
@@ -468,10 +468,10 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     (1, 1)
     """
     mechanism = mechanism_of(parameters)
-    states = whole_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
+    states = full_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
         raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_along")
-    modes, channels = channels_along(mechanism, inputs, np.zeros(1), states)
+    modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), states)
     arrays = evaluate(parameters, modes, states, channels)
     return LinearModel(
         parameters=parameters,

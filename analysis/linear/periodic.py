@@ -24,10 +24,10 @@ from .model import (
     LinearModelError,
     Matrices,
     Modes,
-    channels_along,
     evaluate,
+    full_states,
     layout,
-    whole_states,
+    sampled_channels,
 )
 
 #: Least samples of a period that carry its harmonics.
@@ -229,26 +229,26 @@ def linearise_along(
         if inputs is not None or period is not None:
             raise InputError("inputs and period are those of the orbit: they cannot be given besides")
         turn = motion.turn(samples)
-        states, channels = _in_time(mechanism, turn)
+        states, channels = _resample(mechanism, turn)
         modes, period = turn.modes, turn.period
     else:
-        states = whole_states(mechanism, motion)
+        states = full_states(mechanism, motion)
         inputs, _ = given(mechanism, inputs, None)
         if period is None:
-            period = _one_turn(mechanism, tuple(inputs.modes(mechanism).values()), states)
+            period = _turn_time(mechanism, tuple(inputs.modes(mechanism).values()), states)
     if len(states) < LEAST_SAMPLES:
         raise InputError(f"{len(states)} samples of a period: at least {LEAST_SAMPLES} are needed")
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"period is {period} s: it must be a finite number greater than zero")
     if not isinstance(motion, Orbit):
-        modes, channels = channels_along(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
+        modes, channels = sampled_channels(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
     arrays = evaluate(parameters, modes, states, channels)
     model = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
     model.check()
     return model
 
 
-def _one_turn(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
+def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
     """Return the time of a turn of the freedom with a constant commanded speed."""
     for n in layout(mechanism, modes).commanded:
         rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
@@ -257,7 +257,7 @@ def _one_turn(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
     raise InputError("the period must be given: it follows from the states at a constant prescribed speed alone")
 
 
-def _in_time(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
+def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
     """Resample a turn from equal steps of the crank angle to equal steps of time: states and channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     crank = next(k for k, freedom in enumerate(mechanism.freedoms) if freedom.period)
@@ -279,7 +279,7 @@ def _in_time(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
                 break
         found[k] = values(x)
         found[k, crank] = turn.states[0, crank] + x
-    return whole_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
+    return full_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
 @takes_published(inputs=driven, initial=started)
@@ -343,7 +343,7 @@ def settled_motion(
     if run.status:
         raise LinearModelError(f"there is no steady motion at {speed:g} {channel.name}: {run.message}")
     names = [f.coordinate for f in mechanism.freedoms] + [f.rate for f in mechanism.freedoms]
-    before, after = np.split(whole_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
+    before, after = np.split(full_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
     scale = np.array(mechanism.error_scale(parameters, tuple(after[0].tolist())))[:n]
     gap = np.abs(after[:, :n] - before[:, :n]).max(axis=0) / scale
     worst = max(its.free, key=lambda k: gap[k])

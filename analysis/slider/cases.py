@@ -210,7 +210,7 @@ class SliderCase:
         """Return bounds of the links; a given linkage that is kept fixes all of them."""
         if self.linkage is None or self.free:
             return self.synthesis.bounds
-        return _kept(self.linkage)
+        return _fixed_bounds(self.linkage)
 
     def four_bar(self, *, progress: bool = False) -> Solution:
         """Return the given linkage with its pivot fixed, evaluated, or the best linkage of a search."""
@@ -222,13 +222,15 @@ class SliderCase:
         # where it is on the way of the task is not given: found with every dimension fixed
         only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
         return synthesize(
-            task, _kept(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
+            task, _fixed_bounds(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
         ).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
         """Find the best motion with a number of harmonics; see `slider_motion`."""
         search = self.synthesis.search
-        bounds = _around(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
+        bounds = (
+            _free_bounds(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
+        )
         return slider_motion(
             self.synthesis.task,
             four_bar,
@@ -296,12 +298,12 @@ class SliderCase:
         )
 
 
-def _kept(linkage: Linkage) -> dict[str, tuple[float, float]]:
+def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:
     """Return bounds that fix the dimensions of a linkage."""
     return {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
 
 
-def _around(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
+def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
     """Return bounds of free links: lengths from a quarter to four times; dimensions without effect on a rocker stay fixed."""
     near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in LINKS}
     near["crank_phase"] = (linkage.crank_phase - pi, linkage.crank_phase + pi)
@@ -341,13 +343,13 @@ TABLES: Mapping[str, type] = {
 # Reading
 
 
-def _strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
+def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
     """Read the table ``[strategy]``; its tolerance has the unit of the criterion, the quality function is squared."""
     unit = ("rad" if angular else "m") + "**2" * (table_of(value, name).get("criterion") == "error")
     return read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
 
-def _linkage(value: Any, name: str, *, folder: Path) -> Linkage:
+def _read_linkage(value: Any, name: str, *, folder: Path) -> Linkage:
     """Read a linkage from its dimensions or from a file of `linkwork synthesize`."""
     if "file" not in table_of(value, name):
         dimensions = {d: Quantity("rad" if d in ANGLES else "m") for d in DIMENSIONS}
@@ -386,8 +388,8 @@ def slider_case_from(
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
         "",
         readers={
-            "linkage": partial(_linkage, folder=folder),
-            "strategy": partial(_strategy, angular=angular),
+            "linkage": partial(_read_linkage, folder=folder),
+            "strategy": partial(_read_strategy, angular=angular),
         },
     )
 

@@ -248,7 +248,7 @@ def inverse_dynamics(
         If the links cannot be joined somewhere on the turn, with where.
     """
     check_speed(crank_speed)
-    samples = whole(samples, "samples of a turn")
+    samples = whole_number(samples, "samples of a turn")
     least = max(LEAST_SAMPLES, 2 * slider.order + 1)
     if samples < least:
         raise InputError(f"{samples} samples of a turn: a motion of order {slider.order} needs at least {least}")
@@ -263,7 +263,7 @@ def inverse_dynamics(
     inputs[:, 1] = crank_speed
     for x, i, a in zip(states.tolist(), inputs, acceleration.tolist()):
         _check_joined(parameters, x[0], x[1])
-        at_p = load_at(load, x[0])
+        at_p = load_at_angle(load, x[0])
         i[3], i[4], i[5] = slider_force(x[0], x[1], x[2], x[3], a, at_p, p), *at_p
     values = outputs_of(FIVE_BAR, np.array([1.0]), np.array([*p, 0.0]), states, inputs)
     return SliderDrive(
@@ -285,14 +285,14 @@ def check_speed(crank_speed: float) -> None:
         raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
 
 
-def whole(value: float, what: str) -> int:
+def whole_number(value: float, what: str) -> int:
     """Return a whole number as an int; raises InputError with the name of the quantity if it is not whole."""
     if not float(value).is_integer():
         raise InputError(f"{value} {what}: it must be a whole number")
     return int(value)
 
 
-def load_at(load: Load, crank_angle: float) -> tuple[float, float]:
+def load_at_angle(load: Load, crank_angle: float) -> tuple[float, float]:
     """Return the load at P (N, N) at a crank angle (rad); raises InputError if it is not two finite numbers."""
     given = load(crank_angle) if callable(load) else load
     try:

@@ -138,7 +138,8 @@ class SmoothnessCurve:
     @property
     def attained(self) -> np.ma.MaskedArray:
         """Greatest ``|d2u/dphi2|`` of each motion (m/rad2)."""
-        return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
+        values = [np.nan if s is None else greatest_derivative(s.linkage, 2) for s in self.solutions]
+        return np.ma.masked_invalid(np.array(values))
 
 
 class SmoothnessInterrupted(Interrupted):
@@ -149,7 +150,7 @@ class SmoothnessInterrupted(Interrupted):
         super().__init__(f"stopped after {done} of {problems} problems of the smoothness curve")
 
 
-def greatest(linkage: Linkage, order: int) -> float:
+def greatest_derivative(linkage: Linkage, order: int) -> float:
     """Return the greatest magnitude over a turn of the slider's position (order 0) or of a derivative by the rotation."""
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0
@@ -244,7 +245,7 @@ def smoothness_curve(
 
 def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:
     """Return the linkage with the slider's harmonics scaled down to a bound of the second derivative."""
-    most = greatest(linkage, 2)
+    most = greatest_derivative(linkage, 2)
     if not isinstance(linkage.pivot, SliderMotion) or most <= acceleration:
         return linkage
     series = linkage.pivot.series

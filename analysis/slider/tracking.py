@@ -31,13 +31,13 @@ from ..linear import (
     check_limit,
     check_period,
     control_loop,
-    limited,
     peak,
     rms,
+    saturate,
 )
 from ..numerics.fourier import FourierSeries
 from ..run import Function, Inputs
-from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at, slider_force
+from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at_angle, slider_force
 
 
 class TrackingController:
@@ -113,12 +113,12 @@ class TrackingController:
             assert self.feedback is not None
             forward = self.feedback.holding_force(reference)
         if self.feedback is None:
-            return limited(forward, self.limit)
+            return saturate(forward, self.limit)
         return self.feedback.follow(forward, u - reference, v - w2 * float(self._slope(th2)))
 
     def _forward(self, th2: float, w2: float) -> float:
         u, v, a = float(self.slider(th2)), w2 * float(self._slope(th2)), w2 * w2 * float(self._curvature(th2))
-        return slider_force(th2, u, w2, v, a, load_at(self.load, th2), self._p)
+        return slider_force(th2, u, w2, v, a, load_at_angle(self.load, th2), self._p)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -258,7 +258,7 @@ def track(
         return start.crank_angle + crank_speed * t
 
     def load_part(part: int) -> Function:
-        return Function(lambda t, *state: load_at(load, angle(t + 0.5 * controller.period))[part])
+        return Function(lambda t, *state: load_at_angle(load, angle(t + 0.5 * controller.period))[part])
 
     loop = control_loop(
         plant or parameters,

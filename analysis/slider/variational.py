@@ -334,7 +334,7 @@ def variational_motion(
     chosen_from = minima.valid if continuous else error == error.min(axis=0)
     bridged = _bridged(problem, phi, goal, minima, chosen_from)
     travel = minima.u / (linkage.coupler_length + linkage.rocker_length)
-    choice = _path(w * minima.error**2, travel, chosen_from, bridged, closed)
+    choice = _choose_minima(w * minima.error**2, travel, chosen_from, bridged, closed)
     at = (choice, np.arange(n))
     kinds, branches = problem.labels
     steps = np.arange(n if closed else n - 1)
@@ -432,7 +432,7 @@ def _bridged(
     return bridged
 
 
-def _path(
+def _choose_minima(
     squares: FloatArray, travel: FloatArray, chosen_from: NDArray[np.bool_], bridged: NDArray[np.bool_], closed: bool
 ) -> NDArray[np.int64]:
     """Choose the row of each column by dynamic programming: fewest jumps, then least sum of squares, then least travel."""

@@ -199,7 +199,7 @@ def close(
         If the iteration ends in an open loop or in the other assembly.
     """
     p = parameters
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     lacking, length = shortage(p, th, s1), scale(p, s1)
     worst = int(np.argmax(lacking))
     if lacking[worst] > TOLERANCE * length:
@@ -244,7 +244,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
     InputError, AssemblyError, ClosureError
         As `close`; a step that would change the assembly is a ClosureError.
     """
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     points: list[Closure] = []
     for angle, position in zip(th, s1):
         points.append(close(parameters, angle, position, points[-1] if points else None))
@@ -263,7 +263,7 @@ def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     return 2.0 * np.arcsin(np.minimum(chord, 1.0)), np.linalg.norm(origin(product), axis=-1)
 
 
-def points_of(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
+def broadcast_points(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
     """Return crank angles and shifts broadcast to one shape (n,)."""
     try:
         th, s1 = np.broadcast_arrays(np.asarray(crank_angle, dtype=float), np.asarray(shift, dtype=float))
@@ -445,7 +445,7 @@ def settle(
     InputError, AssemblyError, ClosureError
         As `closure.close`, by which the truth is found.
     """
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     truth = close(parameters, th, s1)
     q = planar(parameters, th) if start is None else np.array(start, dtype=float)
     steps = np.zeros(th.size, dtype=int)

@@ -27,8 +27,8 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from ..numerics.dual import Dual, about_i, apply, cross, join, stack
 from .closure import Closure, close, scale
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
-from .quantities import DEAD_CENTRE, JOINTS, FloatArray, check_joint, each
-from .shifts import in_the_shaft, on_arrays
+from .quantities import DEAD_CENTRE, JOINTS, FloatArray, check_joint, per_angle
+from .shifts import has_shaft_groove, plant_functions
 
 #: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
 LIMIT_COSINE = 1e-9
@@ -157,8 +157,8 @@ def rates(
         At the limit of assembly, where the rod is perpendicular to the guide.
     """
     n = closure.crank_angle.size
-    w, v = each("speed", speed, n), each("shift_velocity", shift_velocity, n)
-    e, a = each("acceleration", acceleration, n), each("shift_acceleration", shift_acceleration, n)
+    w, v = per_angle("speed", speed, n), per_angle("shift_velocity", shift_velocity, n)
+    e, a = per_angle("acceleration", acceleration, n), per_angle("shift_acceleration", shift_acceleration, n)
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
     cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
@@ -287,7 +287,7 @@ def joint_loads(
     # the rod's moment about its line is the equation that is met by itself
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = each("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    known = per_angle("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
     free = np.delete(np.arange(18), given)
     unknown = np.linalg.solve(
         matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
@@ -448,7 +448,7 @@ def compare(turn: ForceTurn) -> Comparison:
         it is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
-    if sought and in_the_shaft(turn.law):
+    if sought and has_shaft_groove(turn.law):
         raise InputError(
             "the dual-number method seeks the slider's force of a shift that is driven apart from the crank: give the load, "
             "or a groove that is not in the shaft"
@@ -466,7 +466,7 @@ def compare(turn: ForceTurn) -> Comparison:
     }
     motion = rates(closure, **moving)
     # what the dual vectors call the slider's force is all along the guide, spring, damper and friction included
-    pushed = on_arrays().slider_resistance(
+    pushed = plant_functions().slider_resistance(
         closure.slider_position, motion.slider_velocity, 0.0, turn.parameters.constants()
     )
     if sought:

@@ -42,12 +42,12 @@ from .quantities import (
     FloatArray,
     MaskedArray,
     check_joint,
-    each,
+    float_array,
     masked_array,
-    numbers,
+    per_angle,
     unit_table,
 )
-from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, in_the_shaft, on_arrays, with_groove
+from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
 #: Angles over the turn by default: every degree, both ends.
 SAMPLES = 361
@@ -106,7 +106,7 @@ def solve(
     Solution
         ``ratio`` is minus the derivative of the torque by the load (m): kth, or with a groove in the shaft dS4/dtheta1.
     """
-    f = on_arrays()
+    f = plant_functions()
     q = f.position(angle, shift.shift, p)
     k = f.coefficients(q, p)
     x = (angle, shift.shift, speed, shift.velocity, 0.0, 0.0)
@@ -194,7 +194,7 @@ class ForceTurn:
 
         The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
         """
-        return self.dead_centres if in_the_shaft(self.law) else self._course.singularities(*self._span)
+        return self.dead_centres if has_shaft_groove(self.law) else self._course.singularities(*self._span)
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
@@ -222,7 +222,7 @@ class ForceTurn:
     def _parallel(self) -> NDArray[np.bool_]:
         """Where the rod is parallel to the crank axis."""
         p = self.parameters.constants()
-        r = on_arrays().rod(self._position, p)
+        r = plant_functions().rod(self._position, p)
         return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
 
     @cached_property
@@ -253,7 +253,7 @@ class ForceTurn:
         reach = low - away, high + away
         places = list(self._course.limits(*reach))
         if poles and self.sought == SLIDER_FORCE:
-            find = self._course.dead_centres if in_the_shaft(self.law) else self._course.singularities
+            find = self._course.dead_centres if has_shaft_groove(self.law) else self._course.singularities
             places += [c.crank_angle for c in find(*reach)]
         distances = np.abs(self.angle[:, None] - np.array(places)[None, :])
         return np.asarray((distances > away).all(axis=1))
@@ -285,7 +285,7 @@ class ForceTurn:
         ground = self._joints[name]
         if frame == 1:
             return ground.copy()
-        f, p, q = on_arrays(), self.parameters.constants(), self._position
+        f, p, q = plant_functions(), self.parameters.constants(), self._position
         components = Vector(*ground.filled(0.0).T)
         mask = np.ma.getmaskarray(ground)
         if frame == 2:
@@ -296,7 +296,7 @@ class ForceTurn:
             with np.errstate(divide="ignore", invalid="ignore"):
                 turned = f.to_rod_frame(components, q, p)
             mask = mask | self._parallel[:, None]
-        return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
+        return np.ma.MaskedArray(_stacked(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
         """Return all values by name with unit, as for a file: NaN for masked values, the last two columns say why.
@@ -401,18 +401,22 @@ def force_turn(
         )
     th = _crank_angles(angles)
     n = th.size
-    w, e = each("crank_speed", crank_speed, n), each("crank_acceleration", crank_acceleration, n)
-    given = each("torque", torque, n) if torque is not None else each("load", 0.0 if load is None else load, n)
-    moving = ShiftMotion(*(each(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items()))
+    w, e = per_angle("crank_speed", crank_speed, n), per_angle("crank_acceleration", crank_acceleration, n)
+    given = (
+        per_angle("torque", torque, n) if torque is not None else per_angle("load", 0.0 if load is None else load, n)
+    )
+    moving = ShiftMotion(
+        *(per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
+    )
     p = with_groove(parameters.constants(), shift)
-    reached = on_arrays().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
+    reached = plant_functions().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
     if not (reached.any() if partial else reached.all()):
         raise _not_assembled(parameters, shift, th, moving.shift, reached)
     unreachable = th[~reached]
     th, w, e, given = (x[reached] for x in (th, w, e, given))
     moving = ShiftMotion(*(x[reached] for x in moving))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=in_the_shaft(shift))
+        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=has_shaft_groove(shift))
     n, m, r = th.size, found.motion, found.reactions
     never = np.zeros(n, dtype=bool)
     dead = never if torque is None else np.abs(found.ratio) <= DEAD_CENTRE * p.a1
@@ -442,7 +446,7 @@ def force_turn(
         # the slider's mass times its acceleration has no part in the load
         _joints=MappingProxyType(
             {
-                name: masked_array(_joined(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
+                name: masked_array(_stacked(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
                 for name in JOINTS
             }
         ),
@@ -455,13 +459,13 @@ def _crank_angles(angles: ArrayLike | None) -> FloatArray:
     if angles is None:
         return np.linspace(0.0, tau, SAMPLES)
     message = "the angles must be a list of finite numbers (rad), at least one"
-    th = np.atleast_1d(numbers(angles, f"{message}, not {angles!r}"))
+    th = np.atleast_1d(float_array(angles, f"{message}, not {angles!r}"))
     if th.ndim != 1 or th.size == 0 or not np.isfinite(th).all():
         raise InputError(message)
     return th
 
 
-def _joined(vector: Vector, n: int) -> FloatArray:
+def _stacked(vector: Vector, n: int) -> FloatArray:
     """Return the components as an array (n, 3)."""
     return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
 
@@ -475,7 +479,7 @@ def _not_assembled(
 ) -> AssemblyError:
     """Return the error for angles at which the rod does not reach the guide."""
     p = parameters.constants()
-    square = on_arrays().assembly_square(th, s1, p)
+    square = plant_functions().assembly_square(th, s1, p)
     worst = int(np.argmin(square))
     short = float(np.sqrt(p.a2 * p.a2 - square[worst]) - p.a2)
     by_how_much = f"{short:.6g} m too short" if short > 0.0 else "perpendicular to the guide within the limit"

@@ -235,11 +235,11 @@ def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
     return slope
 
 
-def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -> _Bounded:
+def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> _Bounded:
     """Return the function A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
-        change = change_of(middle, half)
+        change = changes(middle, half)
         h = sqrt(max(0.0, change.square))
         # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
         spread = sqrt(change.square_spread)
@@ -356,7 +356,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
     # value of a1 s |cos(alpha4)| + r, which is that of a slider in the plane but for the cosine
 
-    def change_of(middle: float, half: float) -> _Change:
+    def changes(middle: float, half: float) -> _Change:
         c, s = cos(middle), sin(middle)
         f = p.a1 * c + p.a4
         most = abs(f) + half * p.a1
@@ -370,9 +370,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
         f = p.a1 * cos(angle) + p.a4
         return p.a1 * sin(angle) * abs(p.ca) + sqrt(max(0.0, p.a2 * p.a2 - f * f))
 
-    least = min(
-        bound(zero.angle) for zero in _zeros(_slider_slope(change_of, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
-    )
+    least = min(bound(zero.angle) for zero in _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2))
     if least < 0.0:
         return None
     # a twist of pi has a sine of its rounding

@@ -88,7 +88,7 @@ def masked_array(values: ArrayLike, where: NDArray[np.bool_]) -> MaskedArray:
     return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
 
 
-def numbers(value: ArrayLike, message: str) -> FloatArray:
+def float_array(value: ArrayLike, message: str) -> FloatArray:
     """Return a new array of floats; raises InputError with ``message`` if the value is not numeric."""
     try:
         return np.array(value, dtype=float)
@@ -96,7 +96,7 @@ def numbers(value: ArrayLike, message: str) -> FloatArray:
         raise InputError(message) from None
 
 
-def each(name: str, value: ArrayLike, n: int) -> FloatArray:
+def per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:
     """Return a finite value for each of n crank angles.
 
     Raises
@@ -104,7 +104,7 @@ def each(name: str, value: ArrayLike, n: int) -> FloatArray:
     InputError
         If the value is neither a finite number nor n of them.
     """
-    values = numbers(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
+    values = float_array(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
     if values.shape not in ((), (1,), (n,)):
         raise InputError(f"{name} has the shape {values.shape}: it must be a number or have one for each of {n} angles")
     if not np.isfinite(values).all():

@@ -141,7 +141,7 @@ class MonteCarlo:
                     f"the tolerances reach a dead centre from {_angles(turn, near)}: there is no linear estimate of {name} "
                     "there"
                 )
-            found += self._off(name, *known[QUANTITIES[name]])
+            found += self._failure_sentence(name, *known[QUANTITIES[name]])
         return tuple(found)
 
     def _without_estimate(self, quantity: str) -> NDArray[np.bool_]:
@@ -191,7 +191,7 @@ class MonteCarlo:
         free = self.turn.sought != SLIDER_FORCE or quantity in FREE_OF_LOAD
         return () if free else tuple(centre.crank_angle for centre in self.turn.singularities)
 
-    def _off(self, name: str, unit: str, one: float) -> list[str]:
+    def _failure_sentence(self, name: str, unit: str, one: float) -> list[str]:
         """Return the sentence on the worst failure of the linear estimate, if any, in a unit of the value ``one`` in SI."""
         off = np.flatnonzero(self.linear_is_off(name) & ~self._without_estimate(name))
         if not off.size:
@@ -207,8 +207,8 @@ class MonteCarlo:
         )
         to_second = "" if second is np.ma.masked else f", to second order {second / one:.3g} {unit}"
         return [
-            f"the linear estimate of {name} is off at {_angle(self.turn, i)}{_others(off)}: {first}, the samples' standard "
-            f"deviation is {spread.deviation[i] / one:.3g} {unit}{to_second}; their mean is "
+            f"the linear estimate of {name} is off at {_angle(self.turn, i)}{_count_others(off)}: {first}, the samples' "
+            f"standard deviation is {spread.deviation[i] / one:.3g} {unit}{to_second}; their mean is "
             f"{(spread.mean[i] - linear.nominal[i]) / one:.3g} {unit} from the nominal value"
         ]
 
@@ -265,7 +265,7 @@ def monte_carlo(
     cores = cores_of(n_jobs)
     size = len(turn) if cores == 1 else -(-len(turn) // (_PARTS * cores))
     parts = [range(k, min(k + size, len(turn))) for k in range(0, len(turn), max(1, size))]
-    work = partial(_drawn, turn, tuple(tolerances), tuple(quantities), samples, seed)
+    work = partial(_sample_angles, turn, tuple(tolerances), tuple(quantities), samples, seed)
     found = dict(over_workers(work, parts, n_jobs=n_jobs))
     drawn = [x for number in sorted(found) for x in found[number]]
     poles = {name: np.array([x.across and name not in FREE_OF_LOAD for x in drawn]) for name in quantities}
@@ -277,13 +277,13 @@ def monte_carlo(
         spreads=MappingProxyType(
             {name: _spread([x.statistics[name] for x in drawn], poles[name]) for name in quantities}
         ),
-        estimates=MappingProxyType({name: _without(linear[name], poles[name]) for name in quantities}),
+        estimates=MappingProxyType({name: _mask_poles(linear[name], poles[name]) for name in quantities}),
         not_assembled=np.array([x.not_assembled for x in drawn], dtype=np.int64),
         undetermined=np.array([x.undetermined for x in drawn], dtype=np.int64),
     )
 
 
-def _without(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
+def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
     """Return the estimate masked at angles at which the samples have a pole."""
     values = {name: getattr(linear, name) for name in Estimate.__dataclass_fields__ if name != "nominal"}
     return replace(
@@ -300,7 +300,7 @@ class _Draws(NamedTuple):
     undetermined: int
 
 
-def _drawn(
+def _sample_angles(
     turn: ForceTurn,
     tolerances: Sequence[Tolerance],
     quantities: Sequence[str],
@@ -312,10 +312,10 @@ def _drawn(
     generator = np.random.default_rng(seed)
     errors = {t.name: t.draw(generator, samples) for t in tolerances}
     _check_samples(turn.parameters, errors)
-    return [_draws(turn, i, errors, quantities) for i in places]
+    return [_sample_angle(turn, i, errors, quantities) for i in places]
 
 
-def _draws(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
+def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
     """Evaluate the samples at angle i in chunks."""
     samples = len(next(iter(errors.values())))
     found = {name: np.empty(samples) for name in quantities}
@@ -408,9 +408,9 @@ def _angle(turn: ForceTurn, i: int) -> str:
 
 
 def _angles(turn: ForceTurn, points: NDArray[Any]) -> str:
-    return _angle(turn, int(points[0])) + _others(points)
+    return _angle(turn, int(points[0])) + _count_others(points)
 
 
-def _others(points: NDArray[Any]) -> str:
+def _count_others(points: NDArray[Any]) -> str:
     others = points.size - 1
     return f" and {others} other angles" if others > 1 else " and another angle" if others else ""

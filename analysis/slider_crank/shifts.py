@@ -29,7 +29,7 @@ from .quantities import FloatArray
 
 
 @cache
-def on_arrays() -> Rebound:
+def plant_functions() -> Rebound:
     """Return the plant's functions by name, for NumPy arrays and for dual numbers (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
     return rebound((friction, vectors, kinematics, dynamics), elementary)
@@ -114,7 +114,7 @@ class GrooveShift:
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """See `ShiftLaw`."""
         # all that the plant's function asks the constants for is amplitude and ratio
-        shift, pitch, bend = on_arrays().groove(angle, self)
+        shift, pitch, bend = plant_functions().groove(angle, self)
         return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
     def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
@@ -189,7 +189,7 @@ class TimeShift:
         return None
 
 
-def in_the_shaft(law: ShiftLaw) -> bool:
+def has_shaft_groove(law: ShiftLaw) -> bool:
     """Return whether the shift is made by a groove in the crank's shaft."""
     return isinstance(law, GrooveShift) and law.in_shaft
 
@@ -228,7 +228,7 @@ class Course:
         """Find the ends of the ranges of assembly from ``low`` to ``high`` (rad)."""
         repeating = self.law.repeating(self.parameters)
         if repeating is None:
-            at = _places(low, high)
+            at = _search_angles(low, high)
             reached = self._square(at) > 0.0
             changes = np.flatnonzero(reached[1:] != reached[:-1])
             return tuple(
@@ -237,7 +237,7 @@ class Course:
             )
         parts = mobility.ranges(self.parameters, repeating)
         ends = {end for part in parts if not part.full(repeating.span) for end in (part.low, part.high)}
-        moved = (end + more for more in _turns(low, high, repeating.span) for end in ends)
+        moved = (end + more for more in _whole_spans(low, high, repeating.span) for end in ends)
         return tuple(sorted(end for end in moved if low <= end <= high))
 
     def _zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
@@ -248,20 +248,22 @@ class Course:
         find = mobility.singularities if held else mobility.dead_centres
         found = find(self.parameters, repeating)
         moved = (
-            c._replace(crank_angle=c.crank_angle + more) for more in _turns(low, high, repeating.span) for c in found
+            c._replace(crank_angle=c.crank_angle + more)
+            for more in _whole_spans(low, high, repeating.span)
+            for c in found
         )
         return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
 
     def _sign_changes(self, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
         """Find zeros of kth + ``pitch`` S1' ks by its signs at `_PIECES` places of the turn."""
-        f, p = on_arrays(), self.parameters.constants()
+        f, p = plant_functions(), self.parameters.constants()
 
         def slope(angle: FloatArray) -> FloatArray:
             moving = self._shift(angle)
             k = f.coefficients(f.position(angle, moving.shift, p), p)
             return np.asarray(k.kth + pitch * moving.velocity / (self.speed or 1.0) * k.ks)
 
-        at = _places(low, high)
+        at = _search_angles(low, high)
         reached = self._square(at) > (LIMIT_SINE * p.a2) ** 2
         values = np.zeros(at.shape)
         values[reached] = slope(at[reached])
@@ -280,14 +282,16 @@ class Course:
 
     def _square(self, angle: FloatArray) -> FloatArray:
         """Return rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
-        return np.asarray(on_arrays().assembly_square(angle, self._shift(angle).shift, self.parameters.constants()))
+        return np.asarray(
+            plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())
+        )
 
 
-def _turns(low: float, high: float, span: float) -> list[float]:
+def _whole_spans(low: float, high: float, span: float) -> list[float]:
     """Return the shifts by whole spans that bring angles in [0, 2 span] between ``low`` and ``high``."""
     return [span * n for n in range(ceil(low / span) - 2, ceil(high / span) + 1)]
 
 
-def _places(low: float, high: float) -> FloatArray:
+def _search_angles(low: float, high: float) -> FloatArray:
     """Return the angles between which signs are compared."""
     return np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)

@@ -33,7 +33,7 @@ from ..numerics.tracing import rebound
 from ..units import Amount, si
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
-from .shifts import ShiftMotion, in_the_shaft, on_arrays, with_groove
+from .shifts import ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
 #: What is in error besides the mechanism's parameters: the crank angle and the axial shift, by the names of their outputs.
 ANGLE, SHIFT = "crank.angle", "shift.position"
@@ -102,7 +102,7 @@ class Sensitivities:
     values: Mapping[str, MaskedArray]
     derivatives: Mapping[str, MaskedArray]
 
-    def of(self, quantity: str, error: str) -> MaskedArray:
+    def derivative(self, quantity: str, error: str) -> MaskedArray:
         """Return the derivative (n,) of a quantity by an error.
 
         Raises
@@ -166,7 +166,7 @@ class Varied:
     @property
     def square(self) -> Any:
         """Rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
-        return on_arrays().assembly_square(self.angle, self.moving.shift, self.p)
+        return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
 
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
         """Compute the quantities, and the lever of the slider's force.
@@ -180,7 +180,7 @@ class Varied:
                 return self._motion(quantities, w, e), 0.0
             sought = turn.sought == SLIDER_FORCE
             given = (turn.torque if sought else turn.slider_force).data[self.at]
-            s = solve(p, self.angle, moving, w, e, given=given, torque=sought, groove=in_the_shaft(turn.law))
+            s = solve(p, self.angle, moving, w, e, given=given, torque=sought, groove=has_shaft_groove(turn.law))
         found = {
             "slider.position": s.position.s4,
             "slider.velocity": s.motion.slider_velocity,
@@ -193,7 +193,7 @@ class Varied:
         return {name: found[name] for name in quantities}, s.ratio
 
     def _motion(self, quantities: Collection[str], w: Any, e: Any) -> dict[str, Any]:
-        f, p, moving = on_arrays(), self.p, self.moving
+        f, p, moving = plant_functions(), self.p, self.moving
         q = f.position(self.angle, moving.shift, p)
         found = {"slider.position": q.s4}
         if set(quantities) != {"slider.position"}:
@@ -212,7 +212,7 @@ def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
     }
     p = with_groove(_CONSTANTS(SimpleNamespace(**nominal | changed)), turn.law)
     angle = turn.angle[at] + errors.get(ANGLE, 0.0)
-    if in_the_shaft(turn.law):
+    if has_shaft_groove(turn.law):
         moving = turn.law.at(angle, turn.speed[at], turn.acceleration[at])
     else:
         moving = ShiftMotion(turn.shift[at], turn.shift_velocity[at], turn.shift_acceleration[at])

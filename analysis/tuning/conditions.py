@@ -79,7 +79,7 @@ class Expansion(NamedTuple):
     constants: FloatArray
 
 
-def family_at(wish: Wish, x: FloatArray) -> Family:
+def family(wish: Wish, x: FloatArray) -> Family:
     """Return the periodic motions over the level for changes in their tolerances."""
     parameters, drive = wish.operation(x, wish.span[0])
     return Family(parameters=parameters, drive=drive, vary=wish.over)
@@ -94,14 +94,14 @@ class Spot(NamedTuple):
     turns: int = 1
 
 
-def spot_of(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
+def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
     """Return the changes, start and level of a motion."""
-    return Spot(x, orbit.start, wish.level_of(orbit), orbit.turns)
+    return Spot(x, orbit.start, wish.level(orbit), orbit.turns)
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     """Return the motion that begins at a spot, as far as it closes."""
-    orbit: PeriodicOrbit = OrbitEquations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
@@ -138,14 +138,14 @@ def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) ->
     return np.array(minors) / radius**2
 
 
-def margin_of(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
+def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
     """Return det(I - A) of `margin_matrix`."""
     matrix = margin_matrix(monodromy, kind, radius)
     return float(np.linalg.det(np.eye(len(matrix)) - matrix))
 
 
 def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Return the derivatives of `margin_of` by y, the level and the parameters, by exact complex steps."""
+    """Return the derivatives of `crossing_margin` by y, the level and the parameters, by exact complex steps."""
     step = 1e-30
     matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
     return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
@@ -172,7 +172,7 @@ class Across:
     offset: float
 
     @classmethod
-    def at_level(cls, wish: Wish, spot: Spot, level: float) -> Across:
+    def level_plane(cls, wish: Wish, spot: Spot, level: float) -> Across:
         """Return the plane of a fixed level, for motions like the one at a spot."""
         return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
@@ -193,7 +193,7 @@ class Lost:
     kind: Crossing
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
-        return margin_of(monodromy, self.kind)
+        return crossing_margin(monodromy, self.kind)
 
     def slopes(self, found: Expansion) -> FloatArray:
         return margin_slopes(found, self.kind)
@@ -293,7 +293,7 @@ class Place:
         z = np.append(begin.y, begin.level)
         first = z = z if slope is None else z + ahead * slope
         n = len(begin.y)
-        evaluate = OrbitEquations(family_at(self.wish, x), begin.turns, *self.wish.span)
+        evaluate = OrbitEquations(family(self.wish, x), begin.turns, *self.wish.span)
         size = np.inf
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
@@ -346,11 +346,11 @@ def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     places = [np.abs(samples).argmax()]
     if limit.output.startswith(AMPLITUDE):
         places = [samples.argmax(), samples.argmin()]
-    angles = climbed(turn, limit, [float(turn.angle[place]) for place in places])
+    angles = peak_angles(turn, limit, [float(turn.angle[place]) for place in places])
     return reading(turn, limit, angles), angles
 
 
-def climbed(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
+def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
     """Return the crank angles near given ones at which the limited quantity is greatest."""
     value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
     signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
@@ -396,7 +396,7 @@ class Condition(Protocol):
 
 
 class Inside:
-    """Condition that no multiplier has crossed a circle in a way: `margin_of` is not negative."""
+    """Condition that no multiplier has crossed a circle in a way: `crossing_margin` is not negative."""
 
     slack = 1e-9
 
@@ -404,7 +404,7 @@ class Inside:
         self.group, self.place, self.kind, self.radius = group, place, kind, radius
 
     def value(self, x: FloatArray) -> float:
-        return margin_of(self.place.at(x).orbit.monodromy, self.kind, self.radius)
+        return crossing_margin(self.place.at(x).orbit.monodromy, self.kind, self.radius)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         found = self.place.at(x)
@@ -437,7 +437,7 @@ class PeakBeyond:
         self._wish, self._last = wish, spot
 
     def _at(self, x: FloatArray) -> Gradient:
-        place, spot = peak(self._wish, x, self._last)
+        place, spot = find_resonance(self._wish, x, self._last)
         self._last = spot
         return place
 
@@ -448,14 +448,14 @@ class PeakBeyond:
         return self._share * self._at(x).by * self._wish.tolerance
 
 
-def peak(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
+def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
     """Find the level of a resonance, its derivatives by the parameters that may be changed, and the motion there.
 
     Raises LinkworkError if there is none near.
     """
-    orbit = Place(wish, Across.at_level(wish, near, near.level), near).at(x).orbit
+    orbit = Place(wish, Across.level_plane(wish, near, near.level), near).at(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)
-    return found.place, spot_of(wish, x, found.orbit)
+    return found.place, known_spot(wish, x, found.orbit)
 
 
 class Below:
@@ -477,7 +477,7 @@ class Below:
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
         turn = sampled(found.orbit)
-        self._last, self.angles = found.spot, climbed(turn, self.limit, self.angles)
+        self._last, self.angles = found.spot, peak_angles(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
 
@@ -501,9 +501,9 @@ class Below:
         return found, value
 
     def _reading(self, x: FloatArray, level: float) -> tuple[Found, float]:
-        found = Place(self._wish, Across.at_level(self._wish, self._last, level), self._last).at(x)
+        found = Place(self._wish, Across.level_plane(self._wish, self._last, level), self._last).at(x)
         turn = sampled(found.orbit)
-        return found, reading(turn, self.limit, climbed(turn, self.limit, self.angles))
+        return found, reading(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:
         return 1.0 - reading(self._at(x)[1], self.limit, self.angles) / float(self.limit.below)

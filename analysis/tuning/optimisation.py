@@ -28,10 +28,10 @@ from .conditions import (
     PeakBeyond,
     Place,
     Spot,
-    spot_of,
+    known_spot,
 )
 from .result import JUMP, RESONANCE, STABLE, Tuned, Verification, readings, requirements
-from .survey import MARGINAL, SOUGHT, Region, Survey, charted, others, survey
+from .survey import MARGINAL, SOUGHT, Region, Survey, charted, other_motions, survey
 from .wishes import Wish
 
 #: IPOPT's tolerance, iterations at most, and the violation of a condition that counts as none.
@@ -203,17 +203,17 @@ class _Search:
         """Survey the range with some changes."""
         own = []
         for spot in self.more:
-            place = Place(self.wish, Across.at_level(self.wish, spot, spot.level), spot)
+            place = Place(self.wish, Across.level_plane(self.wish, spot, spot.level), spot)
             try:
                 own.append(place.at(x).orbit)
             except LostError:
                 continue  # its branch is gone there
         return survey(self.wish, x, own)
 
-    def look_beside(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
+    def search_others(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
         """Search motions beside a response: return whether there are new ones, and levels with two stable ones."""
-        new, several = others(found)
-        self.more += [spot_of(self.wish, found.x, orbit) for orbit in new]
+        new, several = other_motions(found)
+        self.more += [known_spot(self.wish, found.x, orbit) for orbit in new]
         return bool(new), several
 
     def excess(self, found: Survey, several: tuple[float, ...]) -> float:
@@ -272,12 +272,12 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     start = np.clip(zero, wish.scaled(wish.low), wish.scaled(wish.high))
     before = search.look(zero)
     first = before if (start == zero).all() else search.look(start)
-    if search.look_beside(first)[0]:
+    if search.search_others(first)[0]:
         first = search.look(start)
         before = first if (start == zero).all() else search.look(zero)
     _try_ways(search, first, progress)
     if search.least == np.inf:
-        nearer = _next_to_a_clean_one(search, first)
+        nearer = _survey_near_solution(search, first)
         if nearer is not None:
             _try_ways(search, nearer, progress)
     if search.best is None:
@@ -296,7 +296,7 @@ def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
                 search.keep(*found)
 
 
-def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
+def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     """Find changes within the bounds that meet the requirements, and return the survey just before them.
 
     Where no way leads from the first changes to such as are wished, because places are lost on it, one may lead from there.
@@ -306,14 +306,14 @@ def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
     low, high = wish.scaled(wish.low), wish.scaled(wish.high)
     spread = low + (high - low) * qmc.Sobol(len(low), rng=0).random(_SPREAD)
     for x in sorted([low, high, *spread], key=lambda x: float(objective(wish, x))):
-        if _looked(search, x)[0]:
+        if _try_changes(search, x)[0]:
             break
     else:
         return None
     dirty, clean, found = first.x, x, None
     for _ in range(_BISECTIONS):
         middle = 0.5 * (dirty + clean)
-        is_clean, there = _looked(search, middle)
+        is_clean, there = _try_changes(search, middle)
         if is_clean:
             clean = middle
         else:
@@ -321,13 +321,13 @@ def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
     return found
 
 
-def _looked(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
+def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
     """Return whether some changes meet all requirements, and the survey."""
     several: tuple[float, ...] = ()
     try:
         found = search.look(x)
         if search.excess(found, several) == 0.0:
-            new, several = search.look_beside(found)
+            new, several = search.search_others(found)
             found = search.look(x) if new else found
     except LinkworkError:
         return False, None
@@ -422,7 +422,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
         try:
             new = [c for c in _conditions(found, ways) if _counts(c, answer)]
             if not new:
-                own, several = search.look_beside(found)
+                own, several = search.search_others(found)
                 if not own and (number > 0 or not wish.least):
                     return found, several
             # what is far from being active is found again where it matters
@@ -465,13 +465,13 @@ def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
         group = JUMP if wish.no_jump and region.kind is Crossing.FOLD else STABLE
         if end is not None:
             gone.append(region)
-            place = Place(wish, Lost(end.kind), spot_of(wish, x, end.orbit))
+            place = Place(wish, Lost(end.kind), known_spot(wish, x, end.orbit))
             yield Beyond(group, place, high if side == _ABOVE else low, side)
         elif region.kind is Crossing.FOLD:
             yield Inside(group, Place(wish, region.across, region.worst), region.kind, 1.0)
     for lost in found.least:
         if not any(r.kind is lost.kind and r.low <= lost.spot.level <= r.high for r in gone):
-            place = Place(wish, Across.at_level(wish, lost.spot, lost.spot.level), lost.spot)
+            place = Place(wish, Across.level_plane(wish, lost.spot, lost.spot.level), lost.spot)
             yield Inside(STABLE, place, lost.kind, wish.radius)
     low, high = wish.without_resonance
     for spot in found.peaks:

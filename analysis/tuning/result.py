@@ -72,10 +72,10 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
     wish, result = found.wish, {}
     if wish.no_resonance:
         peaks = [(spot.level, spot.level) for spot in found.peaks]
-        result[RESONANCE] = _of_levels(wish, peaks, "at {}", wish.without_resonance)
+        result[RESONANCE] = _interval_reading(wish, peaks, "at {}", wish.without_resonance)
     if wish.no_jump:
         jumps = [(region.low, region.high) for region in found.folds]
-        text = _of_levels(wish, jumps, "between {}", wish.span)
+        text = _interval_reading(wish, jumps, "between {}", wish.span)
         if not jumps and several:
             text = Reading(
                 text=f"two stable motions at {wish.say(*several)}",
@@ -110,7 +110,9 @@ def _stable_everywhere(found: Survey) -> Reading:
     return Reading(text=text, excess=width / wish.size, missed=text)
 
 
-def _of_levels(wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]) -> Reading:
+def _interval_reading(
+    wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
+) -> Reading:
     """Return the state of a requirement that excludes intervals of levels from a span."""
     if not intervals:
         return Reading(text="none")

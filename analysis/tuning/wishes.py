@@ -241,7 +241,7 @@ class Wish:
         low, high = self.between or (0.0, 0.0)
         return float(low), float(high)
 
-    def level_of(self, orbit: PeriodicOrbit) -> float:
+    def level(self, orbit: PeriodicOrbit) -> float:
         """Return the level of a motion in the range."""
         return value_of(orbit.parameters, orbit.drive, self.over)
 
