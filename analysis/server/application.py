@@ -19,7 +19,7 @@ from waitress.server import create_server
 
 from linkwork.errors import InputError
 
-from ..mechanisms import Kind
+from ..synthesis import Kind
 from .worker import Busy, Worker
 
 #: The only address that is listened at; bytes of a request's body and of its head, at most; seconds of silence after which a

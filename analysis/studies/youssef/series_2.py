@@ -35,9 +35,9 @@ from ...synthesis import (
     evaluate,
     turn,
 )
-from ...synthesis.published import PROBLEMS, WEIGHT, packaging_path
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
 from .chapter_7 import slider
+from .problems import PROBLEMS, WEIGHT, packaging_path
 
 FloatArray = NDArray[np.float64]
 
