@@ -11,8 +11,7 @@ from textwrap import fill
 from typing import Any
 
 import matplotlib.style
-from cycler import cycler
-from matplotlib import rc_context
+from matplotlib import cycler, rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation

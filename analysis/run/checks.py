@@ -45,7 +45,7 @@ def _slider_crank(title: str, inputs: Inputs, **changes: Any) -> Case:
     )
 
 
-_RPM_50 = 50.0 * pi / 30.0
+_RPM_50 = 50.0 * RAD_S_PER_RPM
 _GENERAL = {
     "guide_twist": 4.0,
     "crank_cog_y": 0.02,

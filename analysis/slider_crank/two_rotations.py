@@ -25,11 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH
 
 from ..numerics.dual import Array, Dual, about_i, about_j, about_k, skew, stack
 from ..run import takes_published
-from ..units import Amount, in_si
+from ..units import INCH, Amount, in_si
 from .closure import close, points_of, residuals
 from .quantities import FloatArray
 

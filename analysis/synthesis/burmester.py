@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..notebook import Shown, format_count
+from ..display import Shown, format_count
 from .linkage import Linkage
 from .solution import Solution, evaluate, judge, ranked
 from .tasks import Motion, PrecisionPoints, Task, normal_form

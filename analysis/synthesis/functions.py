@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..notebook import Shown, format_count
+from ..display import Shown, format_count
 from ..units import Amount, in_si
 from .burmester import INDEPENDENT, REAL, dyads_of_five, exact_solution
 from .linkage import Linkage, wrapped

@@ -21,8 +21,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE
-
+from ..units import CM_PER_METRE
 from .constraints import USUAL, Constraint, FullTurn, LargestLink
 from .formulas import path_from_formula
 from .linkage import Linkage

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from ..display import Shown
 from ..files import write_csv
-from ..notebook import Shown
 from .areas import area_between, distance_to, hausdorff, straightness
 from .kernels import PLACES
 from .linkage import Linkage, SecondCrank, format_ratio, wrapped

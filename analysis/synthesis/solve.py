@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
 
+from ..display import Shown, format_count
 from ..files import write_csv
-from ..notebook import Shown, format_count
 from ..units import Amount, in_si
 from .black_box import by_differential_evolution, by_simplex
 from .constraints import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..display import Shown, format_count
 from ..mechanisms import Parameters
-from ..notebook import Shown, format_count
 from ..run import parameters_to
 from .places import FloatArray
 from .requirements import Requirement

@@ -13,8 +13,6 @@ from math import degrees, pi
 
 import numpy as np
 
-from linkwork.five_bar.published import CM_PER_METRE
-
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...synthesis import area_between, hausdorff, straightest_part, turn
 from ...synthesis.published import (
@@ -27,6 +25,7 @@ from ...synthesis.published import (
     N,
     packaging_path,
 )
+from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded, unjudged
 from .chapter_6 import (
     FOUND,
