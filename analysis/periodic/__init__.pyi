@@ -50,9 +50,9 @@ from .motion.floquet import require_sign as require_sign
 from .motion.floquet import verdict as verdict
 from .motion.flow import crank_of as crank_of
 from .motion.orbit import ORBIT_TOLERANCE as ORBIT_TOLERANCE
+from .motion.orbit import OrbitEquations as OrbitEquations
 from .motion.orbit import PeriodicOrbit as PeriodicOrbit
 from .motion.orbit import Turn as Turn
-from .motion.orbit import orbit_equations as orbit_equations
 from .motion.orbit import orbit_of as orbit_of
 from .motion.search import Jump as Jump
 from .motion.search import Orbits as Orbits

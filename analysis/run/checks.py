@@ -13,6 +13,7 @@ from linkwork.errors import InputError
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import OFFSET_CASE
 
+from ..units import RAD_S_PER_RPM
 from .case import Case, published_case
 from .cosimulation import Comparison, compare, cosimulate
 from .inputs import Inputs

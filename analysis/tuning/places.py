@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ..periodic import Crossing, Family, PeriodicOrbit, Turn, Variations, motion_gradient, orbit_equations, scale_of
+from ..periodic import Crossing, Family, OrbitEquations, PeriodicOrbit, Turn, Variations, motion_gradient, scale_of
 from .wish import Wish
 
 FloatArray = NDArray[np.float64]
@@ -88,7 +88,7 @@ def spot_of(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     """The motion that begins there, as far as it closes."""
-    orbit: PeriodicOrbit = orbit_equations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    orbit: PeriodicOrbit = OrbitEquations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
@@ -280,7 +280,7 @@ class Place:
         z = np.append(begin.y, begin.level)
         first = z = z if slope is None else z + ahead * slope
         n = len(begin.y)
-        evaluate = orbit_equations(family_at(self.wish, x), begin.turns, *self.wish.span)
+        evaluate = OrbitEquations(family_at(self.wish, x), begin.turns, *self.wish.span)
         size = np.inf
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
@@ -345,7 +345,7 @@ class Centre(Place):
         return slopes
 
     def _gap(self, spot: Spot) -> FloatArray:
-        evaluate = orbit_equations(family_at(self.wish, spot.x), spot.turns, *self.wish.span)
+        evaluate = OrbitEquations(family_at(self.wish, spot.x), spot.turns, *self.wish.span)
         return np.asarray(evaluate(spot.y, spot.level).residual / self._scale[:-1])
 
     def _derivatives(self, found: Expansion) -> FloatArray:

@@ -454,7 +454,7 @@ def test_rows_of_other_code_are_not_taken(tmp_path: Path, monkeypatch: pytest.Mo
     else:
         # whatever module of the package it is in
         read = Path.read_text
-        monkeypatch.setattr(Path, "read_text", lambda p, **how: read(p, **how) + "# changed" * (p.name == "starts.py"))
+        monkeypatch.setattr(Path, "read_text", lambda p, **how: read(p, **how) + "# changed" * (p.name == "drive.py"))
     assert (computed(), computed()) == (2, 0)
 
 

@@ -14,10 +14,9 @@ from linkwork.errors import LinkworkError
 
 from ...numerics.boundaries import Test, lowest
 from ...numerics.continuation import ContinuationError, Curve, End, Evaluate, Evaluation, Follower, Settings
-from ..motion.discretisation import OrbitError, period_from
-from ..motion.drive import scale_of
+from ..motion.discretisation import OrbitError, operating_point
 from ..motion.floquet import Crossing, crossing_test
-from ..motion.orbit import PeriodicOrbit, orbit_from, orbit_of
+from ..motion.orbit import PeriodicOrbit, orbit_of, orbit_through
 from ..motion.variables import Family, Plane
 from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_leave
 from .coexistence import Coexistence, coexistence
@@ -84,7 +83,7 @@ def follow_crossing(
     """
     n = len(orbit.start)
     settings = Settings(low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, most_points=most_points)
-    unknowns = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), x[1] - x[0])
+    unknowns = np.append(orbit.scale, x[1] - x[0])
     follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)
     begin = follower.start(np.append(orbit.start, place[0]), place[1], 1)
 
@@ -110,11 +109,10 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
     n = len(scale) - 1
 
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
-        parameters, drive = at(float(z[n]), float(z[n + 1]))
-        period = period_from(parameters, drive, z[:n], turns)
-        orbit = orbit_from(parameters, drive, z[:n], turns, period)
+        point = operating_point(*at(float(z[n]), float(z[n + 1])))
+        orbit, shift = orbit_through(point, z[:n], turns)
         # the test has no dimension; it is given that of x, whose row it stands in
-        return np.append(period.shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
+        return np.append(shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
     steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
     high = np.append(np.full(n, np.inf), [settings.bounds[n][1], settings.high])

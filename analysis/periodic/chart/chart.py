@@ -24,7 +24,7 @@ from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import shown, takes_published
 from ...units import RAD_S_PER_RPM, Amount, si
-from ..motion.drive import Drive, published_drive, scale_of
+from ..motion.drive import Drive, published_drive
 from ..motion.floquet import Crossing
 from ..motion.orbit import PeriodicOrbit
 from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
@@ -399,7 +399,7 @@ class _Survey:
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
         """Whether a boundary of the same kind and of the same motion passes a special point, nearly."""
         orbit = special.orbit
-        scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        scale = orbit.scale
         for boundary in self.traced:
             if boundary.kind is not special.kind or boundary.motion not in _MOTION:
                 continue
@@ -494,7 +494,7 @@ def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDAr
 
 def _is_of(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
     """Whether an orbit is of the motion whose multipliers a grid has, by the points of the grid around its place."""
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    scale = orbit.scale
     distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
 

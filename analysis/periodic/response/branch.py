@@ -23,11 +23,10 @@ from ...display import Shown, format_count, format_range
 from ...files import write_csv
 from ...mechanisms import mechanism_of
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
-from ..motion.discretisation import OrbitError, growths, period_from, pieces_from
-from ..motion.drive import scale_of
+from ..motion.discretisation import AIM, GROWTH, PLACES, OrbitError, choose_pieces
 from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test
 from ..motion.flow import label
-from ..motion.orbit import PeriodicOrbit, Turn, orbit_equations
+from ..motion.orbit import OrbitEquations, PeriodicOrbit, Turn
 from ..motion.variables import Family
 from ..stability.nonlinear import SpecialPoint
 
@@ -41,10 +40,6 @@ _SWITCH = 2e-3
 #: A branch is left where the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or where its
 #: largest multiplier passes this.
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
-
-#: Growth over a period, or over one of its pieces, from which a period is followed in (more) pieces; growth aimed at for each,
-#: pieces at least and at most a turn, and places of a turn from which their ends are chosen.
-_GROWTH, _AIM, _FEWEST, _PLACES = 1e3, 10.0, 8, 64
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -299,37 +294,25 @@ def _settings(low: float, high: float, greatest: float, most_points: int) -> Set
 def _follower(
     family: Family, orbit: PeriodicOrbit, settings: Settings, angles: NDArray[np.float64] | None = None
 ) -> Follower:
-    ends = [family.at(value) for value in (settings.low, settings.high)]
-    scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
-    if angles is not None:
-        # an arc has the length of the mean square over the pieces
-        scale = np.tile(scale * np.sqrt(len(angles) - 1), len(angles) - 1)
-    return Follower(orbit_equations(family, orbit.turns, settings.low, settings.high, angles), scale, settings)
+    equations = OrbitEquations(family, orbit.turns, settings.low, settings.high, angles)
+    return Follower(equations, equations.scale(orbit.start), settings)
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
-    """Growth of a deviation over a period, or over one of its pieces where it is followed in pieces."""
+    """Return the growth of a deviation over the period, or over one of its pieces if it has several."""
     return orbit.largest if orbit.stations is None else orbit.stations.growth
 
 
-def _in_pieces(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
-    """The same curve from its last point on, the period followed in pieces in each of which deviations grow alike."""
+def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
+    """Return a follower of the same curve by multiple shooting, and its first point, from the last point so far."""
     orbit: PeriodicOrbit = last.data
-    count = _PLACES * orbit.turns
-    places = orbit.turn(count).states[:, orbit.flow.places]
-    angles = np.linspace(0.0, orbit.flow.period * orbit.turns, count + 1)
-    matrices = pieces_from(orbit.parameters, orbit.drive, angles, places)[1]
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
-    growth = np.log(growths(matrices, scale).clip(1.0))
-    # half of the pieces by growth, half by angle
-    pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(_AIM)), _FEWEST * orbit.turns, count))
-    share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
-    chosen = np.unique(np.searchsorted(share, np.linspace(0.0, share[-1], pieces + 1)).clip(0, count))
-    refined = _follower(family, orbit, settings, angles[chosen])
-    n, k = len(orbit.start), len(chosen) - 1
-    ahead = np.zeros(n * k + 1)
+    places = orbit.turn(PLACES * orbit.turns).states[:, orbit.flow.places]
+    angles, starts = choose_pieces(orbit.point, places, orbit.turns)
+    divided = _follower(family, orbit, settings, angles)
+    n = len(orbit.start)
+    ahead = np.zeros(starts.size + 1)
     ahead[:n], ahead[-1] = last.tangent[:n], last.tangent[-1]
-    return refined, refined.resume(places[chosen[:-1]].ravel(), last.parameter, ahead)
+    return divided, divided.resume(starts.ravel(), last.parameter, ahead)
 
 
 def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
@@ -367,7 +350,7 @@ def _branch(
             if stop is not None and stop(point.data):
                 return "it was interrupted"
             reason = reason_to_leave(point, largest)
-            if not reason and _growth(point.data) > _GROWTH:
+            if not reason and _growth(point.data) > GROWTH:
                 refine = True
                 return "deviations grow too fast to be followed over a whole period"
             return reason
@@ -380,12 +363,12 @@ def _branch(
             curve = replace(curve, points=curve.points[:-1], steps=curve.steps[:-1])
         pieces.append((follower, curve))
         last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
-        lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > _AIM and last.data.stations is None
+        lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > AIM and last.data.stations is None
         if not (refine or lost) or left < 2 or (len(curve.points) == 1 and len(pieces) > 1):
             break
         settings = replace(settings, most_points=left)
         try:
-            follower, first = _in_pieces(family, last, settings)
+            follower, first = _divided(family, last, settings)
         except OrbitError:
             break
     special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]
@@ -409,10 +392,7 @@ def _meets_half(before: Point, after: Point) -> bool:
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
         return False
     try:
-        halves = [
-            period_from(o.parameters, o.drive, o.start, turns // 2).shift / scale_of(o.parameters, o.drive, o.start)
-            for o in (before.data, after.data)
-        ]
+        halves = [o.point.period(o.start, turns // 2).shift / o.scale for o in (before.data, after.data)]
     except OrbitError:
         return False
     return bool(halves[0] @ halves[1] < 0.0)
@@ -488,6 +468,6 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
     """Whether a branch passes a motion, given by its start."""
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
-    scale = np.append(np.max([scale_of(o.parameters, o.drive, o.start) for o in ends], axis=0), width)
+    scale = np.append(np.max([o.scale for o in ends], axis=0), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
     return distance(points / scale, np.append(motion, value) / scale) < _ON

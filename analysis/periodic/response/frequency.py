@@ -29,11 +29,11 @@ from ...numerics.workers import interruptible
 from ...run import at_rest, shown, takes_published
 from ...units import Amount, si
 from ..motion.discretisation import OrbitError
-from ..motion.drive import SAME, Drive, published_drive, scale_of
+from ..motion.drive import SAME, Drive, published_drive
 from ..motion.floquet import Crossing
 from ..motion.flow import crank_of
 from ..motion.orbit import PeriodicOrbit, orbit_of, require_turns
-from ..motion.search import orbits_of, passages
+from ..motion.search import orbits_of
 from ..motion.variables import Family, unit_of
 from ..stability.nonlinear import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
@@ -342,7 +342,7 @@ class _Search:
 
         def is_end(special: SpecialPoint) -> bool:
             orbit, reach = special.orbit, 1e-3 * (self.high - self.low)
-            scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+            scale = orbit.scale
             return any(
                 turns == 2 * orbit.turns
                 and abs(value - special.parameter) < reach
@@ -393,7 +393,7 @@ def ended(branch: Branch) -> str:
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     """Whether a branch goes through an orbit at one of its ends."""
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    scale = orbit.scale
     return any(
         abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
         and float(np.abs((branch.orbits[i].start - orbit.start) / scale).max()) < SAME
@@ -496,6 +496,6 @@ class _Isolas:
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
         """Whether a branch passes a motion, whichever of its turns that begins with."""
         width = self.response.high - self.response.low
-        starts = passages(orbit)
+        starts = orbit.passages()
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         return any(passes(branch, value, start, width) for branch in own for start in starts)

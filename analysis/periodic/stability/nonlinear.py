@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters
 from ...run import simulate, takes_published
-from ..motion.discretisation import OrbitError, period_from
-from ..motion.drive import Drive, scale_of
+from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
+from ..motion.drive import Drive
 from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict
 from ..motion.orbit import PeriodicOrbit, orbit_of
 from ..motion.variables import Family
@@ -130,10 +130,10 @@ class Forms:
 
 def _forms(orbit: PeriodicOrbit) -> Forms:
     """Those of the map over a period, in scaled components from the orbit."""
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    scale, point = orbit.scale, orbit.point
 
     def after(x: FloatArray) -> FloatArray:
-        return x + period_from(orbit.parameters, orbit.drive, orbit.start + scale * x, orbit.turns).shift / scale
+        return x + point.period(orbit.start + scale * x, orbit.turns).shift / scale
 
     return Forms(after, orbit.monodromy * scale / scale[:, None])
 
@@ -250,11 +250,11 @@ def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
     """Derivative of the map with respect to the parameter along the left eigenvector of a fold."""
     _, p, _ = _eigenvectors(of.matrix, 1.0)
-    parameters, drive = family.at(special.parameter)
+    point, start = operating_point(*family.at(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
     direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
-    slope = period_from(parameters, drive, special.orbit.start, special.orbit.turns, direction).slope
-    return float(p.real @ (slope / scale_of(parameters, drive, special.orbit.start)))
+    slope = point.period(start, special.orbit.turns, direction).slope
+    return float(p.real @ (slope / point.scale(start)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -310,14 +310,14 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     value = special.parameter + sign * beyond / rate
     parameters, drive = family.at(value)
     old = orbit_of(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
-    scale = scale_of(parameters, drive, old.start)
+    scale = old.scale
     expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
     q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
     y = old.start + 0.2 * expected * scale * q / np.linalg.norm(q)
     distances = []
     for _ in range(_TURNS):
         try:
-            y = y + period_from(parameters, drive, y, old.turns).shift
+            y = y + old.point.period(y, old.turns).shift
         except LinkworkError:
             return FormRun(parameter=value, distance=np.inf, expected=expected)
         distances.append(float(np.linalg.norm((y - old.start) / scale)))
@@ -432,10 +432,10 @@ def confirm(
     if turns is None:
         # as many as change the deviation by more than NOTABLE, where that can be had
         turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
-    scale = scale_of(parameters, drive, orbit.start)
+    scale = orbit.scale
     direction, measure = _leading(orbit, scale)
     begin = orbit.start + disturbance * scale * direction
-    passed, message = _passages(parameters, drive, begin, turns)
+    passed, message = _passages(orbit.point, begin, turns)
     away = (passed - orbit.start) / scale
     size = np.linalg.norm(away, axis=1)
     outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
@@ -449,21 +449,18 @@ def confirm(
     return Confirmation(verdict=verdict, outcome=outcome, growth=growth, deviations=size / size[0], message=message)
 
 
-def _passages(
-    parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int
-) -> tuple[NDArray[np.float64], str]:
-    """y at crank angle 0 of each turn, and why the run ended early, if it did."""
-    if drive.speed is not None:
-        mechanism = mechanism_of(parameters)
-        flow = drive.flow(mechanism)
-        x, count = flow.state(start, drive.vector(mechanism)), len(mechanism.freedoms)
+def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[FloatArray, str]:
+    """Run the mechanism and return y at crank angle 0 of each turn, and why the run ended early."""
+    if point.drive.speed is not None:
+        mechanism, flow = point.mechanism, point.flow
+        x, count = flow.state(start, point.vector), len(mechanism.freedoms)
         initial: dict[str, float] = {}
         for number, freedom in enumerate(mechanism.freedoms):
             initial |= dict(zip(freedom.initial, (x[number], x[count + number])))
-        turn = flow.period / drive.speed
+        turn = flow.period / point.drive.speed
         run = simulate(
-            parameters,
-            drive.inputs(mechanism),
+            point.parameters,
+            point.drive.inputs(mechanism),
             initial=mechanism.initial(**initial),
             samples=turn * np.arange(turns + 1),
             stop_time=turn * turns,
@@ -473,7 +470,7 @@ def _passages(
     passed = [start]
     for _ in range(turns):
         try:
-            passed.append(passed[-1] + period_from(parameters, drive, passed[-1], 1).shift)
+            passed.append(passed[-1] + point.period(passed[-1], 1).shift)
         except OrbitError as error:
             return np.array(passed), str(error)
     return np.array(passed), ""

@@ -19,9 +19,9 @@ from linkwork.errors import InputError, LinkworkError
 
 from ...files import unknown_name
 from ...mechanisms import mechanism_of
-from ..motion.discretisation import period_from
+from ..motion.discretisation import operating_point
 from ..motion.floquet import Crossing
-from ..motion.orbit import PeriodicOrbit, orbit_from, orbit_of
+from ..motion.orbit import PeriodicOrbit, orbit_of, orbit_through
 from ..motion.variables import along_parameters, gradient_names, require_variable, stacked, value_of, with_values
 from .variations import Place, Variations
 
@@ -451,9 +451,7 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
         parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
         start = orbit.start + change
         if step_of is _to_fold:
-            orbit = orbit_from(
-                parameters, drive, start, orbit.turns, period_from(parameters, drive, start, orbit.turns)
-            )
+            orbit, _ = orbit_through(operating_point(parameters, drive), start, orbit.turns)
         else:
             orbit = orbit_of(parameters, drive, turns=orbit.turns, start=start, settle=False)
         if abs(step) <= _LAST * abs(value):
@@ -490,7 +488,7 @@ def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
             left @ v.after(by_y @ columns + by_constant @ along),
         ]
     )
-    shift = period_from(orbit.parameters, orbit.drive, orbit.start, orbit.turns).shift
+    shift = orbit.point.period(orbit.start, orbit.turns).shift
     test = left @ (v.monodromy - np.eye(n)) @ right
     step = np.linalg.solve(matrix, -np.append(shift, test))
     return step[:n], float(step[n])

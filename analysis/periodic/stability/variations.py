@@ -20,17 +20,12 @@ from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ...mechanisms import mechanism_of
 from ...numerics import symbolic
 from ...numerics.codegen import MAKING, MachineCode
 from ...numerics.gauss import gauss
 from ...run import expressions
 from ...run.compiled import rows
-from ..motion import kernels
-from ..motion.discretisation import failure, section_of
-from ..motion.drive import scale_of
 from ..motion.flow import PLAIN, STATE, Flow
-from ..motion.kernels import Status
 from ..motion.orbit import PeriodicOrbit
 
 FloatArray = NDArray[np.float64]
@@ -96,9 +91,7 @@ class Variations:
 
     def __init__(self, orbit: PeriodicOrbit, switched: bool, along: FloatArray) -> None:
         self.orbit, self.switched, self.flow = orbit, switched, orbit.flow
-        mechanism = mechanism_of(orbit.parameters)
-        self._drive, self._p = orbit.drive.vector(mechanism), np.array(orbit.parameters.constants())
-        self.scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        self._drive, self._p, self.scale = orbit.point.vector, orbit.point.constants, orbit.scale
         self._divide(along)
         self._solve_panels()
         wrong = float(np.abs(self.monodromy - orbit.monodromy).max() / max(1.0, np.abs(orbit.monodromy).max()))
@@ -137,16 +130,8 @@ class Variations:
 
     def _sampled(self) -> FloatArray:
         """The motion at the nodes, shape (k, s, n)."""
-        orbit, flow = self.orbit, self.flow
-        stations, starts = np.zeros(1), orbit.start[None, :].copy()
-        if orbit.stations is not None:
-            stations, starts = orbit.stations.angles[:-1].copy(), orbit.stations.starts
-        found = np.empty((self.angles.size, flow.mechanism.size + flow.inputs))
-        section = section_of(orbit.parameters, orbit.drive, orbit.start, PLAIN, STATE)
-        status = kernels.sample(section, stations, starts, self.angles.ravel(), found)
-        if status != Status.DONE:
-            raise failure(status, flow, orbit.start)
-        return found[:, flow.places].reshape(*self.angles.shape, flow.size)
+        found = self.orbit.sample(self.angles.ravel())
+        return found[:, self.flow.places].reshape(*self.angles.shape, self.flow.size)
 
     def _call(self, name: str, rows_of_arguments: FloatArray, along: FloatArray, size: int) -> FloatArray:
         """A function of `_code` at the nodes: its values, shape (k s, size)."""
