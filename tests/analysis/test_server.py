@@ -731,7 +731,7 @@ def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -
 
 @pytest.mark.slow
 def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> None:
-    # a resonance of rig 2 with spring C lies in the range; a stiffer spring leads it to the upper end
+    # a resonance of rig 2 with spring C lies in the range; a stiffer spring leads it 2 % above the upper end
     state = state_of(case_from({"published": "rig-2-spring-c"}, folder=Path()))
     page.evaluate("state => window.studio.restore(state)", state)
     _part(page, "A range of speeds")
@@ -747,7 +747,7 @@ def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> Non
     _wait(page, "window.studio.state.title.endsWith('tuned')")
     # as a search for the stiffness at which the maximum is there finds it, in the tests of the tuning
     assert before == 4000.0
-    assert 4100.0 < _values(page)["slider.stiffness"] < 4300.0
+    assert 4200.0 < _values(page)["slider.stiffness"] < 4400.0
     changed = {name for name, value in _values(page).items() if value != state["values"][name]}
     assert changed == {"slider.stiffness"}
 

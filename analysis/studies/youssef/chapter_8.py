@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...linear import fit_decay
+from ...numerics.decay import fit_decay
 from ...periodic import mean_effective_mass
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, unjudged
