@@ -11,7 +11,8 @@ from textwrap import fill
 from typing import Any
 
 import matplotlib.style
-from matplotlib import cycler, rc_context
+from cycler import cycler
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
