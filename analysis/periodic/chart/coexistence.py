@@ -29,13 +29,10 @@ from .grid import Keeping, code_of, grid_points, row_name, row_points, row_searc
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 
 FloatArray = NDArray[np.float64]
-
 #: Starts from which the motions of a point are sought, after those of its neighbour: a power of two.
 STARTS = 16
-
 #: Samples of a turn for an amplitude.
 SAMPLES = 64
-
 #: Bound of the integrator's local error of a basin, distance from a motion, relative to the scale, at which a start has
 #: arrived, and turns at most.
 _TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000

@@ -26,20 +26,14 @@ from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate
 
 #: Nodes of an element.
 NODES = 12
-
 #: Nodes and weights on an element of length 1, integrals of the Lagrange polynomials up to each node, and their integrals.
 C, B, A, _COEFFICIENTS = gauss(NODES)
-
 AA = np.ascontiguousarray(A @ A)
-
 BA = B @ A
-
 #: The two highest Legendre coefficients.
 TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
-
 #: `tail` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
 DECAY = 200.0
-
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 

@@ -43,7 +43,6 @@ from .kernels import Status
 from .variables import Family
 
 FloatArray = NDArray[np.float64]
-
 #: Largest correction relative to the scale at which a solution counts as found.
 ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction in the scale of y. What it
