@@ -1,6 +1,3 @@
-from .decay import LEAST_SWING as LEAST_SWING
-from .decay import Decay as Decay
-from .decay import fit_decay as fit_decay
 from .design import Design as Design
 from .design import DesignError as DesignError
 from .design import check_period as check_period

@@ -11,8 +11,8 @@ import numpy as np
 
 from linkwork.errors import ParameterError
 
+from ..display import format_count
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
-from ..notebook import format_count
 from ..run import Case, case_from
 from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..studio import state_of

@@ -35,7 +35,6 @@ from linkwork.slider_crank.vectors import Vector
 from ..run import at_its_speed, takes_published
 from ..units import Amount, in_si
 from . import mobility
-from .course import Course
 from .mobility import DeadCentre
 from .quantities import (
     DEAD_CENTRE,
@@ -48,7 +47,7 @@ from .quantities import (
     numbers,
     unit_table,
 )
-from .shifts import ConstantShift, ShiftLaw, ShiftMotion, in_the_shaft, on_arrays, with_groove
+from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, in_the_shaft, on_arrays, with_groove
 
 #: Angles over the turn by default: every degree, both ends.
 SAMPLES = 361

@@ -18,10 +18,21 @@ from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.workers import check_jobs, cores_of, over_workers
-from .derivatives import ANGLE, FREE_OF_LOAD, KINEMATIC, QUANTITIES, SHIFT, check_names, vary
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, unit_table
-from .tolerances import Estimate, Tolerance, check_tolerances, estimate
+from .tolerances import (
+    ANGLE,
+    FREE_OF_LOAD,
+    KINEMATIC,
+    QUANTITIES,
+    SHIFT,
+    Estimate,
+    Tolerance,
+    check_names,
+    check_tolerances,
+    tolerance_effects,
+    vary,
+)
 
 #: Percentiles that a Monte Carlo gives: the normal distribution's at -3, -2, 0, 2, 3 standard deviations.
 PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 99.86501019683699)
@@ -250,7 +261,7 @@ def monte_carlo(
     if samples < 2:
         raise InputError(f"{samples} samples: there must be at least two")
     check_jobs(n_jobs)
-    linear = estimate(turn, tolerances, quantities)
+    linear = tolerance_effects(turn, tolerances, quantities)
     cores = cores_of(n_jobs)
     size = len(turn) if cores == 1 else -(-len(turn) // (_PARTS * cores))
     parts = [range(k, min(k + size, len(turn))) for k in range(0, len(turn), max(1, size))]

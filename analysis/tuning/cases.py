@@ -16,8 +16,8 @@ from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import Drive, drive_of, unit_of
 from ..run import Case, case_from
 from ..units import with_unit
-from .tuned import Tuned
-from .wish import Limit, Wish
+from .result import Tuned
+from .wishes import Limit, Wish
 
 #: The objective where none is given, and how the other begins.
 _LEAST_CHANGE, _LEAST = "least change", "least "
@@ -53,6 +53,7 @@ class TuneTable:
     between: tuple[Any, Any] | None = entry(Many(as_it_is, length=2), None)
     turns: int = entry(Whole(least=1), 1)
     no_resonance: bool = entry(flag, False)
+    resonance_margin: float = entry(Quantity("1", least=0.0), 0.02)
     no_jump: bool = entry(flag, False)
     no_unstable: bool = entry(flag, False)
     least_margin: float = entry(Quantity("1", least=0.0), 0.0)
@@ -138,6 +139,7 @@ def tuning_case_from(
         turns=wanted.turns,
         change=wanted.change,
         no_resonance=wanted.no_resonance,
+        resonance_margin=wanted.resonance_margin,
         no_jump=wanted.no_jump,
         no_unstable=wanted.no_unstable,
         least_margin=wanted.least_margin,

@@ -1,36 +1,381 @@
-"""Conditions on the changes: functions that must not be negative, each at one place of the response."""
+"""Conditions on the changes: functions that must not be negative, each at one motion of the response.
+
+The motion, y at crank angle 0 and the level, which is the speed or the other quantity of the range, is picked from its branch
+by one further equation: a plane across the branch, or the loss of stability. As the parameters change it is found again from
+its last place, and so keeps to its branch.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
-from typing import Any, Protocol
+from dataclasses import dataclass
+from functools import cached_property, partial, reduce
+from itertools import combinations
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ..periodic import Crossing, Gradient, Turn, extremum_gradient
-from .places import (
-    Across,
-    FloatArray,
-    Found,
-    LostError,
-    Place,
-    Spot,
-    centre_of,
-    margin_of,
-    margin_slopes,
-    sampled,
-    spot_of,
+from ..periodic import (
+    Crossing,
+    Family,
+    Gradient,
+    OrbitEquations,
+    PeriodicOrbit,
+    Turn,
+    Variations,
+    extremum_gradient,
+    motion_gradient,
+    scale_of,
 )
-from .wish import AMPLITUDE, Limit, Wish
+from .wishes import AMPLITUDE, Limit, Wish
 
 #: Step in which the level is sought at which an output is greatest, relative to the range's size, and steps at most.
 _STEP, _CLIMB = 1e-3, 12
 #: Samples that the crank angle of a greatest value may be away from where it was.
 _UPHILL = 256
+FloatArray = NDArray[np.float64]
+
+#: Newton's method: iterations at most, and the correction relative to the scale at which a place is found.
+ITERATIONS, FOUND = 12, 1e-9
+#: Change of a parameter, relative to it and to its tolerance, that is made in one step; and the correction that a step may
+#: take, relative to the scale.
+STRIDE, REACH = 0.05, 0.3
+#: Halvings of a step, over all steps, after which a place counts as lost.
+_HALVINGS = 3
+#: Samples of a turn.
+_SAMPLES = 256
+
+
+class LostError(LinkworkError):
+    """A place was not found again."""
+
+
+class Expansion(NamedTuple):
+    """y(T) - y(0) at a place and the monodromy matrix, with their derivatives by y, the level and the k changes.
+
+    Attributes
+    ----------
+    gaps : ndarray, shape (n, n + 1 + k)
+        Derivatives of y(T) - y(0).
+    monodromy : ndarray, shape (n, n)
+    monodromies : ndarray, shape (n + 1 + k, n, n)
+        Its derivatives.
+    variations : Variations
+        The variational equations they come from.
+    ways : ndarray, shape (panels, nodes, n, n + 1 + k)
+        Derivatives of the motion over the turn.
+    constants : ndarray, shape (c, n + 1 + k)
+        Derivatives of the numbers of the drive and the constants of the equations.
+    """
+
+    gaps: FloatArray
+    monodromy: FloatArray
+    monodromies: FloatArray
+    variations: Variations
+    ways: FloatArray
+    constants: FloatArray
+
+
+def family_at(wish: Wish, x: FloatArray) -> Family:
+    """The periodic motions over the level, with changes in their tolerances."""
+    parameters, drive = wish.operation(x, wish.span[0])
+    return Family(parameters=parameters, drive=drive, vary=wish.over)
+
+
+class Spot(NamedTuple):
+    """A place found: the changes, y, the level, and the turns of the period."""
+
+    x: FloatArray
+    y: FloatArray
+    level: float
+    turns: int = 1
+
+
+def spot_of(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
+    """Where a motion is."""
+    return Spot(x, orbit.start, wish.level_of(orbit), orbit.turns)
+
+
+def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
+    """The motion that begins there, as far as it closes."""
+    orbit: PeriodicOrbit = OrbitEquations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    return orbit
+
+
+def sampled(orbit: PeriodicOrbit) -> Turn:
+    """Its outputs over the period, each turn in as many samples."""
+    return orbit.turn(_SAMPLES * orbit.turns)
+
+
+def expansion(wish: Wish, spot: Spot) -> Expansion:
+    """The derivatives at a place, by the variational equations to second order; it need not be on a motion that closes."""
+    along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
+    v, n = along.variations, len(spot.y)
+    unit = np.append(1.0, wish.tolerance)
+    forcing, constants = v.forcing * unit, along.along * unit
+    gaps = np.column_stack([v.monodromy - np.eye(n), v.after(forcing)])
+    ways = np.concatenate([v.fundamental, v.from_start(np.zeros((n, len(unit))), forcing)], axis=-1)
+    constants = np.column_stack([np.zeros((len(constants), n)), constants])
+    monodromies = np.empty((n + len(unit), n, n))
+    for column in range(n):
+        by_y, by_constant = v.second(v.fundamental[..., column])
+        monodromies[:, :, column] = v.after(by_y @ ways + by_constant @ constants).T
+    return Expansion(gaps, v.monodromy, monodromies, v, ways, constants)
+
+
+def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
+    """The matrix A of which det(I - A) is zero where a multiplier crosses a circle in this way, and positive within."""
+    if kind is not Crossing.TORUS:
+        return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
+    # the minors of order 2, whose eigenvalues are the products of two multipliers
+    pairs = list(combinations(range(len(monodromy)), 2))
+    minors = [
+        [monodromy[a, c] * monodromy[b, d] - monodromy[a, d] * monodromy[b, c] for c, d in pairs] for a, b in pairs
+    ]
+    return np.array(minors) / radius**2
+
+
+def margin_of(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
+    """det(I - A) of `margin_matrix`."""
+    matrix = margin_matrix(monodromy, kind, radius)
+    return float(np.linalg.det(np.eye(len(matrix)) - matrix))
+
+
+def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
+    """Derivatives of `margin_of` by y, the level and the parameters, exact for those of the matrix: a step along i."""
+    step = 1e-30
+    matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
+    return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
+
+
+class Row(Protocol):
+    """The equation that picks a place from its branch."""
+
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        """What is zero at the place."""
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        """Its derivatives by y, the level and the changes."""
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        """Those by y and the level alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Across:
+    """In a plane across the branch: normal . (y, level) = offset; at a fixed level where the normal is along it."""
+
+    normal: FloatArray
+    offset: float
+
+    @classmethod
+    def at_level(cls, wish: Wish, spot: Spot, level: float) -> Across:
+        """At a level, of motions like the one at a place."""
+        return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
+
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        return float(self.normal[:-1] @ y + self.normal[-1] * level - self.offset)
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        return np.append(self.normal, np.zeros(len(found.monodromies) - len(self.normal)))
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        return self.normal
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Where a multiplier crosses the unit circle."""
+
+    kind: Crossing
+
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        return margin_of(monodromy, self.kind)
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        return margin_slopes(found, self.kind)
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        there = found()
+        return self.slopes(there)[: len(there.monodromy) + 1]
+
+
+class Found:
+    """A place at some parameters, and how it moves with them."""
+
+    def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
+        self.spot = spot
+        self._wish, self._row = wish, row
+
+    @cached_property
+    def expansion(self) -> Expansion:
+        """The derivatives there."""
+        return expansion(self._wish, self.spot)
+
+    @cached_property
+    def orbit(self) -> PeriodicOrbit:
+        """The motion."""
+        return motion(self._wish, self.spot)
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Derivatives of y and the level by the changes, shape (n + 1, k)."""
+        gaps, n = self.expansion.gaps, len(self.spot.y) + 1
+        rows = np.vstack([gaps, self._row.slopes(self.expansion)])
+        return -np.linalg.solve(rows[:, :n], rows[:, n:])
+
+    def along(self, slopes: FloatArray) -> FloatArray:
+        """Derivatives by the changes of what has these by y, the level and the changes, shape (..., n + 1 + k)."""
+        n = len(self.spot.y) + 1
+        found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
+        return found
+
+    def output_slopes(self, number: int, angle: float) -> FloatArray:
+        """Derivatives by the changes of an output, by its number, at a crank angle; shape (k,)."""
+        found = self.expansion
+        v = found.variations
+        angle = float(angle % (self.spot.turns * v.flow.period))
+        panel = int(np.searchsorted(np.cumsum(v.h), angle).clip(0, len(v.h) - 1))
+        by_y, by_constant = v.output_derivatives(panel, number)
+        nodes = self.along(np.einsum("sn,snm->sm", by_y, found.ways[panel]) + by_constant @ found.constants)
+        # the polynomial through the panel's nodes, by Lagrange
+        away = v.angles[panel] - v.angles[panel][:, None]
+        np.fill_diagonal(away, 1.0)
+        ahead = np.tile(v.angles[panel] - angle, (len(away), 1))
+        np.fill_diagonal(ahead, 1.0)
+        weights: FloatArray = np.prod(ahead / away, axis=1)
+        return weights @ nodes
+
+
+class Place:
+    """A place that is found again wherever the parameters go.
+
+    Parameters
+    ----------
+    wish : Wish
+    row : Row
+    spot : Spot
+        Where it is known.
+    """
+
+    def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
+        self.wish, self.row = wish, row
+        self._last = spot
+        self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
+
+    def at(self, x: FloatArray) -> Found:
+        """The place with changes in their tolerances; raises LostError if it is not found again."""
+        last = self._last
+        moved = np.abs(x - last.x) * self.wish.tolerance
+        size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
+        steps = max(1, int(np.ceil(float((moved / size).max()) / STRIDE)))
+        done, step, way, halvings = 0.0, 1.0 / steps, x - last.x, 0
+        spot, slope = last, None
+        while done < 1.0:
+            share = min(done + step, 1.0)
+            target = x if share == 1.0 else last.x + share * way
+            try:
+                there = self._newton(target, spot, slope, share - done)
+            except LinkworkError as error:
+                step, halvings = 0.5 * step, halvings + 1
+                if halvings > _HALVINGS:
+                    raise LostError(f"a motion near {self.wish.say(spot.level)} is not found again: {error}") from error
+                continue
+            slope = np.append(there.y - spot.y, there.level - spot.level) / (share - done)
+            spot, done = there, share
+        self._last = spot
+        return Found(self.wish, self.row, spot)
+
+    def _newton(self, x: FloatArray, begin: Spot, slope: FloatArray | None, ahead: float) -> Spot:
+        z = np.append(begin.y, begin.level)
+        first = z = z if slope is None else z + ahead * slope
+        n = len(begin.y)
+        evaluate = OrbitEquations(family_at(self.wish, x), begin.turns, *self.wish.span)
+        size = np.inf
+        for count in range(ITERATIONS):
+            here = evaluate(z[:n], float(z[n]))
+            top = np.column_stack([here.jacobian, here.slope])
+            below = self.row.across(partial(expansion, self.wish, begin._replace(x=x, y=z[:n], level=float(z[n]))))
+            value = self.row.value(z[:n], float(z[n]), here.jacobian + np.eye(n))
+            try:
+                step = np.linalg.solve(np.vstack([top, below]), np.append(here.residual, value))
+            except np.linalg.LinAlgError:
+                raise LostError("its equations are singular there") from None
+            z, before, size = z - step, size, float(np.abs(step / self._scale).max())
+            # the second correction may still be the greater one
+            if not np.abs((z - first) / self._scale).max() < REACH or (count > 2 and size > 0.5 * before > FOUND):
+                break
+            if size < FOUND:
+                return begin._replace(x=x, y=z[:n], level=float(z[n]))
+        raise LostError(f"Newton's method does not settle: last correction {size:.1e}")
+
+
+# Outputs over a turn
+
+
+def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
+    """What was sampled over a turn, as its Fourier series at any crank angle."""
+    n = len(samples)
+    c = np.fft.rfft(samples) / n
+    c[1:] *= 2.0
+    if n % 2 == 0:
+        c[-1] *= 0.5
+    k, way = np.arange(len(c)), n * (turn.angle[1] - turn.angle[0])
+    return lambda angle: (c * np.exp(2j * np.pi / way * np.multiply.outer(angle, k))).real.sum(axis=-1)
+
+
+def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
+    """What a limit is about at any crank angle: of a joint the magnitude of the force."""
+    # of its components, which are smooth where the magnitude is not
+    parts = [series(turn, turn[part]) for part in limit.parts]
+    return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
+
+
+def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
+    """What a limit bounds, from the values at its crank angles: see `greatest`."""
+    values = curve(turn, limit)(np.array(angles))
+    return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
+
+
+def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
+    """What a limit bounds over a turn, and the crank angles of it: one, or those of the greatest and the least value."""
+    samples = reduce(np.hypot, (turn[part] for part in limit.parts))
+    places = [np.abs(samples).argmax()]
+    if limit.output.startswith(AMPLITUDE):
+        places = [samples.argmax(), samples.argmin()]
+    angles = climbed(turn, limit, [float(turn.angle[place]) for place in places])
+    return reading(turn, limit, angles), angles
+
+
+def climbed(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
+    """The crank angles about these at which what a limit bounds is greatest."""
+    value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
+    signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
+    return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
+
+
+def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) -> float:
+    """Where a function of the crank angle is greatest (sign +1) or least about an angle."""
+    for _ in range(_UPHILL):
+        a, b, c = sign * value(angle + step * np.array([-1.0, 0.0, 1.0]))
+        if b >= max(a, c):
+            break
+        angle += step if c > a else -step
+    for _ in range(4):
+        # the top of the parabola through three values
+        a, b, c = value(angle + step * np.array([-1.0, 0.0, 1.0]))
+        bend = a - 2.0 * b + c
+        if bend == 0.0:
+            break
+        angle += float(np.clip(0.5 * (a - c) / bend, -1.0, 1.0)) * step
+        step *= 0.1
+    return angle
+
+
+# Conditions
 
 
 class Condition(Protocol):
@@ -79,32 +424,6 @@ class Beyond:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         slopes: FloatArray = self._share * self.place.at(x).slopes[-1]
-        return slopes
-
-
-class Gone:
-    """A closed branch has shrunk to a point, and vanished."""
-
-    slack = 1e-9
-
-    def __init__(self, group: str, wish: Wish, folds: Sequence[Spot]) -> None:
-        self.group, self.centre = group, centre_of(wish, folds)
-        #: Changes at which the centre is known.
-        self.begin, self._there = self.centre.found.x, folds[0].x
-        self._sign = -np.sign(self.centre.miss(self.centre.found))
-
-    def value(self, x: FloatArray) -> float:
-        try:
-            spot = self.centre.at(x).spot
-        except LinkworkError:
-            if np.array_equal(x, self._there):
-                return -1.0  # where the branch is, and too large to have a centre
-            raise
-        # to be gone for certain it has to be a little beyond the point
-        return float(self._sign * self.centre.miss(spot)) - 2.0 * self.slack
-
-    def slopes(self, x: FloatArray) -> FloatArray:
-        slopes: FloatArray = self._sign * self.centre.miss_slopes(self.centre.at(x))
         return slopes
 
 
@@ -191,7 +510,7 @@ class Below:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         (found, turn), names = self._at(x), self._wish.mechanism.output_names
-        total, parts = np.zeros(len(x)), parts_of(turn, self.limit)
+        total, parts = np.zeros(len(x)), self.limit.parts
         for angle, sign in zip(self.angles, (1.0, -1.0)):
             values = [float(series(turn, turn[part])(angle)) for part in parts]
             slopes = [found.output_slopes(names.index(part), angle) for part in parts]
@@ -201,71 +520,3 @@ class Below:
                 # of the magnitude
                 total += np.array(values) @ np.array(slopes) / np.linalg.norm(values)
         return np.asarray(-total / self.limit.below)
-
-
-# Outputs over a turn
-
-
-def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
-    """What was sampled over a turn, as its Fourier series at any crank angle."""
-    n = len(samples)
-    c = np.fft.rfft(samples) / n
-    c[1:] *= 2.0
-    if n % 2 == 0:
-        c[-1] *= 0.5
-    k, way = np.arange(len(c)), n * (turn.angle[1] - turn.angle[0])
-    return lambda angle: (c * np.exp(2j * np.pi / way * np.multiply.outer(angle, k))).real.sum(axis=-1)
-
-
-def parts_of(turn: Turn, limit: Limit) -> list[str]:
-    """The outputs that a limit is about: of a joint the components of its force."""
-    name = limit.output.removeprefix(AMPLITUDE)
-    return [name] if name in turn.names else [p for axis in "xyz" if (p := f"{name}.f{axis}") in turn.names]
-
-
-def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
-    """What a limit is about at any crank angle: of a joint the magnitude of the force."""
-    # of its components, which are smooth where the magnitude is not
-    parts = [series(turn, turn[part]) for part in parts_of(turn, limit)]
-    return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
-
-
-def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
-    """What a limit bounds, from the values at its crank angles: see `greatest`."""
-    values = curve(turn, limit)(np.array(angles))
-    return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
-
-
-def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
-    """What a limit bounds over a turn, and the crank angles of it: one, or those of the greatest and the least value."""
-    samples = reduce(np.hypot, (turn[part] for part in parts_of(turn, limit)))
-    places = [np.abs(samples).argmax()]
-    if limit.output.startswith(AMPLITUDE):
-        places = [samples.argmax(), samples.argmin()]
-    angles = climbed(turn, limit, [float(turn.angle[place]) for place in places])
-    return reading(turn, limit, angles), angles
-
-
-def climbed(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
-    """The crank angles about these at which what a limit bounds is greatest."""
-    value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
-    signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
-    return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
-
-
-def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) -> float:
-    """Where a function of the crank angle is greatest (sign +1) or least about an angle."""
-    for _ in range(_UPHILL):
-        a, b, c = sign * value(angle + step * np.array([-1.0, 0.0, 1.0]))
-        if b >= max(a, c):
-            break
-        angle += step if c > a else -step
-    for _ in range(4):
-        # the top of the parabola through three values
-        a, b, c = value(angle + step * np.array([-1.0, 0.0, 1.0]))
-        bend = a - 2.0 * b + c
-        if bend == 0.0:
-            break
-        angle += float(np.clip(0.5 * (a - c) / bend, -1.0, 1.0)) * step
-        step *= 0.1
-    return angle

@@ -30,13 +30,12 @@ from ..periodic import (
     scale_of,
     speed_name,
 )
-from .conditions import greatest
-from .places import Across, FloatArray, LostError, Place, Spot, margin_of, motion, sampled, spot_of
-from .wish import Limit, Wish
+from .conditions import Across, FloatArray, LostError, Place, Spot, greatest, margin_of, motion, sampled, spot_of
+from .wishes import Limit, Wish
 
 #: Greatest step along the response, in scaled arc length, and how far it is followed beside the range, relative to its width.
 STEP, BESIDE = 2e-2, 0.4
-#: The same of a branch that the response does not meet: whether it is closed decides what can be done with it.
+#: The same of a branch that the response does not meet.
 FAR = 4.0
 #: Least values of a test function along a branch, and greatest ones of an output, that are looked at more closely, at most.
 _LEAST, _MOST = 3, 4
@@ -44,6 +43,8 @@ _LEAST, _MOST = 3, 4
 _NEAR = 0.5
 #: Distance in level and in multipliers that counts as none: of the range's ends, and of the unit circle.
 AT_THE_END, MARGINAL = 1e-7, 1e-6
+#: Width of a part of the range without a stable motion that counts as none, relative to the range's middle.
+NO_GAP = 1e-6
 #: Speeds of the range at which all motions are sought, and those of the chart.
 SOUGHT, _CHARTED = 5, 201
 #: Distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
@@ -67,8 +68,6 @@ class Region:
         What picks that place.
     value : float
         The test function there.
-    closed : bool
-        Whether the branch is: then it can shrink to a point.
     """
 
     kind: Crossing
@@ -79,7 +78,6 @@ class Region:
     worst: Spot
     across: Across
     value: float
-    closed: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,6 +119,8 @@ class Survey:
         For each limit the greatest ones, and where.
     largest : (float, float)
         The largest Floquet multiplier in the range, and its level.
+    unstable : tuple of (float, float)
+        Parts of the range in which no stable motion was met.
     """
 
     wish: Wish
@@ -131,6 +131,7 @@ class Survey:
     least: tuple[Least, ...]
     greatest: tuple[Greatest, ...]
     largest: tuple[float, float]
+    unstable: tuple[tuple[float, float], ...]
 
     @property
     def folds(self) -> tuple[Region, ...]:
@@ -155,9 +156,13 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         If there is no motion to begin with.
     """
     parameters, drive = wish.operation(x, wish.span[0])
+    low, high = _ends(wish, BESIDE)
+    if wish.no_resonance:
+        low, high = min(low, wish.without_resonance[0]), max(high, wish.without_resonance[1])
     response = frequency_response(
         parameters,
-        *_ends(wish, BESIDE),
+        low,
+        high,
         drive=drive,
         vary=wish.over,
         start=wish.start,
@@ -170,7 +175,14 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     regions = [region for branch in branches for region in _regions(wish, x, branch, response)]
     inside = [(branch, np.flatnonzero(_in(wish, branch.parameter))) for branch in branches]
     motions = [[(float(b.parameter[i]), b.orbits[i]) for i in places] for b, places in inside]
-    least = tuple(found for branch in branches for found in _least(wish, x, branch)) if wish.judged else ()
+    unstable = tuple(_without_stable_motion(wish, branches))
+    least: tuple[Least, ...] = ()
+    if wish.judged or unstable:
+        least = tuple(found for branch in branches for found in _least(wish, x, branch))
+    if not wish.judged:
+        # a motion beside a stable one may be unstable
+        without = [found for found in least if any(low <= found.spot.level <= high for low, high in unstable)]
+        least = tuple(found for found in without if found.value < 0.0)
     # that at the least test functions is there to the last digit
     brought = [(found.spot.level, motion(wish, found.spot)) for found in least]
     largest = max((orbit.largest, level) for branch in [*motions, brought] for level, orbit in branch)
@@ -183,7 +195,31 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         least=least,
         greatest=tuple(top for limit in wish.limits for top in _greatest(wish, x, limit, motions)),
         largest=largest,
+        unstable=unstable,
     )
+
+
+def _without_stable_motion(wish: Wish, branches: Sequence[Branch]) -> Iterator[tuple[float, float]]:
+    """Yield the parts of the range that no stable stretch of a branch covers."""
+    covered = sorted(stretch for branch in branches for stretch in _stable_stretches(branch))
+    low, end = wish.span
+    for first, last in [*covered, (end, end)]:
+        if reaches(wish, low, min(first, end)) and first - low > NO_GAP * wish.size:
+            yield low, min(first, end)
+        low = max(low, last)
+
+
+def _stable_stretches(branch: Branch) -> Iterator[tuple[float, float]]:
+    """Yield the least and greatest level of each pair of neighbouring points, of their stable part."""
+    stable = [orbit.largest <= 1.0 + MARGINAL for orbit in branch.orbits]
+    lost = {special.after: special.parameter for special in branch.special}
+    for i in range(len(branch) - 1):
+        ends = [float(branch.parameter[i]), float(branch.parameter[i + 1])]
+        if not all(stable[i : i + 2]) and any(stable[i : i + 2]) and i in lost:
+            ends[stable[i]] = float(lost[i])
+        elif not all(stable[i : i + 2]):
+            continue
+        yield min(ends), max(ends)
 
 
 def _in(wish: Wish, level: Any) -> Any:
@@ -202,8 +238,12 @@ def _ends(wish: Wish, beside: float) -> tuple[float, float]:
 
 def reaches(wish: Wish, low: float, high: float) -> bool:
     """Whether an interval of levels has more than a point in common with the inside of the range."""
+    return _overlap(wish, low, high, wish.span)
+
+
+def _overlap(wish: Wish, low: float, high: float, span: tuple[float, float]) -> bool:
     slack = AT_THE_END * wish.size
-    return bool(high > wish.span[0] + slack and low < wish.span[1] - slack)
+    return bool(high > span[0] + slack and low < span[1] - slack)
 
 
 def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
@@ -293,7 +333,6 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
                 worst=worst,
                 across=across,
                 value=value,
-                closed=branch.closed,
             )
 
 
@@ -360,9 +399,9 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
 
 
 def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
-    """The resonances in the range."""
+    """Yield the resonances in the range and within the margin beside it."""
     for top in response.maxima():
-        if reaches(wish, top.parameter, top.parameter):
+        if _overlap(wish, top.parameter, top.parameter, wish.without_resonance):
             yield spot_of(wish, x, top.orbit)
 
 

@@ -12,11 +12,23 @@ from numpy.typing import NDArray
 
 from analysis import figures
 from analysis.numerics.continuation import ContinuationError
-from analysis.periodic import Branch, Crossing, Drive, Family, OrbitError, Stability, find_orbit, follow, switch
+from analysis.periodic import (
+    Branch,
+    Crossing,
+    Drive,
+    Family,
+    OrbitEquations,
+    OrbitError,
+    Stability,
+    find_orbit,
+    follow,
+    switch,
+)
 from analysis.periodic.response.branch import _of_a_turn
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 
 SPEED = SETS["table-3.1"].crank_speed
 RPM = RAD_S_PER_RPM
@@ -150,7 +162,7 @@ def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
     family = Family(parameters=TABLE_3_1, drive=orbit.drive, vary="slider.friction_coefficient")
     # with its derivative from zero on
-    first = family.evaluate(1, 0.0, 0.2)(orbit.start, 0.0)
+    first = OrbitEquations(family, 1, 0.0, 0.2)(orbit.start, 0.0)
     step = 1e-4
     moved = [find_orbit(replace(TABLE_3_1, slider_friction_coefficient=n * step), speed=SPEED).start for n in (1, 2)]
     slope = (4.0 * moved[0] - moved[1] - 3.0 * orbit.start) / (2.0 * step)

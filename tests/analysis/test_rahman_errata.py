@@ -9,7 +9,7 @@ import pytest
 
 from analysis.numerics.dual import Dual
 from analysis.slider_crank import close, joint_loads, rates
-from analysis.slider_crank.two_rotations import chain, equations, planar, settle
+from analysis.slider_crank.closure import chain, equations, planar, settle
 from analysis.studies.rahman import method, printed
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 from tests.published_rahman import CRANK_IN, INCH, MASSES_LB_S2_IN, POUND_FORCE, ROD_IN, TORQUE_LB_IN

@@ -27,10 +27,10 @@ from analysis.slider_crank import (
     GrooveShift,
     ShiftLaw,
     Tolerance,
-    estimate,
     force_turn,
     monte_carlo,
     sensitivities,
+    tolerance_effects,
 )
 from linkwork.errors import InputError, ParameterError
 from linkwork.parameters import field_name
@@ -196,7 +196,7 @@ def test_distributions(distribution: str, ratio: float, kurtosis: float) -> None
     # the same of the estimate to second order: S4 = sqrt(a2^2 - x^2) at 90 deg, less a constant
     turn = force_turn(IDEAL, crank_speed=1.0, angles=[0.5 * pi])
     deviation = 1e-3
-    second = estimate(turn, [Tolerance(SHIFT, standard_deviation=deviation, distribution=distribution)])[
+    second = tolerance_effects(turn, [Tolerance(SHIFT, standard_deviation=deviation, distribution=distribution)])[
         "slider.position"
     ]
     h = IDEAL.rod_length
@@ -214,7 +214,7 @@ def test_two_errors_together() -> None:
     a1, a2 = IDEAL.crank_length, IDEAL.rod_length
     turn = force_turn(IDEAL, crank_speed=1.0, angles=[0.5 * pi])
     tolerances = [Tolerance("guide.twist", standard_deviation=dx), Tolerance(SHIFT, standard_deviation=dy)]
-    found = estimate(turn, tolerances)["slider.position"]
+    found = tolerance_effects(turn, tolerances)["slider.position"]
     hxx, hxy, hyy = (-a1 - a1 * a1 / a2) * dx * dx, (-1.0 - a1 / a2) * dx * dy, -dy * dy / a2
     assert found.second_mean[0] - found.nominal[0] == pytest.approx(0.5 * (hxx + hyy), rel=1e-4)
     variance = 0.5 * hxx**2 + hxy**2 + 0.5 * hyy**2
@@ -226,7 +226,7 @@ def test_two_errors_together() -> None:
 def test_linear_estimate_is_the_sum_of_variances() -> None:
     turn = offset_turn(np.linspace(0.0, tau, 13))
     quantities = ("slider.position", "crank_pin.fy")
-    found = estimate(turn, TOLERANCES, quantities)
+    found = tolerance_effects(turn, TOLERANCES, quantities)
     slopes = sensitivities(turn, [t.name for t in TOLERANCES], quantities)
     for name in quantities:
         parts: Any = [(slopes.of(name, t.name) * t.deviation) ** 2 for t in TOLERANCES]
@@ -378,7 +378,7 @@ def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
     width = 1e-3
     turn = offset_turn(DEAD + width * np.array([-1.05, -0.95, 0.95, 1.05]), torque=CRANK_TORQUE)
     tolerances = [Tolerance(ANGLE, width)]
-    found = estimate(turn, tolerances, ("slider.load", "slider.position"))
+    found = tolerance_effects(turn, tolerances, ("slider.load", "slider.position"))
     assert np.ma.getmaskarray(found["slider.load"].deviation).tolist() == [False, True, True, False]
     assert not np.ma.getmaskarray(found["slider.position"].deviation).any()
     # hardly a sample of a normal error is as far out as three standard deviations
@@ -454,7 +454,7 @@ def test_wrong_input_is_reported() -> None:
     with pytest.raises(InputError, match="no tolerance"):
         monte_carlo(turn, [])
     with pytest.raises(InputError, match=r"2 tolerances of rod\.length"):
-        estimate(turn, [Tolerance("rod.length", 1.0), Tolerance("rod.length", 2.0)])
+        tolerance_effects(turn, [Tolerance("rod.length", 1.0), Tolerance("rod.length", 2.0)])
     with pytest.raises(InputError, match="1 samples: there must be at least two"):
         monte_carlo(turn, TOLERANCES, samples=1)
     with pytest.raises(ParameterError, match=r"crank_pin\.fx"):

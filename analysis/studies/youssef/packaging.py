@@ -13,10 +13,9 @@ from math import degrees, pi
 
 import numpy as np
 
-from linkwork.five_bar.published import CM_PER_METRE
-
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...synthesis import area_between, hausdorff, straightest_part, turn
+from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded, unjudged
 from .chapter_6 import (
     FOUND,

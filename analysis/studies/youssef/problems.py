@@ -21,12 +21,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.synthesis.linkage.linkage import Linkage
-from analysis.synthesis.task.constraint import USUAL, Constraint, FullTurn, LargestLink
-from analysis.synthesis.task.formula import path_from_formula
-from analysis.synthesis.task.target import TargetPath
-from analysis.synthesis.task.task import RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
-from linkwork.five_bar.published import CM_PER_METRE
+from ...synthesis.linkage.linkage import Linkage
+from ...synthesis.task.constraint import USUAL, Constraint, FullTurn, LargestLink
+from ...synthesis.task.formula import path_from_formula
+from ...synthesis.task.target import TargetPath
+from ...synthesis.task.task import RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
+from ...units import CM_PER_METRE
 
 CM2_PER_M2 = CM_PER_METRE**2
 DEG2_PER_RAD2 = degrees(1.0) ** 2

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ...notebook import Shown, format_count
+from ...display import Shown, format_count
 from ..linkage.linkage import Linkage
 from ..result.solution import Solution, evaluate, judge, ranked
 from ..task.task import Motion, PrecisionPoints, Task, normal_form

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, ParameterError
 
-from ...notebook import Shown, format_count
+from ...display import Shown, format_count
 from ...units import Amount, in_si
 from ..linkage.linkage import Linkage, wrapped
 from ..result.solution import Solution, ranked

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from ...display import Shown
 from ...files import write_csv
-from ...notebook import Shown
 from ...run import parameters_to
 from ...units import with_unit
 from ..linkage.kernels import PLACES

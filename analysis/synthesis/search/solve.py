@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
 
+from ...display import Shown, format_count
 from ...files import write_csv
-from ...notebook import Shown, format_count
 from ...units import Amount, in_si
 from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
 from ..linkage.kind import Kind

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
 
@@ -47,12 +47,15 @@ class Change:
         Between which it must lie (SI).
     tolerance : float
         In which its change is measured (SI).
+    given : str or float
+        Tolerance from which the bounds follow, as it was written; empty where they were given.
     """
 
     name: str
     low: float
     high: float
     tolerance: float
+    given: Amount = ""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
@@ -72,10 +75,16 @@ class Limit:
         it; or ``amplitude of`` an output, for half its range.
     below : float
         SI.
+    unit : str
+        Of ``below``; filled in by `Wish`, as are the parts.
+    parts : tuple of str
+        The output, or the components of the force in the joint.
     """
 
     output: str
     below: Amount
+    unit: str = field(init=False, default="")
+    parts: tuple[str, ...] = field(init=False, default=())
 
     def __str__(self) -> str:
         return self.output if self.output.startswith(AMPLITUDE) else f"greatest {self.output}"
@@ -112,11 +121,14 @@ class Wish:
     turns : int
         Motions of up to so many turns of the crank are looked at.
     no_resonance : bool
-        No maximum of the amplitude of a motion of one turn lies in the range.
+        No maximum of the amplitude of a motion of one turn lies in the range, nor within ``resonance_margin`` of it.
+    resonance_margin : float
+        Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
     no_jump : bool
         No fold lies in the range, and nowhere in it there is a second stable motion.
     no_unstable : bool
-        No unstable motion lies in the range.
+        No unstable motion lies in the range. Without it unstable motions may lie beside stable ones, but everywhere in the
+        range there must be a stable one.
     least_margin : float
         The largest Floquet multiplier is at most one less this.
     limits : sequence of Limit
@@ -138,6 +150,7 @@ class Wish:
     start: Any = None
     turns: int = 1
     no_resonance: bool = False
+    resonance_margin: float = 0.02
     no_jump: bool = False
     no_unstable: bool = False
     least_margin: float = 0.0
@@ -167,9 +180,10 @@ class Wish:
         if not (isinstance(self.turns, int) and self.turns >= 1):
             raise ParameterError("turns", self.turns, "be a whole number, at least one")
         put("change", _changes((self.parameters, drive), self.over, self.change))
-        put("limits", tuple(replace(x, below=_bound(mechanism, x)) for x in self.limits))
-        if not 0.0 <= self.least_margin < 1.0:
-            raise ParameterError("least_margin", self.least_margin, "be at least zero and less than one")
+        put("limits", tuple(_checked(mechanism, limit) for limit in self.limits))
+        for name in ("least_margin", "resonance_margin"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ParameterError(name, getattr(self, name), "be at least zero and less than one")
         if not (self.no_resonance or self.no_jump or self.judged or self.limits):
             raise InputError(
                 "nothing is wished: say no_resonance, no_jump, no_unstable or least_margin, or give a limit of an output"
@@ -178,8 +192,27 @@ class Wish:
             put("least", _changeable(mechanism, self.least))
             if self.least not in self.names:
                 raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
+        self._check_bounds()
+
+    def _check_bounds(self) -> None:
+        """Make sure that mechanism and drive take the bounds of what may be changed."""
+        assert self.drive is not None
+        for change in self.change:
+            for value in (change.low, change.high):
+                try:
+                    with_values(self.parameters, self.drive, {change.name: value})
+                except ParameterError as error:
+                    if not change.given:
+                        raise
+                    unit = unit_of(self.mechanism, change.name)
+                    raise ParameterError(
+                        f"change.{change.name}",
+                        change.given,
+                        f"be a smaller tolerance or a range [least, greatest]: it allows {value:.6g} {unit}, and "
+                        f"{error.name} must {error.requirement}",
+                    ) from None
         for x in (self.scaled(self.low), self.scaled(self.high)):
-            self.operation(x, self.span[0])  # checks the bounds
+            self.operation(x, self.span[0])
 
     def _required_over(self) -> str:
         """What the range is of, where what is given of it fits together."""
@@ -232,6 +265,12 @@ class Wish:
     def radius(self) -> float:
         """What the largest multiplier may be."""
         return 1.0 - self.least_margin
+
+    @property
+    def without_resonance(self) -> tuple[float, float]:
+        """The range with the margin of a resonance on either side, in SI."""
+        (low, high), margin = self.span, self.resonance_margin
+        return low - margin * abs(low), high + margin * abs(high)
 
     @property
     def size(self) -> float:
@@ -340,7 +379,7 @@ def _change(operation: Operation, name: str, value: Any) -> Change:
         return Change(name=name, low=low, high=high, tolerance=tolerance or 0.5 * (high - low))
     if tolerance is None:
         raise ParameterError(what, dict(given), "have a tolerance, or a range between [least, greatest]")
-    return Change(name=name, low=now - tolerance, high=now + tolerance, tolerance=tolerance)
+    return Change(name=name, low=now - tolerance, high=now + tolerance, tolerance=tolerance, given=given["tolerance"])
 
 
 def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
@@ -356,14 +395,18 @@ def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
     return found
 
 
-def _bound(mechanism: Mechanism, limit: Limit) -> float:
+def _checked(mechanism: Mechanism, limit: Limit) -> Limit:
+    """Return a limit in SI, with its unit and the outputs that it is about."""
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
-    joints = {joint: units[parts[0]] for joint, parts in mechanism.joints.items()}
-    known = units if name != limit.output else joints | units
+    known = {output: (output,) for output in units} | (mechanism.joints if name == limit.output else {})
     if name not in known:
         raise unknown_name(name, known, f"output {name!r}")
-    value = si(limit.below, known[name], f"limit of {limit.output}")
+    parts = known[name]
+    value = si(limit.below, units[parts[0]], f"limit of {limit.output}")
     if not (isinstance(value, (int, float)) and isfinite(value) and value > 0.0):
         raise ParameterError(f"limit of {limit.output}", limit.below, "be above zero")
-    return float(value)
+    checked = replace(limit, below=float(value))
+    object.__setattr__(checked, "unit", units[parts[0]])
+    object.__setattr__(checked, "parts", parts)
+    return checked

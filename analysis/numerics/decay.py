@@ -130,7 +130,7 @@ def fit_decay(
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.linear import fit_decay
+    >>> from analysis.numerics.decay import fit_decay
     >>> t = np.linspace(0.0, 1.0, 2001)
     >>> decay = fit_decay(t, np.exp(-2.0 * t) * np.sin(40.0 * t))
     >>> round(decay.decrement / (2.0 * np.pi / 40.0), 2)

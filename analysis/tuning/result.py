@@ -1,0 +1,249 @@
+"""Result of a tuning: parameters before and after, requirement by requirement, and how it was verified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..display import Shown, format_count
+from ..mechanisms import Parameters
+from ..run import parameters_to
+from .conditions import FloatArray
+from .survey import MARGINAL, Survey
+from .wishes import Wish
+
+#: Names of the requirements; that of a limit is its text.
+RESONANCE, JUMP, STABLE = "no resonance", "no jump", "stable motion"
+#: Violation of a limit, relative to it, that counts as none.
+NO_EXCESS = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """What there is of a requirement with some parameters.
+
+    Attributes
+    ----------
+    text : str
+        In words, with units.
+    excess : float
+        By how much it is missed: of places how far they are from the nearer end, relative to the range's middle, of the largest
+        multiplier as it is, of a limit relative to it. Zero where it is met.
+    missed : str
+        The same in words; empty where it is met.
+    """
+
+    text: str
+    excess: float = 0.0
+    missed: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Requirement:
+    """A requirement, with what there is of it before and after the change."""
+
+    name: str
+    wished: str
+    before: Reading
+    after: Reading
+
+    @property
+    def met(self) -> bool:
+        """Whether it is met after the change."""
+        return self.after.excess == 0.0
+
+
+def wished(wish: Wish) -> dict[str, str]:
+    """The requirements of a wish and what each asks for, in words."""
+    found: dict[str, str] = {}
+    if wish.no_resonance:
+        found[RESONANCE] = f"none from {wish.say(*wish.without_resonance, joint=' to ')}"
+    if wish.no_jump:
+        found[JUMP] = "none"
+    if wish.judged:
+        found[STABLE] = f"largest multiplier at most {wish.radius:.6g}"
+    found |= {str(limit): f"below {limit.below:.6g} {limit.unit}" for limit in wish.limits}
+    return found if wish.judged else found | {STABLE: "one at each place of the range"}
+
+
+def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
+    """What there is of each requirement; ``several`` are places at which two stable motions were found."""
+    wish, result = found.wish, {}
+    if wish.no_resonance:
+        peaks = [(spot.level, spot.level) for spot in found.peaks]
+        result[RESONANCE] = _of_levels(wish, peaks, "at {}", wish.without_resonance)
+    if wish.no_jump:
+        jumps = [(region.low, region.high) for region in found.folds]
+        text = _of_levels(wish, jumps, "between {}", wish.span)
+        if not jumps and several:
+            text = Reading(
+                text=f"two stable motions at {wish.say(*several)}",
+                excess=(wish.span[1] - wish.span[0]) / wish.size,
+                missed=f"at {wish.say(*several)} there is a second stable motion",
+            )
+        result[JUMP] = text
+    if wish.judged:
+        value, level = found.largest
+        over = value - wish.radius if value > wish.radius + MARGINAL else 0.0
+        text_of = f"largest multiplier {value:.7g} at {wish.say(level)}"
+        result[STABLE] = Reading(text=text_of, excess=over, missed=f"{text_of}, {over:.3g} too much" if over else "")
+    for limit in wish.limits:
+        greatest = max((top for top in found.greatest if top.limit is limit), key=lambda top: top.value)
+        over = greatest.value / limit.below - 1.0
+        over = over if over > NO_EXCESS else 0.0
+        text_of = f"{greatest.value:.6g} {limit.unit} at {wish.say(greatest.spot.level)}"
+        missed = f"{text_of}, {greatest.value - limit.below:.3g} {limit.unit} too much" if over else ""
+        result[str(limit)] = Reading(text=text_of, excess=over, missed=missed)
+    if not wish.judged:
+        result[STABLE] = _stable_everywhere(found)
+    return result
+
+
+def _stable_everywhere(found: Survey) -> Reading:
+    """Return the reading of the requirement that there is a stable motion everywhere in the range."""
+    if not found.unstable:
+        return Reading(text="everywhere")
+    wish = found.wish
+    text = f"none from {', '.join(wish.say(*ends, joint=' to ') for ends in found.unstable)}"
+    width = sum(high - low for low, high in found.unstable)
+    return Reading(text=text, excess=width / wish.size, missed=text)
+
+
+def _of_levels(wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]) -> Reading:
+    """Return the reading of what should not lie in a span, by its intervals."""
+    if not intervals:
+        return Reading(text="none")
+    low, high = span
+    text = ", ".join(words.format(wish.say(a) if a == b else f"{wish.say(a)} and {wish.say(b)}") for a, b in intervals)
+    away = max(min(b - low, high - a) for a, b in intervals)
+    return Reading(text=text, excess=away / wish.size, missed=f"{text}, {wish.say(away)} from the nearer end")
+
+
+def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tuple[Requirement, ...]:
+    """Each requirement before and after the change."""
+    first, last = readings(before), readings(after, several)
+    return tuple(
+        Requirement(name=name, wished=text, before=first[name], after=last[name])
+        for name, text in wished(before.wish).items()
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """What was computed anew with the changed parameters.
+
+    Attributes
+    ----------
+    orbits : int
+        Of the response that was followed over the range.
+    charted, largest, place : int, float, str
+        Points of a chart's row over the range, the largest multiplier there, and where.
+    sought : int
+        Places at which all motions were sought.
+    several : str
+        Those with more than one stable motion.
+    problems : tuple of str
+        What could not be followed or verified; empty where everything was.
+    """
+
+    orbits: int
+    charted: int
+    largest: float
+    place: str
+    sought: int
+    several: str
+    problems: tuple[str, ...]
+
+    def __str__(self) -> str:
+        chart = f"largest multiplier {self.largest:.6g} at {self.place}"
+        several = "one stable motion at most at each"
+        if self.several:
+            several = f"two stable ones at {self.several}"
+        return (
+            f"response followed anew over {format_count(self.orbits, 'motion')}; row of a chart at {self.charted} points: "
+            f"{chart}; all motions sought at {self.sought}: {several}"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tuned(Shown):
+    """The least change after which a range of speeds is as it was wished; or, where none is, what comes nearest.
+
+    Attributes
+    ----------
+    wish : Wish
+    x : ndarray, shape (k,)
+        The changes in their tolerances.
+    requirements : tuple of Requirement
+    before, after : Survey
+    verification : Verification
+    rounds : int
+        Times that the program was solved, over all ways that were tried.
+    """
+
+    wish: Wish
+    x: FloatArray
+    requirements: tuple[Requirement, ...]
+    before: Survey
+    after: Survey
+    verification: Verification
+    rounds: int
+
+    def __repr__(self) -> str:
+        changed = ", ".join(
+            f"{n} {a:.6g} -> {b:.6g}" for n, a, b in zip(self.wish.names, self.wish.present, self.values)
+        )
+        return f"<Tuned: {changed}; {'met' if self.met else 'not met: ' + '; '.join(self.missed)}>"
+
+    @property
+    def parameters(self) -> Parameters:
+        """After the change."""
+        return self.wish.operation(self.x, self.wish.span[0])[0]
+
+    @property
+    def values(self) -> FloatArray:
+        """Of what may be changed, after it; shape (k,)."""
+        return self.wish.present + self.x * self.wish.tolerance
+
+    @property
+    def met(self) -> bool:
+        """Whether all of the wish is met, as far as could be verified."""
+        return not self.missed
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """What is not met and by how much, a sentence each, and what could not be verified."""
+        return (
+            *(f"{r.name} cannot be met: {r.after.missed}" for r in self.requirements if not r.met),
+            *self.verification.problems,
+        )
+
+    def tables(self) -> dict[str, Any]:
+        """Everything as nested tables, for a file; numbers in SI."""
+        wish, v = self.wish, self.verification
+        return {
+            "met": self.met,
+            "missed": list(self.missed),
+            "over": wish.over,
+            "between": list(wish.span),
+            "changes": {
+                name: {"before": before, "after": after, "tolerance": tolerance, "in tolerances": x}
+                for name, before, after, tolerance, x in zip(
+                    wish.names, *(a.tolist() for a in (wish.present, self.values, wish.tolerance, self.x))
+                )
+            },
+            "requirements": {
+                r.name: {"wished": r.wished, "before": r.before.text, "after": r.after.text, "met": r.met}
+                for r in self.requirements
+            },
+            "verification": {
+                "orbits": v.orbits,
+                "charted": v.charted,
+                "largest multiplier": v.largest,
+                "its place": v.place,
+                "sought": v.sought,
+                "several": v.several,
+            },
+            "parameters": parameters_to(self.parameters),
+        }
