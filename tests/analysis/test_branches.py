@@ -25,9 +25,10 @@ from analysis.periodic import (
     switch,
 )
 from analysis.periodic.response.branch import _of_a_turn
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 
 SPEED = SETS["table-3.1"].crank_speed
 RPM = RAD_S_PER_RPM

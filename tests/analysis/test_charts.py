@@ -26,9 +26,10 @@ from analysis.periodic import (
 )
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import grid as grids
+from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 
 RPM = RAD_S_PER_RPM
 DRIVE = Drive(speed=60.0)

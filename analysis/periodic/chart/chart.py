@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
 
+from ...display import Shown, format_count, format_range
 from ...files import write_csv
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count, format_range
 from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import shown, takes_published

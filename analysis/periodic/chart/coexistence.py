@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count
 from ...files import write_csv
 from ...mechanisms import Parameters
-from ...notebook import Shown, format_count
 from ...run import takes_published
 from ..motion.discretisation import OperatingPoint
 from ..motion.drive import Drive, extent_of, starts_of

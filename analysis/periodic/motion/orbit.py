@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
+from ...display import Shown, format_count
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...numerics.continuation import Evaluation
 from ...run import outputs_of, takes_published
 from ...units import RAD_S_PER_RPM

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count
 from ...mechanisms import InitialState, Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...run import Inputs, driven, started, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error

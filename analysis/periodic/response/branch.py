@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count, format_range
 from ...files import write_csv
 from ...mechanisms import mechanism_of
-from ...notebook import Shown, format_count, format_range
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
 from ..motion.discretisation import AIM, GROWTH, PLACES, OrbitError, choose_pieces
 from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test

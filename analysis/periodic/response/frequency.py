@@ -21,9 +21,9 @@ from linkwork.errors import InputError, Interrupted, ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
+from ...display import Shown, format_count
 from ...files import write_csv
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
 from ...numerics.workers import interruptible
