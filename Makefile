@@ -70,7 +70,7 @@ release: $(DEV)
 	$(BIN)/python build_fmu.py --platforms all --dest dist --publish dist/compatibility
 
 $(RUN): pyproject.toml | $(BIN)/pip
-	$(BIN)/pip install --quiet --editable '.[native]'
+	$(BIN)/pip install --quiet --editable '.[all]'
 	@touch $@
 
 $(DEV): pyproject.toml | $(BIN)/pip

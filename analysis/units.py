@@ -6,11 +6,14 @@ import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from inspect import signature
-from math import inf, isfinite, pi
+from math import inf, isfinite
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 from linkwork.errors import ParameterError
+from linkwork.units import CM_PER_METRE as CM_PER_METRE
+from linkwork.units import INCH as INCH
+from linkwork.units import RAD_S_PER_RPM as RAD_S_PER_RPM
 
 #: A number in SI, or a text with its unit such as "420 rpm", of which `in_si` makes a float; also an array or a list of them.
 Amount = Any
@@ -19,9 +22,6 @@ Units = str | Mapping[str, str] | Callable[[], Mapping[str, str]]
 
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 
-RAD_S_PER_RPM = pi / 30.0
-CM_PER_METRE = 1e2
-INCH = 0.0254
 #: Units of length (m).
 LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})
 

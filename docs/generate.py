@@ -162,8 +162,9 @@ def study_pictures() -> Iterator[Picture]:
     from analysis import figures as draw
     from analysis.periodic import frequency_response
     from analysis.studies import load
+    from analysis.units import RAD_S_PER_RPM
     from analysis.youssef import approximations
-    from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+    from linkwork.five_bar.published import SETS
 
     for name, number in (
         ("linkage", "linkage"),
@@ -245,7 +246,8 @@ def slider_crank_pictures() -> Iterator[Picture]:
 
     from analysis.figures import plot_mechanism, plot_range, plot_tolerances
     from analysis.slider_crank import Tolerance, force_turn, monte_carlo
-    from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
+    from analysis.units import INCH
+    from linkwork.slider_crank.published import CRANK_SPEED, SETS, parameters
 
     case = SETS["rahman-a4-10-s1-3.5"]
     shift = case.initial.shift_position

@@ -9,8 +9,8 @@ import click
 
 from linkwork.errors import InputError
 
+from ..display import format_count
 from ..mechanisms import mechanism_of
-from ..notebook import format_count
 from .common import console, folder_of, html_option, quantity, save_picture, say, show_table, workers_options
 from .driven import Chosen, about_a_case, swing_of
 

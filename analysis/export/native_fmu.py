@@ -5,7 +5,6 @@ Model exchange and co-simulation in one archive, FMI 2.0 or 3.0. The sources tra
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import platform as machine
 import struct
@@ -20,6 +19,7 @@ from typing import NamedTuple
 from linkwork.mechanism import Mechanism
 
 from ..files import unknown_name
+from ..libraries import require
 from ..mechanisms import check
 from ..numerics.codegen import code_folder
 from ..run import shown
@@ -166,10 +166,11 @@ def compile_library(
     Raises
     ------
     BuildError
-        With what the compiler printed, if it failed, or if it is not installed.
+        With what the compiler printed, if it failed.
+    MissingLibraryError
+        If Zig is not installed.
     """
-    if importlib.util.find_spec("ziglang") is None:
-        raise BuildError("native FMUs are compiled by Zig, which is not installed: pip install 'linkwork[native]'")
+    require("ziglang")
     cache = code_folder("zig")
     known = cache / f"{target}.known"
     if not known.is_file():

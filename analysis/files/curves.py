@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
+from ..libraries import require
 from ..units import INCH, LENGTHS, quantity
 from .paths import ending_of, first_line, is_number, read_text
 from .reader import unknown_name
@@ -116,6 +117,7 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
 
 
 def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:
+    require("svgelements")
     from io import StringIO
     from xml.etree import ElementTree
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, ParameterError
 
+from ..libraries import require
 from ..units import LENGTHS
 from .outputs import output, write_text
 from .paths import ending_of
@@ -277,6 +278,7 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     ParameterError
         If the unit is not known.
     """
+    require("ezdxf")
     from ezdxf.filemanagement import new
     from ezdxf.version import __version__
 

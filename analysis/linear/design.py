@@ -13,17 +13,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, pi
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
+from ..libraries import lazy
 from ..run import Function
 from ..units import Amount, in_si
 from .model import FloatArray, LinearModel, LinearModelError, signal_name, sorted_by_magnitude
+
+if TYPE_CHECKING:
+    import control
+else:
+    control = lazy("control")
 
 
 class DesignError(LinkworkError):

@@ -15,9 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,9 +24,15 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..files import unknown_name
+from ..libraries import lazy
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
 from ..run import Inputs, encode, expressions, given, sample, takes_published
+
+if TYPE_CHECKING:
+    import control
+else:
+    control = lazy("control")
 
 FloatArray = NDArray[np.float64]
 #: Values of a mechanism's modes, in its order.

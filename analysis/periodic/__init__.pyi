@@ -2,12 +2,10 @@ from .chart.boundary import CrossingCurve as CrossingCurve
 from .chart.boundary import Monodromy as Monodromy
 from .chart.boundary import RemovalError as RemovalError
 from .chart.boundary import RemovingDamping as RemovingDamping
-from .chart.boundary import WorstDamping as WorstDamping
 from .chart.boundary import follow_crossing as follow_crossing
 from .chart.boundary import orbit_monodromy as orbit_monodromy
 from .chart.boundary import orbit_test as orbit_test
 from .chart.boundary import removing_damping as removing_damping
-from .chart.boundary import removing_damping_over as removing_damping_over
 from .chart.boundary import test_of as test_of
 from .chart.chart import OTHER_ORBIT as OTHER_ORBIT
 from .chart.chart import TRUE_ORBIT as TRUE_ORBIT

@@ -14,7 +14,7 @@ from typing import Literal
 
 from linkwork.errors import InputError, Interrupted
 
-from ..notebook import format_count
+from ..display import format_count
 from ..synthesis import (
     QUICK_SEARCH,
     USUAL,

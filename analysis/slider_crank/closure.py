@@ -26,11 +26,10 @@ from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH
 
 from ..numerics.dual import Array, Dual, about_i, about_j, about_k, axial, origin, skew, stack
 from ..run import takes_published
-from ..units import Amount, in_si
+from ..units import INCH, Amount, in_si
 from .quantities import FloatArray
 
 #: Largest residual of a closed loop: rotation in radians, and length as a share of the links' lengths together.

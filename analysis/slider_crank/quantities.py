@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
-from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
+from linkwork.slider_crank.published import POUND_FORCE, POUND_INCH
 
 from ..files import unknown_name
+from ..units import INCH
 
 FloatArray: TypeAlias = NDArray[np.float64]
 MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..display import Shown, format_count
 from ..mechanisms import Parameters
-from ..notebook import Shown, format_count
 from ..run import parameters_to
 from .conditions import FloatArray
 from .survey import MARGINAL, Survey

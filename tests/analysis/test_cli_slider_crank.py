@@ -16,8 +16,9 @@ from analysis import cli, figures
 from analysis.cli import slider_crank
 from analysis.run import save_parameters
 from analysis.slider_crank import ConstantShift, dual_dynamics, force_turn
+from analysis.units import INCH
 from linkwork.five_bar.published import TABLE_3_1
-from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, parameters
 from tests import published_rahman as rahman
 
 from .conftest import csv

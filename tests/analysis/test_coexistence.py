@@ -34,9 +34,10 @@ from analysis.periodic import (
 )
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart.boundary import branches_on
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 #: The module, whose name in the package is that of its function.
 coexistences = import_module("analysis.periodic.chart.coexistence")

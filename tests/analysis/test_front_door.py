@@ -42,7 +42,7 @@ from analysis import (
     table,
     variant,
 )
-from analysis.notebook import format_count
+from analysis.display import format_count
 from analysis.run import published_case
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 

@@ -42,8 +42,9 @@ from analysis.periodic.motion.discretisation import operating_point, period_from
 from analysis.periodic.motion.drive import scale_of
 from analysis.periodic.motion.variables import unit_of, value_of, with_values
 from analysis.periodic.stability import sensitivity as gradients
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.slider_crank import published as rahman
 from tests.mechanisms import rotor_on_cart
 from tests.strategies import seeded

@@ -20,8 +20,9 @@ from analysis.periodic import (
     orbit_of,
 )
 from analysis.periodic.stability.nonlinear import Forms, coefficient_of
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 RPM = RAD_S_PER_RPM
 

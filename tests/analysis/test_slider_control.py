@@ -28,9 +28,10 @@ from analysis.linear import (
     predict_loop,
     settled_motion,
 )
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, UnknownNameError
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 
 pytest.importorskip("casadi")
 

@@ -16,10 +16,11 @@ from analysis.numerics.dual import Dual, about_i, about_j, about_k
 from analysis.slider_crank import ClosureError, close, follow, shortage
 from analysis.slider_crank import closure as C
 from analysis.slider_crank.closure import planar_loops, residuals
+from analysis.units import INCH
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH, parameters
+from linkwork.slider_crank.published import parameters
 from tests.published_rahman import GREATEST_SHIFTS_IN, OFFSETS_IN, SHIFTS_IN, TWISTS_DEG
 from tests.slider_cranks import Case, cases
 

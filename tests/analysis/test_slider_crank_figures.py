@@ -23,8 +23,9 @@ from analysis.slider_crank import (
     force_turn,
     monte_carlo,
 )
+from analysis.units import INCH
 from linkwork.errors import InputError
-from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 
 ANGLES = np.linspace(0.0, tau, 25)
 SIGMA = 1e-4 * (2.0 + np.cos(ANGLES))

@@ -16,8 +16,9 @@ from PIL import Image
 from analysis.figures import animate_mechanism, plot_mechanism, plot_range, solids
 from analysis.figures import slider_crank_picture as pictures
 from analysis.slider_crank import constant_shift, groove_shift
+from analysis.units import INCH
 from linkwork.errors import AssemblyError, InputError
-from linkwork.slider_crank.published import INCH, parameters
+from linkwork.slider_crank.published import parameters
 from tests import published_rahman as rahman
 from tests.slider_cranks import Case, cases
 

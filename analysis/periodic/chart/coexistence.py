@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count
 from ...files import write_csv
 from ...mechanisms import Parameters
-from ...notebook import Shown, format_count
 from ...run import takes_published
 from ..motion.discretisation import OperatingPoint
 from ..motion.drive import Drive, extent_of, starts_of
@@ -29,13 +29,10 @@ from .grid import Keeping, code_of, grid_points, row_name, row_points, row_searc
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 
 FloatArray = NDArray[np.float64]
-
 #: Starts from which the motions of a point are sought, after those of its neighbour: a power of two.
 STARTS = 16
-
 #: Samples of a turn for an amplitude.
 SAMPLES = 64
-
 #: Bound of the integrator's local error of a basin, distance from a motion, relative to the scale, at which a start has
 #: arrived, and turns at most.
 _TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000

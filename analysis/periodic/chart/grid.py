@@ -33,7 +33,6 @@ from .kernels import Points, Row, Search
 
 FloatArray = NDArray[np.float64]
 Item = TypeVar("Item")
-
 #: Starts from which the orbit of a point is sought if it is not found from its neighbour: a power of two.
 STARTS = 32
 

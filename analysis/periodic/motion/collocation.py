@@ -26,20 +26,14 @@ from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate
 
 #: Nodes of an element.
 NODES = 12
-
 #: Nodes and weights on an element of length 1, integrals of the Lagrange polynomials up to each node, and their integrals.
 C, B, A, _COEFFICIENTS = gauss(NODES)
-
 AA = np.ascontiguousarray(A @ A)
-
 BA = B @ A
-
 #: The two highest Legendre coefficients.
 TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
-
 #: `tail` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
 DECAY = 200.0
-
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 
@@ -240,13 +234,7 @@ def correct_period(section, angles, y, w, desk):
         after = y[(e + 1) % m]
         for i in range(n):
             ends[e, i] -= after[i]
-        for j in range(n):
-            for i in range(n):
-                column[i] = 0.0
-                for k in range(n):
-                    column[i] += matrices[e, i, k] * monodromy[k, j]
-            for i in range(n):
-                monodromy[i, j] = column[i]
+        _chain(matrices[e], monodromy, column)
     # carry the gaps between the elements to the end of the period
     for i in range(n):
         shift[i] = 0.0
@@ -278,6 +266,19 @@ def correct_period(section, angles, y, w, desk):
                 return np.nan
         _carry(matrices[e], ends[e], shift, column)
     return size
+
+
+@inner
+def _chain(matrix, product, column):
+    """Multiply a product of matrices by the next one from the left, in place."""
+    n = product.shape[0]
+    for j in range(n):
+        for i in range(n):
+            column[i] = 0.0
+            for k in range(n):
+                column[i] += matrix[i, k] * product[k, j]
+        for i in range(n):
+            product[i, j] = column[i]
 
 
 @inner
@@ -492,13 +493,7 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
             else:
                 return DIVERGED
             tails[e] = tail(h, scale, section.along, w[e], moves[e])
-            for j in range(n):
-                for i in range(n):
-                    column[i] = 0.0
-                    for k in range(n):
-                        column[i] += matrix[i, k] * whole[k, j]
-                for i in range(n):
-                    whole[i, j] = column[i]
+            _chain(matrix, whole, column)
             _carry(matrix, slope, along, column)
             copy(end, start)
         for i in range(n):

@@ -35,7 +35,6 @@ from .flow import DIRECTIONAL, GAP, PLAIN, VARIATIONAL, Flow
 from .kernels import Section, Status
 
 FloatArray = NDArray[np.float64]
-
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
 INTEGRATOR_TOLERANCE = 1e-12
 #: Growth of a deviation over a period, or over one of its pieces, from which it is divided into (more) pieces; growth aimed at

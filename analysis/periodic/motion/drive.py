@@ -290,10 +290,8 @@ def drive_of(
 
 #: Distance of two starts, relative to the scale, below which they are of one motion.
 SAME = 1e-6
-
 #: How far starts reach where no limit of assembly is met, in the scale of y, and the step to it.
 _WIDEST, _WIDER = 16.0, 1.25
-
 #: Crank speeds of starts under a torque, relative to the guess.
 _SPEEDS = (0.25, 1.5)
 

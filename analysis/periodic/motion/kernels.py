@@ -36,7 +36,6 @@ class Status(IntEnum):
 
 # the same as plain numbers, for the compiled code
 DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
-
 #: Each failure in words.
 REASONS = {
     Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
@@ -44,13 +43,10 @@ REASONS = {
     Status.STALLED: "the crank comes to rest within the period",
     Status.DIVERGED: "Newton's method does not converge",
 }
-
 #: Least step of the integrator (rad).
 _LEAST_STEP = 1e-9
-
 #: Crank speed below which the crank counts as stalled, relative to its speed at the start.
 _STALL = 1e-3
-
 #: Least fraction of a Newton correction that is tried: in Newton's method, and in the search for other motions.
 _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 

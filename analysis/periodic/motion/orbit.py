@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
+from ...display import Shown, format_count
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...numerics.continuation import Evaluation
 from ...run import outputs_of, takes_published
 from ...units import RAD_S_PER_RPM
@@ -43,7 +43,6 @@ from .kernels import Status
 from .variables import Family
 
 FloatArray = NDArray[np.float64]
-
 #: Largest correction relative to the scale at which a solution counts as found.
 ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction in the scale of y. What it

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count
 from ...mechanisms import InitialState, Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...run import Inputs, driven, started, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
@@ -39,7 +39,6 @@ from .orbit import (
 )
 
 FloatArray = NDArray[np.float64]
-
 #: Turns for which a motion that lost its stability is followed to the next steady one, and the change per turn that ends it.
 JUMP_TURNS, SETTLED = 5000, 1e-9
 #: Relative change of the amplitude from one speed to the next beyond which the step is halved, and halvings at most.
@@ -220,10 +219,8 @@ def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
 
 #: Starts of the two methods in a round, and rounds at most.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
-
 #: Distance, relative to the scale, below which a motion that a search without deflation approaches counts as known.
 _NEAR = 1e-4
-
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
 

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, POUND_FORCE, POUND_INCH, parameters
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...slider_crank import (
@@ -35,6 +35,7 @@ from ...slider_crank import (
     joint_loads,
     ranges,
 )
+from ...units import INCH
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
 from .table import (
     AXIAL_LB,

@@ -13,12 +13,13 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, parameters
 
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...numerics.dual import Dual, about_i, about_j, about_k, axial
 from ...slider_crank import CLEAR_DEG, Settled, assembly_margin, constant_shift, greatest_shift, settle
 from ...slider_crank.closure import Rows, chain, equations, freedoms, planar, residuals
+from ...units import INCH
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
 from .figures import ANGLE, ANGLES_DEG, CRANK, NOTHING, TORQUE, clear, dead_centres_deg, printed, printed_symbol, values
 from .printed import (

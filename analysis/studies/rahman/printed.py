@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH, POUND_FORCE
+from linkwork.slider_crank.published import POUND_FORCE
 
 from ...numerics.dual import Dual, about_i, about_j, about_k, cross
 from ...slider_crank import settle
 from ...slider_crank.closure import Rows, chain
+from ...units import INCH
 
 FloatArray = NDArray[np.float64]
 

@@ -19,11 +19,12 @@ from math import asin, log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, DYN_CM_PER_NEWTON_METRE, RAD_S_PER_RPM
+from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import mean_effective_mass
 from ...run import Event, Inputs, Trajectory, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded
 from . import free_crank
 from .runs import (

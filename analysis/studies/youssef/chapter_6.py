@@ -19,8 +19,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import (
     LINKS,
@@ -36,8 +34,9 @@ from ...synthesis import (
     trade_off,
     turn,
 )
-from ...synthesis.published import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
+from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from .problems import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 
 FloatArray = NDArray[np.float64]
 

@@ -14,11 +14,10 @@ from math import atan2, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...numerics.decay import fit_decay
 from ...periodic import mean_effective_mass
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, unjudged
 from . import rig_1, rig_2
 from .rigs import (

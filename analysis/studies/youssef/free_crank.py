@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.published import CM_PER_METRE, DYN_CM_PER_NEWTON_METRE, RAD_S_PER_RPM
+from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
 from .runs import LINEAR, ON_THE_GRAPH, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
 

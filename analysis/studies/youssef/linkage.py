@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import Figure, animate_linkage, draw_linkage
 from ...run import Inputs, Trajectory, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, Study, StudyResult, at_most
 from .runs import SPEED, table_3_1
 

@@ -7,10 +7,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Crossing, PeriodicOrbit, SpecialPoint, Sweep, sweep
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, unjudged
 from .rigs import (
     FASTEST,

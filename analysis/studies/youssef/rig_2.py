@@ -8,10 +8,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Branch
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, nonlinear_harmonic_balance, slider_equation, two_harmonics
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
 from .rigs import (

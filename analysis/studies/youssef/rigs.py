@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 from ...figures import Curve
 from ...periodic import (
@@ -28,6 +28,7 @@ from ...periodic import (
     frequency_response,
     natural_frequency,
 )
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, StudyResult, Verdict, at_most
 from .runs import SETTLING_TIME, steady_turn
 

@@ -14,14 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.published import (
-    CM_PER_METRE,
-    DYN_PER_CM_PER_NEWTON_PER_METRE,
-    RAD_S_PER_RPM,
-    TABLE_3_1,
-)
+from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE, TABLE_3_1
 
 from ...run import Inputs, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 
 #: Crank speed of chapter III (rpm).
 SPEED = 420.0

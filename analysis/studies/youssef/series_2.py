@@ -18,10 +18,8 @@ from math import degrees, pi, radians
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE
-
+from ...display import format_count
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...notebook import format_count
 from ...numerics.fourier import FourierSeries
 from ...slider import slider_motion
 from ...synthesis import (
@@ -35,9 +33,10 @@ from ...synthesis import (
     evaluate,
     turn,
 )
-from ...synthesis.published import PROBLEMS, WEIGHT, packaging_path
+from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
 from .chapter_7 import slider
+from .problems import PROBLEMS, WEIGHT, packaging_path
 
 FloatArray = NDArray[np.float64]
 
