@@ -24,19 +24,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.studies.youssef.problems import AREA_N, PACKAGING_FLATNESS, PACKAGING_ROTATION, PACKAGING_TRAVEL, N
 from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
-from analysis.synthesis.black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
-from analysis.synthesis.constraints import Constraint, Limits, limits_of
-from analysis.synthesis.overlap import symmetric_difference
-from analysis.synthesis.published import (
-    AREA_N,
-    PACKAGING_FLATNESS,
-    PACKAGING_ROTATION,
-    PACKAGING_TRAVEL,
-    N,
-)
-from analysis.synthesis.starts import linkage_of
-from analysis.synthesis.tasks import Normal, Task
+from analysis.synthesis.linkage.kernels import symmetric_difference
+from analysis.synthesis.search.start import linkage_of
+from analysis.synthesis.task.constraint import Constraint
+from analysis.synthesis.task.limits import Limits, limits_of
+from analysis.synthesis.task.task import Normal, Task
+
+from .black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -28,13 +28,14 @@ from scipy.optimize import OptimizeResult
 from threadpoolctl import threadpool_limits
 
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
-from analysis.synthesis.black_box import PENALTY, BlackBox, descend_from, evolve
-from analysis.synthesis.constraints import USUAL, Constraint, limits_of
-from analysis.synthesis.kernels import coupler_path
-from analysis.synthesis.overlap import nearest, symmetric_difference
-from analysis.synthesis.refine import divided
-from analysis.synthesis.starts import linkage_of
-from analysis.synthesis.tasks import Normal
+from analysis.synthesis.linkage.kernels import coupler_path, nearest, symmetric_difference
+from analysis.synthesis.search.refine import divided
+from analysis.synthesis.search.start import linkage_of
+from analysis.synthesis.task.constraint import USUAL, Constraint
+from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.task import Normal
+
+from .black_box import PENALTY, BlackBox, descend_from, evolve
 
 FloatArray = NDArray[np.float64]
 

@@ -35,9 +35,9 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from analysis.synthesis import InfeasibleError, Search, synthesize
-from analysis.synthesis.black_box import BlackBox
-from analysis.synthesis.starts import start_of
+from analysis.synthesis.search.start import start_of
 
+from .black_box import BlackBox
 from .contest import (
     BlackBoxSearch,
     Contest,

@@ -36,6 +36,7 @@ from rich.console import Console
 from rich.table import Table
 
 from analysis.numerics.tracing import rebound
+from analysis.studies.youssef.problems import PROBLEMS, WEIGHT, N, ellipse
 from analysis.synthesis import (
     LargestLink,
     Linkage,
@@ -46,21 +47,15 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.black_box import DRAWS, BlackBox, descend_from
-from analysis.synthesis.constraints import limits_of
-from analysis.synthesis.kernels import coupler_path, coupler_path_jacobian
-from analysis.synthesis.polish import Polisher, fit_least_squares, quality_of
-from analysis.synthesis.published import (
-    PROBLEMS,
-    WEIGHT,
-    N,
-    ellipse,
-)
-from analysis.synthesis.scan import scan
-from analysis.synthesis.starts import Start, linkage_of, start_of
-from analysis.synthesis.tasks import Normal
+from analysis.synthesis.linkage.kernels import coupler_path, coupler_path_jacobian
+from analysis.synthesis.search.polish import Polisher, fit_least_squares, quality_of
+from analysis.synthesis.search.scan import scan
+from analysis.synthesis.search.start import Start, linkage_of, start_of
+from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics
 
+from .black_box import DRAWS, BlackBox, descend_from
 from .contest import PHASES, SEARCHES, Contest, PlacedFourBar, Trace, by_freudenstein, searched
 
 FloatArray = NDArray[np.float64]

@@ -145,10 +145,10 @@ def write_solution(
     pivot = solution.linkage.pivot
     slides = solution.linkage.slides
     if not (slides or isinstance(pivot, SecondCrank)):
-        written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
+        written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution.linkage)))
     if pivot is None:
         case = folder / ("slider-crank.toml" if slides else "five-bar.toml")
-        written.append(write_tables(case, make.run_case(solution, title)))
+        written.append(write_tables(case, solution.run_case(make, title)))
     if isinstance(pivot, SecondCrank):
         say(
             "no case to run: the house has no mechanism with two geared cranks; its drawings, sheet and curve are written"
@@ -180,14 +180,12 @@ def _forces(solution: Solution, make: Any) -> PinForces | None:
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
 @set_option("constraints.largest_link='300 mm' or task.n=36; lists as in TOML")
-@click.option("--method", help="scan, differential-evolution or simplex; the last two for comparison.")
 @search_options
 @click.option("--animate", is_flag=True, help="Write a GIF of the first linkage over a turn, too.")
 @handled
 def synthesize(
     case: str,
     settings: Sequence[str],
-    method: str | None,
     objective: str | None,
     seed: int | None,
     jobs: int | None,
@@ -218,9 +216,7 @@ def synthesize(
         load_synthesis_case,
     )
 
-    overrides = overrides_of(
-        settings, search__method=method, task__objective=objective, search__seed=seed, search__jobs=jobs
-    )
+    overrides = overrides_of(settings, task__objective=objective, search__seed=seed, search__jobs=jobs)
     check_kind(case, SYNTHESIS)
     chosen = load_synthesis_case(case, overrides)
     stopped: Interrupted | None = None

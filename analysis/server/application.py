@@ -17,7 +17,7 @@ from urllib.parse import parse_qs
 from linkwork.errors import InputError
 
 from ..libraries import MissingLibraryError
-from ..mechanisms import Kind
+from ..synthesis import Kind
 from .worker import Busy, Worker
 
 try:

@@ -144,7 +144,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
 
 def _state(solution: Solution, title: str) -> Answer:
-    state = state_of(case_from(Make().run_case(solution, title), folder=Path(), title=title))
+    state = state_of(case_from(solution.run_case(Make(), title), folder=Path(), title=title))
     # the path says nothing of the way in which the crank turns, and the page seeks periodic motions of one way
     state["values"]["drive.speed"] = abs(state["values"]["drive.speed"])
     return state

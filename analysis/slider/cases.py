@@ -48,7 +48,6 @@ from ..synthesis import (
     Task,
     TimedPath,
     UntimedPath,
-    direction,
     synthesis_case_from,
     synthesize,
 )
@@ -236,7 +235,7 @@ class SliderCase:
             bounds=bounds,
             constraints=self._constraints,
             guesses=guesses,
-            search=search.search(method="scan", starts=self.slider.starts, progress=progress),
+            search=search.search(starts=self.slider.starts, progress=progress),
         )
 
     def simplest(self, *, progress: bool = False) -> Strategy:
@@ -258,7 +257,7 @@ class SliderCase:
         """Force, torque and pin forces of the motion; the crank turns the way the task is done."""
         wanted = self.drive
         assert wanted is not None
-        speed = direction(solution) * wanted.speed
+        speed = solution.direction * wanted.speed
         motion, parameters = motion_of_plant(solution.linkage), self.synthesis.make.moving(solution.linkage)
         load = (0.0, 0.0) if self.load is None else (self.load.fx, self.load.fy)
         if wanted.best_spring:

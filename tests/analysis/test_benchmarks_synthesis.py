@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import Linkage, Search, evaluate, turn
-from analysis.synthesis.black_box import PENALTY
-from analysis.synthesis.published import PROBLEMS
-from analysis.synthesis.starts import start_of
+from analysis.synthesis.search.start import start_of
+from benchmarks.black_box import PENALTY
 from benchmarks.contest import (
     SEARCHES,
     Contest,

@@ -25,6 +25,7 @@ from analysis.synthesis import (
     LargestLink,
     LeastTransmission,
     Linkage,
+    Make,
     Motion,
     PivotRegion,
     PrecisionPoints,
@@ -34,15 +35,14 @@ from analysis.synthesis import (
     TimedPath,
     TradeOff,
     TradeOffInterrupted,
-    cases,
     load_synthesis_case,
     synthesis_case_from,
     turn,
 )
-from analysis.synthesis.case_tasks import KINDS
-from analysis.synthesis.constraints import UNKNOWNS
-from analysis.synthesis.requirements import requirement
-from analysis.synthesis.user_functions import traced
+from analysis.synthesis.case import case as cases
+from analysis.synthesis.case.tables import KINDS
+from analysis.synthesis.task.constraint import UNKNOWNS
+from analysis.synthesis.task.formula import requirement, traced
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 ROOT = Path(__file__).parents[2]
@@ -133,10 +133,7 @@ def test_options_and_settings_reach_the_search(linkwork, tmp_path) -> None:
     assert first == second
     assert not list(Path("a").glob("*.png"))
     assert len(np.genfromtxt("a/best-curve.csv", delimiter=",", skip_header=1)) == 36
-    for option, value, code, said in (
-        ("--method", "simplx", cli.WRONG, "did you mean simplex?"),
-        ("--jobs", 0, 2, "0 is neither -1, for all, nor a number of cores"),
-    ):
+    for option, value, code, said in (("--jobs", 0, 2, "0 is neither -1, for all, nor a number of cores"),):
         result = linkwork("synthesize", "case.toml", option, value)
         assert result.exit_code == code
         assert said in " ".join(result.stderr.split())
@@ -148,11 +145,11 @@ def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
     given = {}
     monkeypatch.setattr(cases, "synthesize", lambda *arguments, **more: given.update(more))
     monkeypatch.setattr(cases, "trade_off", lambda *arguments, **more: given.update(limits=arguments[2], **more))
-    search = '[search]\nmethod = "simplex"\nseed = 5\ncandidates = 99\nstarts = 7\nsolutions = 2\njobs = 2\n'
+    search = "[search]\nseed = 5\ncandidates = 99\nstarts = 7\nsolutions = 2\njobs = 2\n"
     search += 'kinds = ["slider-crank", "geared-five-bar"]\ngears = [2]\n'
     found = case(ELLIPSE + search + '[trade_off]\nover = "size"\nlimits = [1, 2]\nstarts = 3\n', tmp_path)
     found.solve(progress=True)
-    search = Search(seed=5, method="simplex", candidates=99, starts=7, solutions=2, n_jobs=2, progress=True)
+    search = Search(seed=5, candidates=99, starts=7, solutions=2, n_jobs=2, progress=True)
     which = {"kinds": ("slider-crank", "geared-five-bar"), "gears": (2.0,)}
     assert given == {"search": search, **which}
     given.clear()
@@ -174,7 +171,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     task = Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
     solution = Solution.of(task, linkage)
     assert not solution.verdicts.full_turn
-    ran = case_from(cases.Make(speed=3.0).run_case(solution, "swing"), folder=tmp_path)
+    ran = case_from(solution.run_case(Make(speed=3.0), "swing"), folder=tmp_path)
     motion = simulate(
         ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
     )
@@ -294,7 +291,6 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         (ELLIPSE + "[constraints]\nassembly = 2", "be +1 or -1"),
         (ELLIPSE + "[constraints]\npivot_A = [[0, 0], [1, 1]]", "at least 3 finite corners"),
         (ELLIPSE + '[constraints]\nrequire = ["crank_lenght <= 3 mm"]', "did you mean crank_length?"),
-        (ELLIPSE + '[search]\nmethod = "simplx"', "did you mean simplex?"),
         (ELLIPSE + "[search]\nstarts = 0", "search.starts is 0: it must be at least 1"),
         (ELLIPSE + "[search]\njobs = 0", "a number of cores, or -1"),
         (ELLIPSE + '[make]\nspeed = "1 Hz"', "be in rad/s or rpm"),

@@ -137,7 +137,7 @@ def test_curve_of_four_poses(seed: int) -> None:
 
 
 def test_map_of_four_poses_is_what_each_linkage_is_judged() -> None:
-    from analysis.synthesis.burmester import Dyad, four_bar
+    from analysis.synthesis.exact.burmester import Dyad, four_bar
 
     found = guidance(random_poses(3, 4))
     assert isinstance(found, GuidanceMap)

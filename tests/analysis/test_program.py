@@ -42,13 +42,13 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.constraints import limits_of
-from analysis.synthesis.polish import fit_least_squares, polish, quality_of, residuals
-from analysis.synthesis.program import Program
-from analysis.synthesis.scan import scan
-from analysis.synthesis.starts import Start, linkage_of, start_of
-from analysis.synthesis.statement import BETWEEN
-from analysis.synthesis.tasks import Normal
+from analysis.synthesis.search.polish import fit_least_squares, polish, quality_of, residuals
+from analysis.synthesis.search.program import Program
+from analysis.synthesis.search.scan import scan
+from analysis.synthesis.search.start import Start, linkage_of, start_of
+from analysis.synthesis.search.statement import BETWEEN
+from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.task import Normal
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse
 

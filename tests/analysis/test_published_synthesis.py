@@ -16,6 +16,16 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 
+from analysis.studies.youssef.problems import (
+    PACKAGING_FLATNESS,
+    PACKAGING_OFFSET_CM,
+    PACKAGING_POINTS_CM,
+    PACKAGING_ROTATION,
+    PACKAGING_TRAVEL,
+    PROBLEMS,
+    packaging_path,
+    rocker_function,
+)
 from analysis.synthesis import (
     FullTurn,
     LargestLink,
@@ -33,16 +43,6 @@ from analysis.synthesis import (
     synthesize,
     trade_off,
     turn,
-)
-from analysis.synthesis.published import (
-    PACKAGING_FLATNESS,
-    PACKAGING_OFFSET_CM,
-    PACKAGING_POINTS_CM,
-    PACKAGING_ROTATION,
-    PACKAGING_TRAVEL,
-    PROBLEMS,
-    packaging_path,
-    rocker_function,
 )
 from tests import published
 

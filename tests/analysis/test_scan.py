@@ -29,11 +29,11 @@ from analysis.synthesis import (
     normal_form,
     turn,
 )
-from analysis.synthesis.constraints import Limits, limits_of
-from analysis.synthesis.polish import quality_of
-from analysis.synthesis.scan import SHAPES, Candidates, _placed, _shapes, scan
-from analysis.synthesis.starts import linkage_of
-from analysis.synthesis.tasks import Normal
+from analysis.synthesis.search.polish import quality_of
+from analysis.synthesis.search.scan import SHAPES, Candidates, _placed, _shapes, scan
+from analysis.synthesis.search.start import linkage_of
+from analysis.synthesis.task.limits import Limits, limits_of
+from analysis.synthesis.task.task import Normal
 
 FloatArray = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def shape(linkage: Linkage, *, phase: float = 0.0, distance: float = 0.0, direct
 
 def first(candidates: Candidates, normal: Normal) -> Linkage:
     """The first candidate's linkage."""
-    from analysis.synthesis.starts import Start
+    from analysis.synthesis.search.start import Start
 
     return linkage_of(Start(q=candidates.q[0], branch=candidates.branch), normal)
 

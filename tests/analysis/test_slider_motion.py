@@ -13,6 +13,7 @@ from scipy.optimize import differential_evolution, minimize_scalar
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import SmoothnessInterrupted, greatest, motion, slider_motion, smoothness_curve
+from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import (
     ANGLES,
     LENGTHS,
@@ -39,11 +40,10 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.constraints import limits_of
-from analysis.synthesis.kernels import link_directions
-from analysis.synthesis.program import Program
-from analysis.synthesis.published import PROBLEMS
-from analysis.synthesis.starts import linkage_of, random_pivot, start_of
+from analysis.synthesis.linkage.kernels import link_directions
+from analysis.synthesis.search.program import Program
+from analysis.synthesis.search.start import linkage_of, random_pivot, start_of
+from analysis.synthesis.task.limits import limits_of
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 

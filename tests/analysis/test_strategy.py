@@ -12,6 +12,7 @@ import pytest
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import Step, Strategy, StrategyInterrupted, simplest_mechanism
 from analysis.slider import strategy as strategy_module
+from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import (
     ANGLES,
     LENGTHS,
@@ -33,7 +34,6 @@ from analysis.synthesis import (
     evaluate,
     turn,
 )
-from analysis.synthesis.published import PROBLEMS
 from linkwork.errors import InputError
 from tests.linkages import BASE
 

@@ -47,11 +47,11 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.kernels import COLUMNS, coupler_path_jacobian
-from analysis.synthesis.kinds import limits_of_kinds, second_crank
-from analysis.synthesis.report import report
-from analysis.synthesis.scan import scan
-from analysis.synthesis.starts import linkage_of
+from analysis.synthesis.linkage.kernels import COLUMNS, coupler_path_jacobian
+from analysis.synthesis.result.report import report
+from analysis.synthesis.search.scan import scan
+from analysis.synthesis.search.start import linkage_of
+from analysis.synthesis.task.limits import limits_of_kinds, second_crank
 from linkwork.errors import InputError, ParameterError
 from linkwork.slider_crank import kinematics as plant
 

@@ -36,13 +36,13 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.constraints import limits_of
-from analysis.synthesis.overlap import symmetric_difference
-from analysis.synthesis.program import Program
-from analysis.synthesis.refine import Refinement
-from analysis.synthesis.starts import start_of
-from analysis.synthesis.targets import even_odd_area
-from analysis.synthesis.tasks import Measure, Objective
+from analysis.synthesis.linkage.kernels import symmetric_difference
+from analysis.synthesis.search.program import Program
+from analysis.synthesis.search.refine import Refinement
+from analysis.synthesis.search.start import start_of
+from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.target import even_odd_area
+from analysis.synthesis.task.task import Measure, Objective
 from tests.linkages import BASE, drawn
 
 pytest.importorskip("casadi")

@@ -25,7 +25,7 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.formulas import formula
+from analysis.synthesis.task.formula import formula
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]

@@ -51,8 +51,8 @@ from analysis.synthesis import (
     trade_off,
     turn,
 )
-from analysis.synthesis.constraints import limits_of
-from analysis.synthesis.polish import Polished, polish
+from analysis.synthesis.search.polish import Polished, polish
+from analysis.synthesis.task.limits import limits_of
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse
 
@@ -119,8 +119,8 @@ class TestResult:
                     timer.start()
                 yield found
 
-        monkeypatch.setattr("analysis.synthesis.solve.polish", long)
-        monkeypatch.setattr("analysis.synthesis.search.over_workers", interrupted)
+        monkeypatch.setattr("analysis.synthesis.search.solve.polish", long)
+        monkeypatch.setattr("analysis.synthesis.search.start.over_workers", interrupted)
         with pytest.raises(SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
             synthesize(TASK, search=replace(QUICK, n_jobs=n_jobs))
         timer.join()
@@ -134,7 +134,7 @@ class TestResult:
         def interrupted(*_: Any, **__: Any) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("analysis.synthesis.solve.scan", interrupted)
+        monkeypatch.setattr("analysis.synthesis.search.solve.scan", interrupted)
         with pytest.raises(SynthesisInterrupted, match="stopped after 0 of 7 searches") as caught:
             synthesize(TASK, search=Search(starts=7))
         assert caught.value.synthesis is None
@@ -181,7 +181,7 @@ def judged(kind: str) -> Solution:
     rotation = phi if kind in ("poses", "precision") else None
     if kind == "open":
         from analysis.synthesis import normal_form
-        from analysis.synthesis.solution import nearest_rotations
+        from analysis.synthesis.result.solution import nearest_rotations
 
         normal = normal_form(task)
         rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
@@ -372,7 +372,7 @@ class TestTradeOff:
             found = synthesize(*arguments, **more)
             return found if len(calls) == 3 else replace(found, solutions=(poor,))
 
-        monkeypatch.setattr("analysis.synthesis.trading.synthesize", search)
+        monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
         front = trade_off(TASK, "size", [0.4, 0.6, 0.5], search=Search(starts=1))
         assert len(calls) == 6
         assert front.solutions[0] is front.solutions[1] is front.solutions[2] is not poor
@@ -390,7 +390,7 @@ class TestTradeOff:
                 raise KeyboardInterrupt
             raise SynthesisInterrupted(synthesize(*arguments, **more), 1, 2)
 
-        monkeypatch.setattr("analysis.synthesis.trading.synthesize", search)
+        monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
         with pytest.raises(TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off") as caught:
             trade_off(TASK, "size", [0.3, 0.6], search=Search(starts=1))
         front = caught.value.trade_off
@@ -563,11 +563,6 @@ class TestBadInput:
             ({"search": {"starts": 0}}, InputError, "0 starts: there must be at least one"),
             ({"search": {"candidates": 0}}, InputError, "0 candidates"),
             ({"search": {"n_jobs": 0}}, InputError, "0 cores"),
-            (
-                {"search": {"method": "annealing"}},
-                InputError,
-                r"no method 'annealing' \(the names are scan, differential-evolution, simplex",
-            ),
             ({"weights": [1.0, 2.0]}, InputError, r"weights have the shape \(2,\)"),
             ({"constraints": ["short"]}, InputError, "constraint 'short' is none: use .*LeastTransmission"),
             ({"bounds": {"crank": (0, 1)}}, ParameterError, "crank is .* have the name of a dimension"),

@@ -15,7 +15,7 @@ from analysis.numerics.fourier import FourierSeries
 from analysis.slider import VariationalMotion, variational_motion
 from analysis.slider.variational import _path
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion
-from analysis.synthesis.kernels import link_directions
+from analysis.synthesis.linkage.kernels import link_directions
 from linkwork.errors import AssemblyError, InputError, ParameterError
 
 FloatArray = NDArray[np.float64]

@@ -293,11 +293,6 @@ def least_area(_: Path) -> list[Any]:
     ]
 
 
-def black_box(_: Path) -> list[Any]:
-    search = Search(method="simplex", starts=4, seed=2)
-    return [list(s.linkage.values().values()) for s in synthesize(TimedPath(points=ELLIPSE), search=search).solutions]
-
-
 def samples(_: Path) -> list[Any]:
     turn = force_turn("rahman-a4-10-s1-3.5", angles=np.linspace(0.0, 6.0, 40))
     names = ("slider.position", "crank_pin.fz")
@@ -307,7 +302,7 @@ def samples(_: Path) -> list[Any]:
     return [part for s in spreads for part in (s.mean.filled(), s.deviation.filled(), s.percentiles.filled(), s.counts)]
 
 
-WORK = (ensemble, kept_ensemble, chart, timed_path, least_area, black_box, samples)
+WORK = (ensemble, kept_ensemble, chart, timed_path, least_area, samples)
 
 
 def assert_same(found: list[Any], expected: list[Any]) -> None:

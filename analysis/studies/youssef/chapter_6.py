@@ -34,9 +34,9 @@ from ...synthesis import (
     trade_off,
     turn,
 )
-from ...synthesis.published import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from .problems import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 
 FloatArray = NDArray[np.float64]
 

@@ -15,16 +15,6 @@ import numpy as np
 
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...synthesis import area_between, hausdorff, straightest_part, turn
-from ...synthesis.published import (
-    CM2_PER_M2,
-    PACKAGING_FLATNESS,
-    PACKAGING_OFFSET_CM,
-    PACKAGING_ROTATION,
-    PACKAGING_TRAVEL,
-    PROBLEMS,
-    N,
-    packaging_path,
-)
 from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded, unjudged
 from .chapter_6 import (
@@ -39,6 +29,16 @@ from .chapter_6 import (
     pairing_area,
     path_columns,
     sound_verdicts,
+)
+from .problems import (
+    CM2_PER_M2,
+    PACKAGING_FLATNESS,
+    PACKAGING_OFFSET_CM,
+    PACKAGING_ROTATION,
+    PACKAGING_TRAVEL,
+    PROBLEMS,
+    N,
+    packaging_path,
 )
 
 NUMBER = "6.11"

@@ -18,9 +18,9 @@ from scipy.optimize import minimize, minimize_scalar
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import Linkage, Search, TimedPath, UntimedPath, area_between, evaluate, synthesize, turn
-from ...synthesis.published import AREA_N, CM2_PER_M2, PROBLEMS, ellipse
 from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded
 from .chapter_6 import TRANSMISSION, FloatArray, best, our_error, printed_error
+from .problems import AREA_N, CM2_PER_M2, PROBLEMS, ellipse
 
 NUMBER = "quality"
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]

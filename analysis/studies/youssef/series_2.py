@@ -33,10 +33,10 @@ from ...synthesis import (
     evaluate,
     turn,
 )
-from ...synthesis.published import PROBLEMS, WEIGHT, packaging_path
 from ...units import CM_PER_METRE
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
 from .chapter_7 import slider
+from .problems import PROBLEMS, WEIGHT, packaging_path
 
 FloatArray = NDArray[np.float64]
 
