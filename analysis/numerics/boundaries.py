@@ -6,7 +6,7 @@ It knows no mechanics. `scan` finds the roots along a line, close pairs too; `tr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
@@ -241,13 +241,8 @@ class Boundary:
                     - u * u * (1.0 - u) * t
                 )
 
-            u = (
-                0.0
-                if p[axis] == level
-                else 1.0
-                if q[axis] == level
-                else scipy.optimize.brentq(lambda u: curve(u)[axis] - level, 0, 1)
-            )
+            # the ends may be zero: brentq takes them as they are
+            u = scipy.optimize.brentq(lambda u: curve(u)[axis] - level, 0.0, 1.0)
             found.append(curve(u)[1 - axis] * box.size[1 - axis] + box.corner[1 - axis])
         return np.array(found)
 
@@ -405,7 +400,6 @@ def chart(
     lines: tuple[int, int] = (2, 5),
     samples: int = 200,
     step: float = 0.02,
-    seeds: Iterable[tuple[float, float]] = (),
 ) -> Chart:
     """Find and trace the boundaries in a box.
 
@@ -421,18 +415,16 @@ def chart(
         See `scan`.
     step : float
         See `trace`.
-    seeds : iterable of (float, float)
-        Points near further boundaries.
 
     Raises
     ------
     InputError
-        If no line and no seed is given, or one line of a kind, which has no place.
+        If there are no lines, or one line of a kind, which has no place.
     """
-    if 1 in lines or min(lines) < 0 or (lines == (0, 0) and not seeds):
-        raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind or seed")
+    if 1 in lines or min(lines) < 0 or lines == (0, 0):
+        raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind")
     gaps: list[Gap] = []
-    candidates: list[tuple[int | None, tuple[float, float]]] = [(None, seed) for seed in seeds]
+    candidates: list[tuple[int, tuple[float, float]]] = []
     for side, count in enumerate(lines):
         for value in np.linspace(*(box.x, box.y)[side], count).tolist():
 
@@ -444,13 +436,11 @@ def chart(
             gaps += [Gap(point=point(place), message=message) for place, message in line.gaps]
     found: list[Boundary] = []
     for axis, seed in candidates:
-        if axis is not None and any(_on(boundary, axis, seed, box) for boundary in found):
+        if any(_on(boundary, axis, seed, box) for boundary in found):
             continue
         try:
             found.append(trace(test, seed, box, step=step))
         except LinkworkError as error:
-            if axis is None:
-                raise
             # the sign changes where the function jumps, too
             gaps.append(Gap(point=seed, message=f"no boundary leads through: {error}"))
     return Chart(box=box, test=test, boundaries=tuple(found), gaps=tuple(gaps))

@@ -234,13 +234,7 @@ def correct_period(section, angles, y, w, desk):
         after = y[(e + 1) % m]
         for i in range(n):
             ends[e, i] -= after[i]
-        for j in range(n):
-            for i in range(n):
-                column[i] = 0.0
-                for k in range(n):
-                    column[i] += matrices[e, i, k] * monodromy[k, j]
-            for i in range(n):
-                monodromy[i, j] = column[i]
+        _chain(matrices[e], monodromy, column)
     # carry the gaps between the elements to the end of the period
     for i in range(n):
         shift[i] = 0.0
@@ -272,6 +266,19 @@ def correct_period(section, angles, y, w, desk):
                 return np.nan
         _carry(matrices[e], ends[e], shift, column)
     return size
+
+
+@inner
+def _chain(matrix, product, column):
+    """Multiply a product of matrices by the next one from the left, in place."""
+    n = product.shape[0]
+    for j in range(n):
+        for i in range(n):
+            column[i] = 0.0
+            for k in range(n):
+                column[i] += matrix[i, k] * product[k, j]
+        for i in range(n):
+            product[i, j] = column[i]
 
 
 @inner
@@ -486,13 +493,7 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
             else:
                 return DIVERGED
             tails[e] = tail(h, scale, section.along, w[e], moves[e])
-            for j in range(n):
-                for i in range(n):
-                    column[i] = 0.0
-                    for k in range(n):
-                        column[i] += matrix[i, k] * whole[k, j]
-                for i in range(n):
-                    whole[i, j] = column[i]
+            _chain(matrix, whole, column)
             _carry(matrix, slope, along, column)
             copy(end, start)
         for i in range(n):
