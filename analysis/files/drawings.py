@@ -259,7 +259,6 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     """
     require("ezdxf")
     from ezdxf.filemanagement import new
-    from ezdxf.sections.classes import REQ_R2004
     from ezdxf.version import __version__
 
     metre = _unit_length(unit, UNITS)
@@ -308,9 +307,9 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     document.header.custom_vars.append("Title", drawing.title)
     height = 1.1 * max(top - bottom, 0.5 * (right - left))
     document.set_modelspace_vport(height, center=(0.5 * (left + right), 0.5 * (bottom + top)))
-    # ezdxf adds the classes that a file must have in the order of a set, which differs between processes
-    for name in sorted(REQ_R2004):
-        document.classes.add_class(name)
+    # ezdxf lists the classes in the order of a set, which differs between processes
+    document.classes.add_required_classes(document.dxfversion)
+    document.classes.classes = dict(sorted(document.classes.classes.items()))
     stream = StringIO()
     document.write(stream)
     # ezdxf dates each file; only a global option would prevent that
