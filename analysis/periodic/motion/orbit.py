@@ -544,7 +544,8 @@ class OrbitEquations:
         self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
         # each piece with the next one, shape (k, n, k, n): the part of the Jacobian that stays the same
         k, n = len(self.angles) - 1, flow.size
-        self._joined: FloatArray = -np.kron(np.roll(np.eye(k), 1, axis=1), np.eye(n)).reshape(k, n, k, n)
+        self._joined: FloatArray = np.zeros((k, n, k, n))
+        self._joined[np.arange(k), :, (np.arange(k) + 1) % k] = -np.eye(n)
         self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))
         # a number of the drive varies: the equations' numbers are linear in it
         self._direction = family.direction(high, low, high) if mechanism is other else None
