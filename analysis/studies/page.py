@@ -1,4 +1,4 @@
-"""The page of a thesis: each figure with what it shows, each statement with its source and verdict, and a count at the head."""
+"""Markdown page of a thesis: each figure, a table of its verdicts, and a count of them at the head."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ _ROW = re.compile(
 
 
 def figures(numbers: Iterable[str]) -> str:
-    """The figures of these numbers, computed, in Markdown; one that only shows a mechanism or an apparatus has its title.
+    """Compute the figures of these numbers and return them in Markdown.
 
-    What several of them say of an assignment is said at the first.
+    A figure that only shows a mechanism or an apparatus has its title alone. An assignment shared by several figures is
+    printed with the first.
     """
     lines: list[str] = []
     for number in numbers:
@@ -42,7 +43,7 @@ def figures(numbers: Iterable[str]) -> str:
 
 
 def count(page: str) -> str:
-    """How many of the thesis's statements on a page hold, fail or cannot be judged, and how many checks of ours hold."""
+    """Return a sentence with the number of statements on a page that hold, fail or cannot be judged, and of our checks."""
     found = Counter(_ROW.findall(page))
     thesis = {outcome: found[TEXT, outcome] + found[LISTING, outcome] for outcome in (HOLDS, FAILS, UNJUDGED)}
     listing = sum(number for (source, _), number in found.items() if source == LISTING)

@@ -1,4 +1,4 @@
-"""What every study is: a claim, what we compute, the picture, the verdict; and how one is run."""
+"""The parts of a study (claim, computed columns, picture, verdicts) and how one is run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..figures import Curve, Figure
 from ..files import save_figure, write_csv
 from . import STUDIES, file_stem, is_figure
 
-#: Where a statement comes from: the thesis's text, its program when it is run, or our own derivations and checks.
+#: Sources of a statement: the thesis's text, its program when run, our derivations and checks.
 TEXT, LISTING, OURS = "text", "listing", "ours"
 #: What a verdict may be.
 HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
@@ -21,22 +21,22 @@ HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """A stated result beside ours: it holds if ``computed`` lies from ``lower`` to ``upper``.
+    """Stated result beside the computed one; it holds if ``computed`` lies from ``lower`` to ``upper``.
 
     Attributes
     ----------
     statement : str
-        What is said, as a sentence without its number.
+        The statement in words, without its number.
     source : str
-        Who says so: `TEXT`, `LISTING` or `OURS`.
+        `TEXT`, `LISTING` or `OURS`.
     place : str
-        Where: the section, and the lines (L) of the scanned text; empty for ours.
+        Section, and lines (L) of the scanned text; empty for ours.
     stated, computed : float or None
         The two values in ``unit``; None where the statement cannot be judged.
     lower, upper : float
         Range that the source supports.
     why : str
-        Why the statement cannot be judged, or, in a few words, why it fails.
+        Reason why the statement cannot be judged, or why it fails.
     """
 
     statement: str
@@ -91,7 +91,7 @@ def near(
     place: str = "",
     why: str = "",
 ) -> Verdict:
-    """A verdict on a value that is stated to within a tolerance."""
+    """Judge a value that is stated to within a tolerance."""
     bounds = {"lower": stated - tolerance, "upper": stated + tolerance}
     return _judged(statement, source, stated, computed, unit, place, why, **bounds)
 
@@ -99,14 +99,14 @@ def near(
 def at_least(
     statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
 ) -> Verdict:
-    """A verdict on a value that is stated to reach another."""
+    """Judge a value that is stated as a lower bound."""
     return _judged(statement, source, stated, computed, unit, place, why, lower=stated)
 
 
 def at_most(
     statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
 ) -> Verdict:
-    """A verdict on a value that is stated not to exceed another."""
+    """Judge a value that is stated as an upper bound."""
     return _judged(statement, source, stated, computed, unit, place, why, upper=stated)
 
 
@@ -126,22 +126,22 @@ def _judged(
 
 
 def unjudged(statement: str, source: str, why: str, *, place: str) -> Verdict:
-    """A statement that cannot be judged, with the reason."""
+    """Record a statement that cannot be judged, with the reason."""
     return Verdict(statement=statement, source=source, place=place, why=why)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyResult:
-    """What a study found.
+    """Result of a study: what is claimed, the data of the plot, and the verdicts.
 
     Attributes
     ----------
     number : str
-        Of the thesis's figure, or the name of a picture.
+        Number of the thesis's figure, or name of a picture.
     claim : str
-        What the thesis claims or shows, as far as its text tells.
+        Claim or content of the figure, as far as the thesis's text tells.
     assignment : str
-        What in the figure is our choice, because the caption is lost; empty where nothing is.
+        Our choices in the figure, because the caption is lost; empty if there are none.
     columns : mapping
         Data of the plot by name with unit; all of one length, padded with NaN.
     verdicts : tuple of Verdict
@@ -160,13 +160,13 @@ class StudyResult:
 
     @property
     def heading(self) -> str:
-        """What stands above the plot: the figure's number and title."""
+        """Heading of the plot: the figure's number and title."""
         return f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A figure of the thesis: how it is computed, how it is drawn, and how it is animated, if it is."""
+    """Figure of a thesis: functions that compute, draw and, for some, animate it."""
 
     number: str
     compute: Callable[[], StudyResult]
@@ -187,12 +187,12 @@ class Study:
 
 
 def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
-    """Columns brought to the length of the longest with NaN."""
+    """Pad columns with NaN to the length of the longest."""
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     length = max(len(values) for values in arrays.values())
     return {name: np.append(v, np.full(length - len(v), np.nan)) for name, v in arrays.items()}
 
 
 def curves_of(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
-    """Columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
+    """Return columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
     return [Curve(x=result.columns[x], y=result.columns[name], label=label) for name, label in names.items()]

@@ -1,13 +1,13 @@
-"""Rahman's figures 5 to 38: displacement and joint forces of the generalised slider-crank, one family of studies.
+"""Rahman's figures 5 to 38: displacement and joint forces of the generalised slider-crank.
 
-The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, with the offset a4, the shift S1 or the twist
-alpha4 in three sizes, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). What is sought is the force on
-the slider, and with it every joint force and moment. It has no finite value at the dead centres, where it has no lever on
-the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a curve
-is therefore told at whole degrees that are more than `CLEAR_DEG` from a dead centre.
+The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, with three values of the offset a4, the
+shift S1 or the twist alpha4, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). The unknown is the
+force on the slider, and with it every joint force and moment. It is infinite at the dead centres, where it has no lever
+on the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a
+curve is therefore taken at whole degrees more than `CLEAR_DEG` from a dead centre.
 
-What sections 3.2 and 3.3 state is held against the right mechanism where the quantity concerned is shown. All forces are
-computed a second time by dual vectors, which share no equation with the plant.
+Statements of sections 3.2 and 3.3 are judged with the figure that shows the quantity. All forces are computed a second
+time by dual vectors, which share no equation with the plant.
 """
 
 from __future__ import annotations
@@ -57,19 +57,19 @@ from .table import (
 
 FloatArray = NDArray[np.float64]
 
-#: Crank angles of the curves (deg): half degrees, the whole ones among them.
+#: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
 ANGLE = "crank angle theta1 [deg]"
-#: Step (deg) in which the loop closed by dual matrices is followed round the turn.
+#: Step (deg) in which the loop is continued over the turn by dual matrices.
 FOLLOW_DEG = 20.0
-#: Largest force or moment (lb, lb.in) that is taken for none, and largest relative difference of two ways of computing.
+#: Largest force or moment (lb, lb.in) that counts as zero, and largest relative difference of two methods.
 NOTHING, SAME = 1e-6, 1e-9
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
-#: How far (deg) "near" is taken to reach in "spikes near 100 and 300 degrees", and by what share of half the stroke a curve may
-#: depart from a sine to be "almost" one: ours, the source gives no range.
+#: Our range (deg) of "near" in "spikes near 100 and 300 degrees", and our largest departure from a sine, relative to half the
+#: stroke, of a curve that is "almost" one. The source gives no range.
 SPIKES_TO, ALMOST = 25.0, 0.2
-#: By how much the values on both sides of a spike exceed all that are clear of the dead centres.
+#: Ratio by which the values beside a spike exceed all values clear of the dead centres.
 SPIKE = 2.0
 
 _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
@@ -77,7 +77,7 @@ _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
 
 @cache
 def turn(case: Case, given: str = "torque") -> ForceTurn:
-    """A turn of the crank, with the ``torque`` given and the slider's force sought, or with no ``load`` on the slider."""
+    """Compute a turn of the crank with a given ``torque`` and unknown slider force, or without ``load`` on the slider."""
     return force_turn(
         parameters(case.offset_in, case.twist_deg),
         crank_speed=CRANK_SPEED,
@@ -88,12 +88,12 @@ def turn(case: Case, given: str = "torque") -> ForceTurn:
 
 
 def dead_centres_deg(case: Case) -> FloatArray:
-    """Crank angles of the dead centres (deg)."""
+    """Return the crank angles of the dead centres (deg)."""
     return np.degrees([centre.crank_angle for centre in turn(case).dead_centres])
 
 
 def values(case: Case, component: Component, given: str = "torque") -> FloatArray:
-    """A component over the turn in the unit as printed, NaN at a dead centre."""
+    """Return a component over the turn in the printed unit, NaN at a dead centre."""
     found = turn(case, given)
     if component.source in ("axial_force", "slider_force"):
         si = getattr(found, component.source)
@@ -103,27 +103,27 @@ def values(case: Case, component: Component, given: str = "torque") -> FloatArra
 
 
 def position(case: Case) -> FloatArray:
-    """Slider position (in)."""
+    """Return the slider position (in)."""
     return turn(case).slider_position / INCH
 
 
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
-    """Which of the angles are whole degrees and clear of the dead centres."""
-    # an angle at just this distance is not clear, however it is rounded
+    """Return a mask of the whole degrees that are clear of the dead centres."""
+    # an angle at exactly this distance is not clear, whatever its rounding
     return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG + 1e-6))
 
 
 def greatest(case: Case, quantity: FloatArray) -> float:
-    """Greatest magnitude of a quantity over the turn, clear of the dead centres."""
+    """Return the greatest magnitude of a quantity over the turn, clear of the dead centres."""
     return float(np.abs(quantity[clear(case)]).max())
 
 
 def spikes_deg(case: Case, component: Component) -> FloatArray:
-    """Crank angles (deg) of the poles of a component: where its reciprocal, which is smooth there, goes through zero."""
+    """Find the crank angles (deg) of the poles of a component, as zeros of its reciprocal."""
     value = values(case, component)
     (changes,) = np.nonzero(value[:-1] * value[1:] < 0.0)
-    # a zero of the component changes its sign too, between small values
+    # a zero of the component changes its sign too, but between small values
     size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
     found = []
     for at in changes[size > SPIKE * greatest(case, value)].tolist():
@@ -135,7 +135,7 @@ def spikes_deg(case: Case, component: Component) -> FloatArray:
 
 @cache
 def dual(case: Case) -> JointLoads:
-    """All joint forces by dual vectors, at the angles that are clear of the dead centres.
+    """Compute all joint forces by dual vectors at the angles that are clear of the dead centres.
 
     The loop is closed by continuation round the turn in steps of `FOLLOW_DEG`, and from these points in between.
     """
@@ -147,7 +147,7 @@ def dual(case: Case) -> JointLoads:
 
 
 def difference_from_dual(case: Case, component: Component) -> float:
-    """Greatest difference between a component and that by dual vectors, clear of the dead centres, relative to T/a1 or T."""
+    """Return the greatest difference of a component from dual vectors, clear of the dead centres, relative to T/a1 or T."""
     loads = dual(case)
     if component.source in ("axial_force", "slider_force"):
         si = loads.axial if component.source == "axial_force" else loads.slider_force
@@ -159,7 +159,7 @@ def difference_from_dual(case: Case, component: Component) -> float:
 
 
 def _motion(family: str) -> list[Verdict]:
-    """Stroke, shape and dead centres of the slider's motion, and the power that it takes."""
+    """Judge stroke, shape and dead centres of the slider's motion, and its power."""
     cases, place = FAMILIES[family].cases, "section 3.3, L1125"
     verdicts = []
     for case in cases:
@@ -193,19 +193,19 @@ def _motion(family: str) -> list[Verdict]:
 
 
 def _stroke(case: Case) -> float:
-    """Stroke (in) of a mechanism of section 3.1 at its shift."""
+    """Return the stroke (in) of a mechanism of section 3.1 at its shift."""
     mechanism = parameters(case.offset_in, case.twist_deg)
     (whole,) = ranges(mechanism, constant_shift(case.shift_in * INCH))
     return whole.stroke / INCH
 
 
 def _torque(case: Case) -> FloatArray:
-    """Crank torque (lb.in) that the motion takes without a load on the slider."""
+    """Return the crank torque (lb.in) without a load on the slider."""
     return np.asarray(turn(case, "load").torque / POUND_INCH)
 
 
 def _force_verdicts(family: str, component: Component) -> list[Verdict]:
-    """What is said of any component: its spikes, that the offset raises it; and that it is computed twice."""
+    """Judge the spikes of a component, the influence of the offset, and its agreement with dual vectors."""
     cases, symbol = FAMILIES[family].cases, component.symbol
     verdicts = []
     found = [spikes_deg(case, component) for case in cases]
@@ -241,13 +241,13 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
 
 
 def _offsets_gain(component: Component, given: str) -> float:
-    """Least gain of a component's greatest magnitude from each case of variable offset to the next, the ideal one first."""
+    """Return the least gain of a component's greatest magnitude from one offset to the next, the ideal case first."""
     peaks = [greatest(case, values(case, component, given)) for case in (IDEAL, *FAMILIES["offset"].cases)]
     return min(after - before for before, after in pairwise(peaks))
 
 
 def moment_by_forces(case: Case, axis: str) -> tuple[FloatArray, FloatArray]:
-    """1T1i or 1T1j (lb.in) by the forces on the crank: as section 3.2 has it, and with the axial force."""
+    """Return 1T1i or 1T1j (lb.in) from the forces on the crank, as in section 3.2 and with the axial force."""
     angle = np.radians(ANGLES_DEG)
     fi, fj, fk = (values(case, COMPONENTS[name]) for name in ("1F1i", "1F1j", "1F1k"))
     if axis == "i":
@@ -256,7 +256,7 @@ def moment_by_forces(case: Case, axis: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict]:
-    """1T1i or 1T1j by the forces, and whether they are there."""
+    """Judge 1T1i or 1T1j against the forces, and whether the shift causes it."""
     symbol, axis, place = component.symbol, component.symbol[-1], "section 3.2, L1119"
     short, lacking = ("-1F1j S1", " + 1F1k a1 sin(theta1)") if axis == "i" else ("1F1i S1", " - 1F1k a1 cos(theta1)")
     verdicts = []
@@ -273,7 +273,7 @@ def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict
 
 
 def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
-    """Values from an independent derivation."""
+    """Compare the slider force with values from an independent derivation."""
     verdicts = []
     for case in cases:
         if case.shift_in == 0.0 and case.twist_deg == IDEAL.twist_deg:
@@ -293,7 +293,7 @@ def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
 
 
 def _constant() -> list[Verdict]:
-    """What section 3.2 finds to be constant or zero, and what the equations take for given."""
+    """Judge the components that section 3.2 finds constant or zero, and the assumptions of the equations."""
     cases, place, verdicts = FAMILIES["all"].cases, "section 3.2, L1117", []
     about = {name: [values(case, COMPONENTS[name]) for case in cases] for name in ("1F1k", "2F2j", "2F2k", "1T1k")}
 
@@ -341,7 +341,7 @@ def _dead_centre_name(case: Case) -> str:
 
 
 def compute(number: str) -> StudyResult:
-    """Curves of all cases of a figure, their dead centres, and what is stated of them."""
+    """Compute the curves of all cases of a figure, their dead centres, and the verdicts."""
     family, symbols, *_ = FIGURES[number]
     components = [COMPONENTS[symbol] for symbol in symbols]
     cases = (IDEAL, *FAMILIES[family].cases)
@@ -366,18 +366,18 @@ def compute(number: str) -> StudyResult:
 
 
 def printed(text: str) -> str:
-    """A case or a list of dimensions as it stands in a plot."""
+    """Format a case or a list of dimensions for a plot."""
     text = re.sub(r"\b([aS])(\d)", r"$\1_\2$", text.replace("alpha4", r"$\alpha_4$"))
     return re.sub(r" deg\b", "°", text)
 
 
 def printed_symbol(symbol: str) -> str:
-    """A symbol of the thesis, such as 1F1k, as it stands in a plot."""
+    """Format a symbol of the thesis, such as 1F1k, for a plot."""
     return re.sub(r"^(\d)([FT])(\d)([ijk])$", r"$^\1\2_{\3\4}$", symbol)
 
 
 def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, FloatArray]:
-    """A curve that is interrupted at its dead centres."""
+    """Return a curve that is interrupted at its dead centres."""
     centres = result.columns[_dead_centre_name(case)]
     centres = centres[np.isfinite(centres)]
     where = np.searchsorted(ANGLES_DEG, centres)
@@ -385,7 +385,7 @@ def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, Flo
 
 
 def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
-    """Range in which all values lie that are clear of the dead centres, with some room; at least a lb or lb.in each way."""
+    """Return a range with all values clear of the dead centres, at least 1 lb or 1 lb.in each way."""
     joined = np.concatenate(list(curves))
     low, high = float(joined.min()), float(joined.max())
     room = max(0.08 * (high - low), 1.0 if high - low < NOTHING else 0.0)
@@ -393,7 +393,7 @@ def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
 
 
 def draw(result: StudyResult) -> Figure:
-    """A panel a component; the ideal case dashed over the others, dead centres dotted."""
+    """Draw one panel a component, the ideal case dashed over the others, dead centres dotted."""
     family, symbols, *_ = FIGURES[result.number]
     looks = [
         (case, printed(case.name), colour, line)

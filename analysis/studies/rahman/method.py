@@ -1,7 +1,7 @@
-"""Rahman's method judged: his loop closure and its iteration, his rates, his force equations in the plane.
+"""Verdicts on Rahman's method: loop closure and its iteration, rates, force equations in the plane.
 
-`printed` has the equations to the letter. What they state is held against other formulations: dual matrices, difference
-quotients, the plant. The errata are numbered as in docs/rahman.md.
+`printed` has the equations to the letter. They are compared with other formulations: dual matrices, difference quotients,
+the plant. The errata are numbered as in docs/rahman.md.
 """
 
 from __future__ import annotations
@@ -49,42 +49,41 @@ OPEN = {
     Case("alpha4 = 232 deg", 20.0, 0.0, 232.0): (37.84, 3.78),
     Case("alpha4 = 310 deg", 20.0, 0.0, 310.0): (37.90, 2.74),
 }
-#: The same for the first of these by other iterations: which equations, from the angle before or not, and how far the number of
-#: the independent reconstruction is given.
+#: Results of other iterations for the first case: equations used, start from the previous angle or not, and digits given.
 VARIANTS: tuple[tuple[str, Rows, bool, float, float, float], ...] = (
     ("from the planar estimate at every angle", "printed", False, 23.0, 4.62, 0.05),
     ("without the diagonal of eq 22", "upper", True, 20.3, 2.31, 0.05),
     ("by all eighteen equations", "all", True, 20.26, 1.71, 0.005),
 )
-#: Cases whose row 37f is looked at, and what it lacks (in/s) by an independent reconstruction: as printed where |sin theta2| is
-#: above `CLEAR_SINE`, since eq 41 divides by it, and with erratum 2 mended.
+#: Cases for row 37f, with its residuals (in/s) by an independent reconstruction: as printed where |sin theta2| is above
+#: `CLEAR_SINE`, since eq 41 divides by it, and with erratum 2 mended.
 ROW_F = {
     Case("a4 = 30 in at S1 = 9 in", 30.0, 9.0, 270.0): (84.0, 40.0),
     Case("alpha4 = 310 deg", 20.0, 0.0, 310.0): (215.0, 66.0),
 }
 CLEAR_SINE = 0.15
-#: A configuration in general position, theta2' (rad/s) there as printed and as it is right by an independent derivation.
+#: A configuration in general position, with its theta2' (rad/s) as printed and by an independent derivation.
 GENERAL = Joints(*(np.array(value) for value in (2.1, 0.35, -1.3, 0.2, 40.0)))
 THETA2_RATE_PRINTED, THETA2_RATE = -4.3389, -4.3743
-#: Step of difference quotients, and the relative difference that they have at most.
+#: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
-#: Weight of water (lb/in3), which a specific gravity is relative to.
+#: Weight of water (lb/in3), the reference of specific gravities.
 WATER = 62.43 / 12.0**3
 
 
 @cache
 def followed(case: Case, rows: Rows = "printed", from_before: bool = True) -> Turn:
-    """The iteration over a turn in a case."""
+    """Run the iteration over a turn in a case."""
     return turn(parameters(case.offset_in, case.twist_deg), case.shift_in, rows, from_before=from_before)
 
 
 def joints(unknowns: FloatArray) -> Joints:
-    """Unknowns (..., 5) of the loop by name."""
+    """Return the unknowns (..., 5) of the loop by name."""
     return Joints(*np.moveaxis(unknowns, -1, 0))
 
 
 def _nothing(name: str, size: ArrayLike, unit: str, place: str, why: str = "") -> Verdict:
-    """A verdict on what the thesis has for zero: mostly the difference of an equation from what it should give."""
+    """Judge that a quantity vanishes, usually the difference between an equation and its correct value."""
     return near(name, TEXT, 0.0, float(np.abs(size)), NOTHING, unit, place=place, why=why)
 
 
@@ -92,7 +91,7 @@ def _nothing(name: str, size: ArrayLike, unit: str, place: str, why: str = "") -
 
 
 def _operators() -> float:
-    """Greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
+    """Return the greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
     th, eta = float(GENERAL.th2), float(GENERAL.eta2)
     about = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     tilting = np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
@@ -112,7 +111,7 @@ def _operators() -> float:
 
 
 def _limits() -> list[Verdict]:
-    """Up to where the iteration settles, as the thesis states it, and that these are no limits of the mechanism."""
+    """Judge the stated limits of the iteration, and show that they are not limits of the mechanism."""
     place = "section 3.2, L1121"
     within = "the thesis does not say how many corrections it allows"
     rounding = "where the iteration ends there depends on rounding: 1e-9 in more or less of S1 decide it"
@@ -155,7 +154,7 @@ def _limits() -> list[Verdict]:
 
 
 def _in_the_plane() -> list[Verdict]:
-    """The planar mechanism, where the chain is right."""
+    """Judge the planar mechanism, for which the chain is right."""
     offsets, grid, zero = (0.0, 10.0, 20.0, 30.0), np.radians(GRID_DEG), np.zeros(1)
     flat = [followed(Case("", a4, 0.0, 270.0)) for a4 in offsets]
     loops = []
@@ -166,7 +165,7 @@ def _in_the_plane() -> list[Verdict]:
         loops += [float(left[0]) for left in residuals(chain(parameters(a4), zero, zero, estimate)[0])]
 
     def ended(off: float) -> list[Settled]:
-        """The iteration from estimates of theta2 and theta3 that are off (deg)."""
+        """Run the iteration from estimates of theta2 and theta3 that are off by given angles (deg)."""
         away = np.radians([off, 0.0, -off, 0.0, 0.0])
         planes = [parameters(a4) for a4 in offsets]
         return [settle(p, grid, 0.0, rows="printed", start=planar(p, grid) + away) for p in planes]
@@ -191,7 +190,7 @@ def _in_the_plane() -> list[Verdict]:
 
 
 def closure() -> StudyResult:
-    """The iteration, and by how much the loop is open where it ends."""
+    """Compute the iteration and the closure error at which it ends."""
     columns, verdicts = {ANGLE: GRID_DEG}, []
     name, why = "freedoms of the chain, of which theta1 and S1 are given", "erratum 1: two rotations to a ball joint"
     (first, *_) = OPEN
@@ -240,7 +239,7 @@ def closure() -> StudyResult:
 
 
 def _row_f(case: Case) -> tuple[FloatArray, FloatArray]:
-    """What row 37f lacks (in/s) on the grid: as printed, NaN where eq 41 has no bound, and with erratum 2 mended."""
+    """Return the residual of row 37f (in/s) on the grid: as printed, NaN where eq 41 is unbounded, and by erratum 2."""
     p, q = parameters(case.offset_in, case.twist_deg), joints(followed(case).unknowns[:, 0])
     lacking = loop_rates(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))[5]
     shift = np.full(GRID_DEG.size, case.shift_in * INCH)
@@ -249,7 +248,7 @@ def _row_f(case: Case) -> tuple[FloatArray, FloatArray]:
 
 
 def _angular_velocity() -> float:
-    """Difference (rad/s) of eqs 30 and 31 from the angular velocity of Z(theta) Y(eta), by a difference quotient."""
+    """Return the difference (rad/s) of eqs 30 and 31 from the angular velocity of Z(theta) Y(eta), by a difference quotient."""
     th, eta, th_rate, eta_rate = 0.8, 0.3, 1.7, -2.1
     before, now, after = (about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-H, 0.0, H))
     omega = axial(Dual((after - before) / (2.0 * H) @ now.T)).real
@@ -257,7 +256,7 @@ def _angular_velocity() -> float:
 
 
 def _printed_rates() -> list[Verdict]:
-    """Eqs 28a, 30, 31 and 38 to 43, 38a to 42a in the general position, with the shift at rest or at 1.3 in/s."""
+    """Judge eqs 28a, 30, 31 and 38 to 43, 38a to 42a in the general position, with the shift at rest or at 1.3 in/s."""
     crank, still = CRANK_AT_SPEED._replace(shift_rate=1.3), CRANK_AT_SPEED
     right = loop_rates(crank, GENERAL, Joints(*np.zeros(5)))
     matrix = np.stack([loop_rates(crank, GENERAL, Joints(*unit)) - right for unit in np.eye(5)], -1)
@@ -265,7 +264,7 @@ def _printed_rates() -> list[Verdict]:
     solved, rates = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
     as_printed, mended = (float(joint_rates(still, GENERAL, erratum_4=erratum).th2) for erratum in (False, True))
     left = abs(float(joint_rates(crank, GENERAL, erratum_4=True).th2 - solved.th2))
-    # the derivative along the motion by a step into the complex plane, which has no rounding
+    # derivative along the motion by a complex step, which has no rounding error
     moved = Joints(*(q + 1e-20j * r for q, r in zip(GENERAL, rates)))
     seconds = joint_accelerations(crank, GENERAL, rates)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(crank, moved)))
@@ -305,7 +304,7 @@ def _printed_rates() -> list[Verdict]:
 
 
 def _dead_centres() -> list[Verdict]:
-    """What section 3.2 gives for the cause of the spikes, in the plane."""
+    """Judge the cause that section 3.2 gives for the spikes, in the plane."""
     place, verdicts, worst = "section 3.2, L1115", [], 0.0
     for a4 in (10.0, 20.0, 30.0):
         case, p = Case("", a4, 0.0, 270.0), parameters(a4)
@@ -328,7 +327,7 @@ def _dead_centres() -> list[Verdict]:
 
 
 def velocities() -> StudyResult:
-    """The rates as printed, and the row that is not solved."""
+    """Compute the rates as printed, and the residual of the unsolved row."""
     columns, verdicts = {ANGLE: GRID_DEG}, _printed_rates()
     for case, (stated, mended_stated) in ROW_F.items():
         lacking, mended = _row_f(case)
@@ -361,7 +360,7 @@ _PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
 
 def planar_forces(*, erratum_5: bool, erratum_6: bool) -> dict[str, FloatArray]:
-    """Forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not."""
+    """Return the forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not."""
     p, angle = parameters(_PLANE.offset_in), np.radians(ANGLES_DEG)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
     r = joint_rates(CRANK_AT_SPEED, q)
@@ -372,7 +371,7 @@ def planar_forces(*, erratum_5: bool, erratum_6: bool) -> dict[str, FloatArray]:
 
 
 def _slips(right: dict[str, FloatArray]) -> list[Verdict]:
-    """Erratum 9 in the force equations, 63b and 69k."""
+    """Judge erratum 9 in the force equations, 63b and 69k."""
     angle, at = np.radians(ANGLES_DEG), clear(_PLANE)
     crank, b = CRANK_AT_SPEED, bodies(parameters())
     r = joint_rates(crank, GENERAL)
@@ -407,7 +406,7 @@ def _slips(right: dict[str, FloatArray]) -> list[Verdict]:
 
 
 def forces() -> StudyResult:
-    """The force equations in the plane, as printed and mended."""
+    """Compute the force equations in the plane, as printed and mended."""
     columns, verdicts, at = {ANGLE: ANGLES_DEG}, [], clear(_PLANE)
     right = {symbol: values(_PLANE, COMPONENTS[symbol]) for symbol in _PLANAR}
     columns["4F4k right [lb]"] = right["4F4k"]
@@ -456,18 +455,18 @@ def forces() -> StudyResult:
 # ---------------------------------------------------------------- plots
 
 
-#: What columns of a unit have in common, by which a panel's axis is called.
+#: Labels of the axes by the unit of their columns.
 _SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "row 37f", "[lb]": "4F4k"}
-#: What columns are drawn dashed, over the others.
+#: Columns drawn dashed, over the others.
 _DASHED = ("37f mended", "both mended", "all eighteen")
 
 
 def draw(result: StudyResult) -> Figure:
-    """A panel for each unit of the columns; dashed what is mended."""
+    """Draw one panel for each unit of the columns, mended equations dashed."""
     panels = []
     for unit, label in _SHOWN.items():
         shown = {name: column for name, column in result.columns.items() if name.endswith(unit) and name != ANGLE}
-        # the forces have no bound at the dead centres
+        # the forces are infinite at the dead centres
         inside = clear(_PLANE) if unit == "[lb]" else slice(None)
         limit = 1.05 * max((float(np.nanmax(np.abs(column[inside]))) for column in shown.values()), default=0.0)
         curves = [

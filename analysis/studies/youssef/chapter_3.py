@@ -48,12 +48,12 @@ DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
 PERIOD = 60.0 / SPEED
 #: Transmission at which the coupler and the rocker count as collinear: |sin(th4 - th3)|.
 COLLINEAR_SINE = 0.3
-#: Turns over which the drift is followed.
+#: Turns of a run without a spring.
 DRIFT_TURNS = 40
 SAMPLES_PER_DRIFT_TURN = 120
 #: By damping (dyn.s/cm): turns at which coupler and rocker are collinear, and half a unit of the last figure given.
 COLLINEAR = {1e4: (3.0, 0.05), 5e4: (4.9, 0.05), 1e5: (8.0, 0.05), 5e5: (36.0, 0.5)}
-#: Dampers (dyn.s/cm) with which the drift has a rate.
+#: Dampers (dyn.s/cm) with which the drift is nearly linear.
 NEAR_LINEAR = (5e5, 1e6)
 #: By stiffness (dyn/cm): crank angle of the least position (deg) and mean position (cm).
 STEADY = {5e5: (23.45, -0.611), 1e6: (17.5, -0.280), 2e6: (5.2, -0.142)}
@@ -75,9 +75,9 @@ def _k(stiffness: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """The slider without a spring: turns of the crank, slider position (cm), and the turn at which the links line up.
+    """Motion of the slider without a spring: turns of the crank, slider position (cm), turn at which the links are collinear.
 
-    ``collinear_turn`` is NaN if they never do.
+    ``collinear_turn`` is NaN if they never are.
     """
 
     turns: NDArray[np.float64]
@@ -85,17 +85,17 @@ class Drift:
     collinear_turn: float
 
     def turn(self, number: int) -> NDArray[np.float64]:
-        """Slider position over a turn (cm), the first being turn 1; ends included."""
+        """Return the slider position over a turn (cm), counted from 1, both ends included."""
         n = SAMPLES_PER_DRIFT_TURN
         return self.slider_cm[(number - 1) * n : number * n + 1]
 
     def per_turn(self, number: int) -> float:
-        """Drift over a turn (cm)."""
+        """Return the drift over a turn (cm)."""
         return float(self.turn(number)[-1] - self.turn(number)[0])
 
     @property
     def until_collinear(self) -> NDArray[np.float64]:
-        """Slider position until the links line up (cm), NaN from there on."""
+        """Slider position (cm), NaN from the moment the links are collinear."""
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
     @property
@@ -105,14 +105,14 @@ class Drift:
 
     @property
     def unsteadiness(self) -> float:
-        """How much the motion over the fourth turn differs in shape from that over the third, relative to its swing."""
+        """Difference in shape between the motions over the fourth and the third turn, relative to the range of the fourth."""
         line = np.linspace(0.0, self.per_turn(4), SAMPLES_PER_DRIFT_TURN + 1)
         return float(np.ptp(self.turn(4) - self.turn(3)) / np.ptp(self.turn(4) - line))
 
 
 @cache
 def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Table 3.1 at 420 rpm without a spring; ends at the limit of assembly."""
+    """Run Table 3.1 at 420 rpm without a spring, up to the limit of assembly."""
     angle = asin(COLLINEAR_SINE)
     run = simulate(
         table_3_1(0.0, damping, gravity),
@@ -129,7 +129,7 @@ def drift(damping: float, gravity: float = 9.81) -> Drift:
 
 
 def drift_result() -> StudyResult:
-    """Drift of the slider with the five dampers, how far from linear it is, and when the links line up."""
+    """Compute the drift with the five dampers, its departure from a line, and when the links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
     settling, shapes, drifts, folds = [], [], [], []
     for mu, run in runs.items():
@@ -151,7 +151,7 @@ def drift_result() -> StudyResult:
             stated, tolerance = COLLINEAR[mu]
             folds.append(near(f"links collinear; {_mu(mu)}", OURS, stated, run.collinear_turn, tolerance, "turns"))
     rates = greatest_ratio(np.array([run.per_turn(3) for run in runs.values()]))
-    # with the strongest damper they never are
+    # with the strongest damper the links never are collinear
     sooner = greatest_ratio(np.array([runs[mu].collinear_turn for mu in reversed(COLLINEAR)]))
     gain = min(abs(run.per_turn(3)) - abs(run.per_turn(1)) for run in runs.values())
     columns = {TURNS: max((run.turns for run in runs.values()), key=len)}
@@ -172,7 +172,7 @@ def drift_result() -> StudyResult:
 
 
 def weightless_result() -> StudyResult:
-    """Drift with and without gravity for the five dampers."""
+    """Compute the drift with and without gravity for the five dampers."""
     columns = {TURNS: max((drift(mu).turns for mu in DAMPINGS), key=len)}
     for mu in DAMPINGS:
         columns[f"slider position u; {_mu(mu)} [cm]"] = drift(mu).until_collinear
@@ -200,7 +200,7 @@ def weightless_result() -> StudyResult:
 
 
 def draw_drift(result: StudyResult) -> Figure:
-    """Drift over the first turns and over many; a cross where the links line up, or dashed what is without gravity."""
+    """Draw the drift over the first turns and over many, with a cross at collinear links or dashed curves without gravity."""
     turns = result.columns[TURNS]
     curves, others = [], []
     for colour, mu in zip(COLOURS, DAMPINGS):
@@ -232,7 +232,7 @@ def draw_drift(result: StudyResult) -> Figure:
 
 @cache
 def from_rest(stiffness: float) -> Trajectory:
-    """Three turns from the thesis's start, th2 = u = u' = 0."""
+    """Run three turns from the thesis's start, th2 = u = u' = 0."""
     inputs = Inputs(speed=SPEED * RAD_S_PER_RPM)
     return simulate(table_3_1(stiffness), inputs, stop_time=3.0 * PERIOD, step=PERIOD / 360.0)
 
@@ -242,7 +242,7 @@ def _steady(stiffness: float) -> SteadyTurn:
 
 
 def steady_result() -> StudyResult:
-    """The motion from rest and the steady turn with each spring."""
+    """Compute the motion from rest and the steady turn with each spring."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     columns = {ANGLE: turns[1e6].angle_deg}
     columns |= {f"slider position u; {_k(k)} [cm]": turn.slider_cm for k, turn in turns.items()}
@@ -259,7 +259,7 @@ def steady_result() -> StudyResult:
 
 
 def _steady_verdicts() -> list[Verdict]:
-    """Verdicts on transient, mean and least position, and the reference numbers."""
+    """Judge transient, mean and least position, and compare with reference numbers."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
@@ -279,7 +279,7 @@ def _steady_verdicts() -> list[Verdict]:
         at_most("change of u from one turn to the next", TEXT, 1e-7, change, "cm", place="L1950"),
         at_most("mean of u, greatest of the three springs", TEXT, 0.0, max(means.values()), "cm", place="L1952"),
         at_most(softer("mean of u"), TEXT, 1.0, nearer, place="L1954"),
-        # 22 was read from a figure, and so was 0
+        # 22 and 0 were read from a figure
         near(f"crank angle of the least u; {_k(5e5)}", TEXT, 22.0, places[5e5], 2.0, "deg", place="L1962"),
         at_most(softer("crank angle of the least u"), TEXT, 1.0, sooner, place="L1964"),
         near(
@@ -301,7 +301,7 @@ def _steady_verdicts() -> list[Verdict]:
 
 
 def _shape_verdicts() -> list[Verdict]:
-    """Verdicts on the slopes between the least and the greatest position, and on the width of the curves."""
+    """Judge the slopes between the least and the greatest position, and the width of the curves."""
     turns = [_steady(k) for k in STIFFNESSES]
     ends = np.array([[find(t.angle_deg, t.slider_cm)[0] for find in (least, greatest)] for t in turns])
     widths, ranges = np.diff(ends, axis=1)[:, 0] % 360.0, np.array([np.ptp(t.slider_cm) for t in turns])
@@ -335,7 +335,7 @@ def _shape_verdicts() -> list[Verdict]:
 
 
 def draw_steady(result: StudyResult) -> Figure:
-    """The motion from the start over three turns, and the steady turns with a cross at each least position."""
+    """Draw the motion from the start over three turns, and the steady turns with a cross at each least position."""
     columns = result.columns
     from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in STIFFNESSES}
     names = [f"slider position u; {_k(k)} [cm]" for k in STIFFNESSES]
@@ -367,7 +367,7 @@ def draw_steady(result: StudyResult) -> Figure:
 
 
 def torque_result() -> StudyResult:
-    """The torque over the steady turn with each spring, and where it depends on the spring."""
+    """Compute the torque over the steady turn with each spring, and where it depends on the spring."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     angle, torque = turns[1e6].angle_deg, turns[1e6].torque
     # in dyn.cm, as stated
@@ -428,7 +428,7 @@ def torque_result() -> StudyResult:
 
 
 def draw_torque(result: StudyResult) -> Figure:
-    """The three torques over a turn."""
+    """Draw the three torques over a turn."""
     panel = Panel(
         x_label="crank angle [deg]",
         y_label="crank torque [N m]",

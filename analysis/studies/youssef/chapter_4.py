@@ -35,10 +35,10 @@ from ..study import LISTING, OURS, TEXT, Study, StudyResult, Verdict, at_least, 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios I4 whose resonances by appendix 2 are known.
 INERTIA_RATIOS = (0.5, 1.0, 1.5)
-#: Resonance (rad/s) by I4: of appendix 2 when run, and right. The determinant vanishes at two speeds: these are the lower ones,
-#: but for the listing's at I4 = 1.5.
+#: Resonance (rad/s) by I4: by appendix 2 when run, and exact. The determinant vanishes at two speeds, of which these are the
+#: lower ones, except the listing's at I4 = 1.5.
 RESONANCES = {0.5: (31.0763, 31.0975), 1.0: (30.5572, 30.5979), 1.5: (30.0645, 30.1220)}
-#: The same at I4 = 1 of the printed coefficients.
+#: Resonance (rad/s) at I4 = 1 by the printed coefficients.
 PRINTED_RESONANCE = 30.6120
 #: Variants that are compared, by their names in legends.
 VARIANTS = {Variant.EXACT: "right", Variant.PRINTED: "(4.21) as printed", Variant.FORTRAN: "listing of appendix 2"}
@@ -46,28 +46,28 @@ VARIANTS = {Variant.EXACT: "right", Variant.PRINTED: "(4.21) as printed", Varian
 SPEEDS = np.unique(
     np.concatenate([np.arange(9.0, 40.05, 0.1), np.arange(15.0, 15.8, 0.005), np.arange(30.0, 31.3, 0.005)]).round(3)
 )
-#: Those outside the regions of resonance.
+#: Mask of the speeds outside the regions of resonance.
 APART = (np.abs(SPEEDS - 15.5) > 1.0) & (np.abs(SPEEDS - 31.0) > 2.0)
 #: omega_c = mu/(m4 + m5) (1/s) of appendix 2: it raises mu by 200 dyn.s/cm after each curve, and m4 + m5 is 1000 g.
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
-#: omega_c (1/s) at which the second harmonics are compared: the thesis's, which removes all instability.
+#: omega_c (1/s) of the comparison of second harmonics: the thesis's, which removes all instability.
 COMPARED_AT = 0.45
-#: Least amplitude in what we call the region of resonance, and how far from the resonance we call it outside (rad/s).
+#: Least amplitude in the region of resonance, and least distance of the outside from the resonance (rad/s): our choice.
 LARGE, OUTSIDE = 0.1, 3.0
-#: What we take "may be neglected" and "not affected on the scale of the graph" to mean.
+#: Our readings of "may be neglected" and "not affected on the scale of the graph".
 NEGLIGIBLE, UNSEEN = 0.1, 0.01
 
 
 @cache
 def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
-    """The equation at 1 rad/s: without gravity only its spring and its damper depend on the speed."""
+    """Return the linear equation at 1 rad/s: without gravity only its spring and its damper depend on the speed."""
     return slider_equation(chapter_4(inertia_ratio), 1.0, variant=variant, form=Form.RESONANCE)
 
 
 def linear(
     speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> HarmonicMotion:
-    """zeta by the thesis's two harmonics."""
+    """Return zeta by the thesis's two harmonics."""
     once = equation(inertia_ratio, variant)
     return two_harmonics(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed))
 
@@ -75,12 +75,12 @@ def linear(
 def harmonic(
     n: int, speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> NDArray[np.float64]:
-    """Amplitude of the n-th harmonic over the speed."""
+    """Return the amplitude of the n-th harmonic over the speed."""
     return np.array([linear(speed, inertia_ratio, omega_c, variant).harmonic(n) for speed in speeds.tolist()])
 
 
 def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Variant.EXACT) -> tuple[float, float]:
-    """Speed (rad/s) and size of the greatest n-th harmonic near its resonance."""
+    """Return speed (rad/s) and size of the greatest n-th harmonic near its resonance."""
     middle = 0.5 * sum(resonance(chapter_4(inertia_ratio), variant=variant, harmonic=n))
     found = minimize_scalar(
         lambda speed: -linear(speed, inertia_ratio, omega_c, variant).harmonic(n),
@@ -95,7 +95,7 @@ def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Varian
 
 
 def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
-    """The n-th harmonic over the speed: three I4, and I4 = 1 by each variant."""
+    """Return the n-th harmonic over the speed, for three I4 by the exact equation and for I4 = 1 by each variant."""
     columns = {"speed [rad/s]": SPEEDS}
     for ratio in INERTIA_RATIOS:
         for variant, name in VARIANTS.items():
@@ -105,7 +105,7 @@ def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
 
 
 def growth_verdicts(columns: dict[str, NDArray[np.float64]], n: int, place: str) -> list[Verdict]:
-    """Amplitudes and widths of the region of resonance for a larger I4 against those for a smaller one."""
+    """Judge whether amplitudes and the width of the resonance grow with I4."""
     curves = [columns[f"I4 = {ratio:g}; right [1]"] for ratio in INERTIA_RATIOS]
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
     level = LARGE if n == 1 else 0.1 * LARGE
@@ -126,7 +126,7 @@ def growth_verdicts(columns: dict[str, NDArray[np.float64]], n: int, place: str)
 
 
 def compute_first() -> StudyResult:
-    """Fig 4.3, and where the determinant vanishes."""
+    """Compute Fig 4.3, and the speeds at which the determinant vanishes."""
     columns = undamped_columns(1)
     verdicts = []
     for ratio, (listed, reference) in RESONANCES.items():
@@ -180,7 +180,7 @@ def compute_first() -> StudyResult:
 
 
 def compute_second() -> StudyResult:
-    """Fig 4.4: the second harmonic, how it compares with the first, and by how much the listing's is too small."""
+    """Compute Fig 4.4: the second harmonic, its size beside the first, and the error of the listing."""
     columns = undamped_columns(2)
     step = 0.005
     resonant = np.arange(14.5, 16.5, step)
@@ -240,7 +240,7 @@ def compute_second() -> StudyResult:
 
 
 def draw_undamped(result: StudyResult, n: int) -> Figure:
-    """The three inertia ratios, and the variants close to the resonance."""
+    """Draw the three inertia ratios, and the variants close to the resonance."""
     c, word = result.columns, ("first", "second")[n - 1]
     three = {f"I4 = {ratio:g}": c[f"I4 = {ratio:g}; right [1]"] for ratio in INERTIA_RATIOS}
     variants = {name: c[f"I4 = 1; {name} [1]"] for name in VARIANTS.values()}
@@ -270,7 +270,7 @@ RATIOS = np.arange(0.0, 2.01, 0.25)
 
 
 def compute_deviation() -> StudyResult:
-    """Fig 4.5: how far the resonance lies below omega_k."""
+    """Compute Fig 4.5: the distance of the resonance below omega_k."""
     columns = {"inertia ratio I4 [1]": RATIOS}
     for variant, name in VARIANTS.items():
         columns[f"omega_k less resonance; {name} [rad/s]"] = np.array(
@@ -308,7 +308,7 @@ def compute_deviation() -> StudyResult:
 
 
 def draw_deviation(result: StudyResult) -> Figure:
-    """The deviation by each variant."""
+    """Draw the deviation by each variant."""
     names = (name for name in result.columns if name.startswith("omega_k"))
     curves = [
         Curve(x=RATIOS, y=result.columns[column], label=name, line=line)
@@ -327,12 +327,12 @@ def draw_deviation(result: StudyResult) -> Figure:
 # Figures 4.6 and 4.7
 
 CLOSE = np.arange(27.0, 35.01, 0.02)
-#: The damper at which the plant's amplitude, a fifth of the rocker's length, is still a small motion (1/s).
+#: Damper (1/s) that limits the plant's amplitude to a fifth of the rocker's length, still a small motion.
 STRONGEST = DAMPERS[-1]
 
 
 def free_frequency(inertia_ratio: float, omega_c: float) -> float:
-    """Frequency of the free motion (rad/s), from the Floquet multipliers at 20 rad/s."""
+    """Return the frequency of the free motion (rad/s), from the Floquet multipliers at 20 rad/s."""
     speed = 20.0
     found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
     multiplier = hill_multipliers(found.homogeneous().stiffened(found.spring))[0]
@@ -342,12 +342,12 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def eliminating(inertia_ratio: float, amplitude: float) -> float:
-    """omega_c (1/s) that keeps the peak of the first harmonic down to an amplitude."""
+    """Find the omega_c (1/s) that limits the peak of the first harmonic to an amplitude."""
     return float(brentq(lambda d: peak(1, inertia_ratio, d)[1] - amplitude, 0.1, 10.0, xtol=1e-6))
 
 
 def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
-    """First harmonic of a single mass on a spring: the means of M and K alone."""
+    """Return the first harmonic of a single mass on a spring, with the means of M and K alone."""
     found = equation(inertia_ratio, Variant.EXACT)
     stiffness = SQUARE_OF_OMEGA_K / CLOSE**2 + found.stiffness.mean - found.mass.mean
     amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / CLOSE)
@@ -355,7 +355,7 @@ def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
 
 
 def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
-    """Fig 4.6 and 4.7: the first harmonic with the listing's dampers."""
+    """Compute Fig 4.6 or 4.7: the first harmonic with the dampers of the listing."""
     columns = {"speed [rad/s]": CLOSE}
     for omega_c in (0.0, *DAMPERS):
         columns[f"omega_c = {omega_c:g} 1/s; right [1]"] = harmonic(1, CLOSE, inertia_ratio, omega_c)
@@ -432,7 +432,7 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """All dampers by the right equation, and the strongest by each variant and the plant."""
+    """Draw all dampers by the exact equation, and the strongest by each variant and the plant."""
     c = result.columns
     dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; right [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [

@@ -47,7 +47,7 @@ from .regions import (
     run_verdicts,
 )
 
-#: First region in lambda_k^2 by I4: the right one, and by appendix 3 when run.
+#: First region in lambda_k^2 by I4: exact, and by appendix 3 when run.
 RIGHT: Mapping[float, tuple[float, float]] = {
     0.5: (0.258298, 0.259203),
     1.0: (0.266540, 0.268367),
@@ -58,18 +58,18 @@ APPENDIX_3: Mapping[float, tuple[float, float]] = {
     1.0: (0.26580, 0.27054),
     1.5: (0.27382, 0.28069),
 }
-#: omega_c (1/s) that removes the region up to I4 = 1.5: as stated, by appendix 4 when run, and right.
+#: omega_c (1/s) that removes the region up to I4 = 1.5: as stated, by appendix 4 when run, and exact.
 STATED, LISTED, REMOVING = 0.45, 0.459, 0.167
 #: Why some numbers of Fig 5.2 and 5.3 fail.
 LISTED_RATIO = "I4 = 0.5, which the listing has (L8641)"
-#: What we take "narrow" and "negligible" to mean.
+#: Our readings of "narrow" and "negligible".
 NARROW, NEGLIGIBLE = 0.05, 0.1
 # Figures 5.1 to 5.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """The first region over a parameter: its symbol and values, the mechanism at one, and what the figure says of it."""
+    """First region over a parameter: symbol and values, mechanism at a value, and the verdicts of the figure."""
 
     number: str
     symbol: str
@@ -84,7 +84,7 @@ class Sweep:
 
 @cache
 def regions(name: str) -> dict[str, list[Region]]:
-    """The regions of a sweep by way; of its further mechanisms those of the true orbit, by name."""
+    """Return the regions of a sweep by method, and the regions of the true orbit of its further mechanisms."""
     sweep = SWEEPS[name]
     found = {way: [of(sweep.mechanism(x)) for x in sweep.values] for way, of in WAYS.items()}
     for way, mechanism in (sweep.further or {}).items():
@@ -93,17 +93,17 @@ def regions(name: str) -> dict[str, list[Region]]:
 
 
 def widths(found: Iterable[Region]) -> NDArray[np.float64]:
-    """Widths in lambda_k^2."""
+    """Return the widths of regions in lambda_k^2."""
     return np.array([region.width for region in found])
 
 
 def axes(found: Iterable[Region]) -> NDArray[np.float64]:
-    """A of each."""
+    """Return the axis A of each region."""
     return np.array([axis(region) for region in found])
 
 
 def second_verdict(sweep: Sweep) -> Verdict:
-    """The second region, of which the text says in all three figures that it is negligible."""
+    """Judge the width of the second region, which the text calls negligible for all three figures."""
     ratios = [hill(p, 2).width / hill(p).width for p in map(sweep.mechanism, sweep.values)]
     return at_most(
         "width of the second region to that of the first, greatest",
@@ -116,7 +116,7 @@ def second_verdict(sweep: Sweep) -> Verdict:
 
 
 def compute_sweep(number: str) -> StudyResult:
-    """The regions over a parameter."""
+    """Compute the regions over a parameter."""
     sweep, found = SWEEPS[number], regions(number)
     columns = {f"{sweep.symbol} [1]": np.array(sweep.values)}
     for way, these in found.items():
@@ -132,7 +132,7 @@ def compute_sweep(number: str) -> StudyResult:
 
 
 def draw_sweep(result: StudyResult) -> Figure:
-    """The regions, and their widths."""
+    """Draw the regions and their widths."""
     c, sweep = result.columns, SWEEPS[result.number]
     values = c[f"{sweep.symbol} [1]"]
     edges, sizes = [], []
@@ -161,7 +161,7 @@ def draw_sweep(result: StudyResult) -> Figure:
 
 
 def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
-    """Fig 5.1, and the formulas it is by."""
+    """Judge Fig 5.1 and the formulas behind it."""
     true, ratios = found["true orbit"], np.array(SWEEPS["5.1"].values)
     middles = np.array([0.5 * (region.low + region.high) for region in true]) - 0.25
     slope = middles[-1] / ratios[-1]
@@ -227,13 +227,13 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
 
 
 def with_crank(sigma2: float, inertia_ratio: float = 1.0) -> FiveBarParameters:
-    """The mechanism with another crank, sigma2 = l2/l4."""
+    """Return the mechanism with another crank, sigma2 = l2/l4."""
     mechanism = chapter_4(inertia_ratio)
     return replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
 
 
 def judge_crank(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
-    """Fig 5.2."""
+    """Judge Fig 5.2."""
     true = found["true orbit"]
     widest = widths(regions("5.1")["true orbit"]).max()
     return [
@@ -272,24 +272,24 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
 
 
 def held(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """The mechanism to which the thesis's angles belong at any coupler: its ground link and the guide's direction follow."""
+    """Return the mechanism that has the thesis's angles with another coupler: ground link and guide direction follow."""
     mechanism = closed(sigma3, inertia_ratio)
     ground = rect(mechanism.coupler_length, pi / 3.0) - rect(mechanism.rocker_length, 2.0 * pi / 3.0)
     return replace(mechanism, ground_length=abs(ground), slider_guide_angle=-phase(ground))
 
 
 def closed(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """The mechanism with another coupler, sigma3 = l3/l4, and the same ground link."""
+    """Return the mechanism with another coupler, sigma3 = l3/l4, and the same ground link."""
     mechanism = chapter_4(inertia_ratio)
     return replace(mechanism, coupler_length=sigma3 * mechanism.rocker_length)
 
 
-#: The thesis's coupler on a ground link that stays.
+#: Name of the sweep with a constant ground link.
 SAME_GROUND = "true orbit on the same ground link"
 
 
 def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
-    """Fig 5.3: with the angles held, as the thesis has it, and with the ground link kept."""
+    """Judge Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     others = min(widths(regions(number)["true orbit"]).max() for number in ("5.1", "5.2"))
     verdicts = []
     follow = "the angles follow the coupler"
@@ -403,7 +403,7 @@ SWEEPS = {
 
 # Figure 5.4
 
-#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and the range in which the removing one is sought.
+#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and search range of the removing damper.
 BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
 DAMPERS = (0.0, 0.05, 0.1, 0.15)
 RANGE = (0.0, 1.2)
@@ -420,7 +420,7 @@ RUNS = ((0.1, 0.2761), (0.1, 0.2785), (0.2, 0.2761))
 
 
 def with_damping(omega_c: float) -> Plane:
-    """The plane of lambda_k^2 and I4 at a damper omega_c (1/s)."""
+    """Return the plane of lambda_k^2 and I4 at a damper omega_c (1/s)."""
 
     def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
         return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
@@ -430,13 +430,13 @@ def with_damping(omega_c: float) -> Plane:
 
 @cache
 def damped_region(omega_c: float) -> Chart:
-    """Boundaries of the first region in lambda_k^2 and I4."""
+    """Return the boundaries of the first region in lambda_k^2 and I4."""
     return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
 
 
 @cache
 def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
-    """Damper omega_c (1/s) that removes the first region, by (5.35)."""
+    """Find the damper omega_c (1/s) that removes the first region."""
 
     def test(lambda_k2: float, omega_c: float) -> float:
         return MOTIONS[motion](with_damping(omega_c), -1)(lambda_k2, inertia_ratio)
@@ -445,13 +445,13 @@ def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
 
 
 def width_at(found: Chart, value: float) -> float:
-    """Width in lambda_k^2 at an I4, zero where there is no region."""
+    """Return the width in lambda_k^2 at an I4, zero if there is no region."""
     roots = found.across(value, samples=100).roots
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
 def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
-    """What is stated of the regions, by their dampers (1/s)."""
+    """Judge the statements on the regions by damper (1/s)."""
     tips = {d: float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0}
     worst = {motion: removing(motion, 1.5).damping for motion in MOTIONS}
     mechanisms = [chapter_4(x) for x in (0.5, 1.0, 1.5)]
@@ -508,7 +508,7 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
         ),
         at_most("(5.35) cut off after its ninth term, as the thesis has it, less Hill's determinant", OURS, 1e-6, cut),
         unjudged("the computer-oriented method is fast", TEXT, "no times are given", place="L3960"),
-        # a tip is where that damping removes the region; the trace rounds it in short steps
+        # at a tip that damping removes the region; the trace follows it in short steps
         *(
             near(
                 f"removing omega_c at the tip of the boundary, I4 = {tip:.4f}",
@@ -529,7 +529,7 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
 
 
 def compute_damped() -> StudyResult:
-    """Boundaries at each damper, and the damper that removes the region."""
+    """Compute the boundaries at each damper, and the damper that removes the region."""
     charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
     columns = {"I4 [1]": RATIOS}
     for motion in MOTIONS:
@@ -548,7 +548,7 @@ def compute_damped() -> StudyResult:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """The regions at each damper, and the removing one over I4."""
+    """Draw the regions at each damper, and the removing damper over I4."""
     c = result.columns
     boundaries = []
     for colour, omega_c in zip(COLOURS, DAMPERS):

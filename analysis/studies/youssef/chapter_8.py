@@ -1,7 +1,8 @@
-"""The figures of chapter VIII: how the slider of the two rigs moved, beside the theory.
+"""Figures of chapter VIII: the slider motion of both rigs, measured and computed.
 
-The measured curves are lost with the figures; the text says of most of them what they show. Theory is the periodic motion of
-the full equations with the measured damping. The resonance curves of rig 2 are in `rig_2`, what is ours in `rig_1` and there.
+The measured curves are lost with the figures; the text describes most of them. Theory is the periodic motion of the
+full equations with the measured damping. The resonance curves of rig 2 are in `rig_2`; our own studies are in `rig_1`
+and `rig_2`.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ KICK, LENGTH, SCATTER, DRY = 1.0, 1.0, 0.005, 0.5
 
 
 def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0.0) -> NDArray[np.float64]:
-    """Position (m) of the disconnected slider after an impulse; dry friction (N) shifts the middle of each swing."""
+    """Return the position (m) of the disconnected slider after an impulse; dry friction (N) shifts the centre of each swing."""
     p = rig(spring)
     decay = 0.5 * p.slider_damping / p.slider_mass
     frequency = sqrt(p.slider_stiffness / p.slider_mass - decay**2)
@@ -64,7 +65,7 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
         centre = -side * friction / p.slider_stiffness
         a = x - centre
         b = (v + decay * a) / frequency
-        # it turns back where its velocity is zero, and stays there if the spring is weaker than the friction
+        # the slider turns back at zero velocity, or stays there if the spring is weaker than the friction
         last = (atan2(v, decay * b + frequency * a) if v else pi) / frequency
         s = np.append(time - begin, last)
         swing = centre + np.exp(-decay * s) * (a * np.cos(frequency * s) + b * np.sin(frequency * s))
@@ -76,7 +77,7 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
 
 
 def compute_decay() -> StudyResult:
-    """Records as the thesis took them, and what the logarithmic decrement makes of them."""
+    """Compute records like those of the thesis, and the damping that their logarithmic decrement gives."""
     time = np.linspace(0.0, LENGTH, 4001)
     columns, verdicts = {"time [s]": time}, []
     for number, (stated, spring) in FOUND.items():
@@ -106,7 +107,7 @@ def compute_decay() -> StudyResult:
 
 
 def draw_decay(result: StudyResult) -> Figure:
-    """The records, a panel a rig."""
+    """Draw the records, one panel a rig."""
     panels = []
     for number, (_, spring) in FOUND.items():
         names = [name for name in result.columns if f"spring {spring}" in name]
@@ -125,7 +126,7 @@ def draw_decay(result: StudyResult) -> Figure:
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """A figure of the slider's position over the crank angle: spring, speeds (rpm), and what is stated of it.
+    """Figure of the slider position over the crank angle: spring, speeds (rpm), and its verdicts.
 
     ``rough`` adds each curve with friction in the guide, by the coefficient `SLIGHT`.
     """
@@ -139,7 +140,7 @@ class Turns:
     rough: bool = False
 
     def compute(self) -> StudyResult:
-        """The steady turns at these speeds."""
+        """Compute the steady turns at the speeds of a figure."""
         turns = {f"{speed:g} rpm": turn(self.spring, speed) for speed in self.speeds}
         if self.rough:
             (speed,) = self.speeds
@@ -152,7 +153,7 @@ class Turns:
         )
 
     def draw(self, result: StudyResult) -> Figure:
-        """The turns over the crank angle; where they differ much in size, each over its amplitude."""
+        """Draw the turns over the crank angle, relative to their amplitudes if these differ much."""
         angle, *positions = result.columns.items()
         sizes = [0.5 * float(np.ptp(u)) for _, u in positions]
         relative = max(sizes) > 5.0 * min(sizes)
@@ -174,7 +175,7 @@ class Turns:
 
     @property
     def study(self) -> Study:
-        """The row as a study."""
+        """Return the row as a study."""
         return Study(self.number, self.compute, self.draw)
 
 
@@ -186,7 +187,7 @@ STATED = {"A": ((580.0, 592.0), (290.0, 296.0)), "B": ((1160.0, 1133.0), (580.0,
 
 
 def _periodic() -> list[Verdict]:
-    """8.7: one cycle of the crank is one of the slider, at this speed and at all others."""
+    """Judge Fig 8.7: one cycle of the slider takes one cycle of the crank, at this speed and at all others."""
     change = steady_turn(rig("A"), 360.0).change
     words = "largest multiplier of the motion of one cycle at all speeds run"
     largest = {s: largest_multiplier(s, SLOWEST, STOPPED[s]) for s in "AB"}
@@ -200,7 +201,7 @@ def _periodic() -> list[Verdict]:
 
 
 def _compared(spring: str, speed: float) -> list[Verdict]:
-    """8.8 to 8.13: theory beside measurements that are lost."""
+    """Return the verdicts of Fig 8.8 to 8.13, which compare theory with lost measurements."""
     words, line = {"A": ("slightly other amplitudes", "L6479"), "B": ("reasonable agreement in amplitude", "L6524")}[
         spring
     ]
@@ -220,19 +221,19 @@ def _compared(spring: str, speed: float) -> list[Verdict]:
 
 
 def _peaks(spring: str, speeds: Sequence[float], line: str, stated: int = 4) -> list[Verdict]:
-    """Peaks, highest and lowest points together, at each of the speeds."""
+    """Judge the number of maxima and minima together at each speed."""
     counted = {speed: peaks(turn(spring, speed)) for speed in speeds}
     words, place = "peaks of the oscillation at", f"8.4.1.2, {line}"
     return [near(f"{words} {speed:g} rpm", TEXT, stated, n, 0.0, place=place) for speed, n in counted.items()]
 
 
 def _rises(spring: str, speeds: Sequence[float]) -> float:
-    """The least difference of the amplitude from one speed to the next (cm)."""
+    """Judge the growth of the amplitude from one speed to the next (cm)."""
     return float(np.diff([amplitude(turn(spring, speed)) for speed in speeds]).min())
 
 
 def _natural_and_half(spring: str, speeds: Sequence[float], line: str) -> list[Verdict]:
-    """The calculated natural frequency, and the amplitude that rises to its half."""
+    """Judge the calculated natural frequency, and the rise of the amplitude up to its half."""
     (natural, right), (half, right_half) = STATED[spring]
     found, at_half, rise = natural_speed(spring), near_fraction(spring, 2)[0], _rises(spring, speeds)
     why, why_half, place = (
@@ -251,7 +252,7 @@ def _natural_and_half(spring: str, speeds: Sequence[float], line: str) -> list[V
 
 
 def _harmonics(spring: str) -> list[Verdict]:
-    """More than one harmonic, but none beyond the second: nothing is noticed where those meet the natural frequency."""
+    """Judge that there is more than one harmonic but no resonance of any beyond the second."""
     sizes = np.array([[harmonic(turn(spring, speed), n) for n in (1, 2, 3)] for speed in SPEEDS[spring]])
     second, third = (sizes[:, 1] / sizes[:, 0]).min(), (sizes[:, 2] / sizes[:, :2].max(axis=1)).max()
     verdicts = [
@@ -268,7 +269,7 @@ def _harmonics(spring: str) -> list[Verdict]:
 
 
 def _travel(spring: str) -> Verdict:
-    """Whether the greatest displacement is met where the rig had to be stopped."""
+    """Judge whether the greatest displacement occurs at the speed at which the rig had to be stopped."""
     last = STOPPED[spring]
     *before, there = (
         float(np.abs(slider(turn(spring, w))).max()) for w in np.arange(SPEEDS[spring][0], last + 1.0, 5.0)

@@ -1,4 +1,4 @@
-"""Studies of ours on rig 1: what lies about resonance, where it could not be run, and what friction explains."""
+"""Studies of ours on rig 1: the motions about resonance, where it could not be run, and the influence of friction."""
 
 from __future__ import annotations
 
@@ -47,31 +47,31 @@ NAMES = ("below resonance", "lower branch", "upper branch", "period of two turns
 
 @cache
 def swept(spring: str, rising: bool) -> Sweep:
-    """What a machine meets as it speeds up or slows down step by step, with spring B about resonance."""
+    """Sweep the speed up or down in steps with spring B about resonance."""
     low, step = (SLOWEST, 25.0) if spring == "A" else (SPLIT, STEP)
     speeds = np.arange(low, FASTEST[spring] + 1.0, step) * RAD_S_PER_RPM
     return sweep(rig(spring), speeds if rising else speeds[::-1])
 
 
 def special_points() -> list[SpecialPoint]:
-    """Fold and period doublings of the branches about resonance with spring B."""
+    """Return the folds and period doublings of the branches about resonance with spring B."""
     return [special for branch in resonant_b().branches for special in branch.special]
 
 
 def speeds_of(kind: Crossing) -> list[float]:
-    """Their speeds (rpm)."""
+    """Return the speeds of special points (rpm)."""
     return [special.parameter / RAD_S_PER_RPM for special in special_points() if special.kind is kind]
 
 
 def upper_orbit(speed: float) -> PeriodicOrbit:
-    """The motion of large amplitude with spring B at a speed (rpm)."""
+    """Find the motion of large amplitude with spring B at a speed (rpm)."""
     upper = resonant_b().branches[1]
     near_it = upper.orbits[int(np.argmin(np.abs(rpm(upper) - speed)))]
     return orbit(rig("B"), speed, near_it.start)
 
 
 def compute_rig_1() -> StudyResult:
-    """Branches of periodic motions, and sweeps with rising and falling speed."""
+    """Compute branches of periodic motions, and sweeps with rising and falling speed."""
     columns = columns_of(motions("A").branches[0], "spring A")
     for name, branch in zip(NAMES, motions("B").branches + resonant_b().branches):
         columns |= columns_of(branch, f"spring B; {name}")
@@ -115,7 +115,7 @@ def compute_rig_1() -> StudyResult:
 
 
 def draw_rig_1(result: StudyResult) -> Figure:
-    """Amplitude over the speed: spring A, spring B up to resonance, and the motions about it."""
+    """Draw the amplitude over the speed: spring A, spring B up to resonance, and the motions about resonance."""
     below = [c for n in NAMES[:2] for c in curves_over_speed(result, f"spring B; {n}", COLOURS[0])]
     about = [c for n, colour in zip(NAMES[1:], COLOURS) for c in curves_over_speed(result, f"spring B; {n}", colour, n)]
     for name, label, line, marker, colour in (
@@ -157,13 +157,13 @@ PIN_RADIUS = 3e-4
 
 
 def lowered(spring: str, **changes: float) -> NDArray[np.float64]:
-    """By what part changes of the rig lower the amplitude at the speeds of comparison."""
+    """Return the relative decrease of the amplitude by changes of the rig, at the speeds of comparison."""
     speeds = COMPARED[spring]
     return np.array([1.0 - amplitude(turn(spring, w, **changes)) / amplitude(turn(spring, w)) for w in speeds])
 
 
 def lag(spring: str, speed: float, coefficient: float) -> float:
-    """By how much friction delays the oscillation, where the two agree best (deg of crank angle)."""
+    """Return the delay of the motion by friction that gives the best agreement (deg of crank angle)."""
     rough, smooth = (slider(turn(spring, speed, slider_friction_coefficient=c))[:-1] for c in (coefficient, 0.0))
     together = np.fft.irfft(np.fft.rfft(rough - rough.mean()) * np.conj(np.fft.rfft(smooth - smooth.mean())))
     shift = 360.0 / len(rough) * int(np.argmax(together))
@@ -171,7 +171,7 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
 
 
 def lost_to_friction(speed: float, coefficient: float) -> float:
-    """Work of friction in the guide over that of the damper in a crank cycle; spring A."""
+    """Return the work of friction in the guide relative to the damper's, over a crank cycle with spring A."""
     of = turn("A", speed, slider_friction_coefficient=coefficient)
     v = of["slider.velocity"]
     viscous = rig("A").slider_damping * np.mean(v**2)
@@ -179,7 +179,7 @@ def lost_to_friction(speed: float, coefficient: float) -> float:
 
 
 def _with(coefficient: float) -> list[Verdict]:
-    """What a coefficient does to what the text says of the amplitudes."""
+    """Judge the statements on the amplitudes with a coefficient of friction."""
     friction, words = {"slider_friction_coefficient": coefficient}, f"; coefficient {coefficient:g}"
     taken = {s: lowered(s, **friction) for s in "AB"}
     shift, ratio = max(abs(lag("A", w, coefficient)) for w in COMPARED["A"]), taken["B"].mean() / taken["A"].mean()
@@ -212,7 +212,7 @@ def _with(coefficient: float) -> list[Verdict]:
 
 
 def compute_friction() -> StudyResult:
-    """Amplitude over the speed with friction, and what becomes of the statements on the amplitudes."""
+    """Compute the amplitude over the speed with friction, and judge the statements on the amplitudes."""
     columns: dict[str, NDArray[np.float64]] = {}
     for s in "AB":
         columns[f"speed; spring {s} [rpm]"] = GRID[s]
@@ -267,7 +267,7 @@ def compute_friction() -> StudyResult:
 
 
 def draw_friction(result: StudyResult) -> Figure:
-    """Amplitude over the speed, and a turn, one curve a coefficient."""
+    """Draw the amplitude over the speed and a turn, one curve a coefficient."""
     panels = []
     for s, speed in SHOWN.items():
         verticals = {words: place for words, place in marks(s, 2, 3, 4).items() if place > GRID[s][0]}

@@ -1,4 +1,4 @@
-"""The resonance curves of rig 2, figures 8.19 to 8.21, and what its drive and its pins carry."""
+"""Resonance curves of rig 2, figures 8.19 to 8.21, and the loads on its drive and pins."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ BEYOND, STRONGER = 1000.0, 1.25
 
 @cache
 def linear_motion(spring: str, speed: float) -> HarmonicMotion:
-    """u/l4 at a speed (rpm) by two harmonics of the linear equation of chapter IV, put right."""
+    """Return u/l4 at a speed (rpm) by two harmonics of the corrected linear equation of chapter IV."""
     return two_harmonics(slider_equation(rig(spring), speed * RAD_S_PER_RPM, variant=Variant.SECOND_ORDER))
 
 
 def length(spring: str) -> float:
-    """The rocker's length (cm), over which amplitudes are."""
+    """Return the rocker's length (cm), the reference of amplitudes."""
     return CM_PER_METRE * rig(spring).rocker_length
 
 
 def compute_resonance(number: str, spring: str) -> StudyResult:
-    """Amplitude over the speed by the full equations and by two harmonics of the linear one."""
+    """Compute the amplitude over the speed by the full equations and by two harmonics of the linear one."""
     (branch,), l4 = motions(spring).branches, length(spring)
     place, peak = near_fraction(spring, 1)
     speeds = np.unique(np.append(CURVE, place)).tolist()
@@ -92,7 +92,7 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
 
 
 def _natural_frequencies(spring: str, place: float) -> list[Verdict]:
-    """What the thesis sees and calculates."""
+    """Judge the natural frequencies that the thesis measures and calculates."""
     (seen, calculated, right), natural = NATURAL[spring], natural_speed(spring)
     why, section = "582 and 829 rpm are not as 1 to the root of 2", "8.4.2.2, L6867"
     verdicts = [
@@ -119,7 +119,7 @@ def _natural_frequencies(spring: str, place: float) -> list[Verdict]:
 
 
 def _beyond(spring: str) -> list[Verdict]:
-    """Whether what the thesis names makes resonance wider and the amplitude beyond it larger than the theory's."""
+    """Judge whether the causes named in the thesis broaden the resonance and raise the amplitude beyond it."""
     base, damping = amplitude(turn(spring, BEYOND)), STRONGER * rig(spring).slider_damping
     rough, damped = (
         turn(spring, BEYOND, slider_friction_coefficient=SLIGHT),
@@ -139,7 +139,7 @@ def _beyond(spring: str) -> list[Verdict]:
 
 
 def draw_resonance(spring: str, result: StudyResult) -> Figure:
-    """Amplitude over l4 over the speed."""
+    """Draw the amplitude relative to l4 over the speed."""
     panel = Panel(
         x_label="crank speed [rpm]",
         y_label="amplitude of u / l4",
@@ -167,7 +167,7 @@ ORDERS = (1, 2, 3)
 
 
 def compute_harmonics() -> StudyResult:
-    """The second harmonic over l4 over the speed, by the full and the linear equations; the first and third beside it."""
+    """Compute three harmonics relative to l4 over the speed, and the second by the linear equation too."""
     columns: dict[str, NDArray[np.float64]] = {}
     verdicts: list[Verdict] = []
     points = CURVE[::3]
@@ -204,7 +204,7 @@ def compute_harmonics() -> StudyResult:
 
 
 def draw_harmonics(result: StudyResult) -> Figure:
-    """The harmonics, one panel a spring, the second in front."""
+    """Draw the harmonics, one panel a spring, the second in front."""
     panels = []
     for spring in "CD":
         name = f"spring {spring}"
@@ -251,7 +251,7 @@ TORQUES = ("greatest crank torque", "mean crank torque")
 
 
 def compute_forces() -> StudyResult:
-    """Crank torque and pin forces along the motions, and what resonance adds to the law of low speeds."""
+    """Compute crank torque and pin forces along the motions, and their departure from the law of low speeds."""
     columns: dict[str, NDArray[np.float64]] = {}
     verdicts: list[Verdict] = []
     for spring in "CD":
@@ -283,12 +283,12 @@ def compute_forces() -> StudyResult:
 
 
 def amplification(branch: Branch, force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A force along a branch over what it would be if it grew with the square of the speed from the branch's low end."""
+    """Return a force along a branch relative to one that grows with the square of the speed from the branch's low end."""
     return np.asarray(force / (force[0] * (branch.parameter / branch.parameter[0]) ** 2))
 
 
 def power_balance(branch: Branch) -> float:
-    """Mean power at the crank less the damper's, relative to the greatest torque's; the greatest along a branch."""
+    """Return the greatest difference of mean crank and damper power along a branch, relative to that of the greatest torque."""
     damping = branch.family.parameters.slider_damping
     worst = 0.0
     for speed, of in zip(branch.parameter, (motion.turn() for motion in branch.orbits)):
@@ -299,7 +299,7 @@ def power_balance(branch: Branch) -> float:
 
 
 def draw_forces(result: StudyResult) -> Figure:
-    """Torque above, pin forces below, one column a spring; dotted the law of low speeds."""
+    """Draw the torque above and the pin forces below, one column a spring, with the law of low speeds dotted."""
     torques, forces = [], []
     for spring in "CD":
         name = f"spring {spring}"
