@@ -12,7 +12,7 @@ from .study import FAILS, HOLDS, LISTING, OURS, TEXT, UNJUDGED
 _HEADINGS = "| statement | source | where | stated | computed | verdict |\n| --- | --- | --- | --- | --- | --- |"
 #: A row of a table of verdicts: its source and its verdict.
 _ROW = re.compile(
-    rf"^\| .* \| ({TEXT}|{LISTING}|{OURS}) \| .* \| \**({HOLDS}|{FAILS}|{UNJUDGED})\** \|$", flags=re.MULTILINE
+    rf"^\| .* \| ({TEXT}|{LISTING}|{OURS.kind}) \| .* \| \**({HOLDS}|{FAILS}|{UNJUDGED})\** \|$", flags=re.MULTILINE
 )
 
 
@@ -37,7 +37,9 @@ def figures(numbers: Iterable[str]) -> str:
         for v in result.verdicts:
             computed = "; ".join(part for part in (v.found, v.why) if part)
             outcome = v.outcome if v.holds else f"**{v.outcome}**"
-            lines.append(f"| {v.statement} | {v.source} | {v.place} | {v.expected} | {computed} | {outcome} |")
+            lines.append(
+                f"| {v.statement} | {v.source.kind} | {v.source.place} | {v.expected} | {computed} | {outcome} |"
+            )
         lines.append("")
     return "\n".join(lines)
 
@@ -47,9 +49,9 @@ def count(page: str) -> str:
     found = Counter(_ROW.findall(page))
     thesis = {outcome: found[TEXT, outcome] + found[LISTING, outcome] for outcome in (HOLDS, FAILS, UNJUDGED)}
     listing = sum(number for (source, _), number in found.items() if source == LISTING)
-    ours = sum(number for (source, _), number in found.items() if source == OURS)
+    ours = sum(number for (source, _), number in found.items() if source == OURS.kind)
     return (
         f"Of {sum(thesis.values())} statements of the thesis {thesis[HOLDS]} hold, {thesis[FAILS]} do not, and "
         f"{thesis[UNJUDGED]} cannot be judged, each with the reason. {listing} of them come from its program when it is run, "
-        f"the others from its text. Of {ours} checks of ours {found[OURS, HOLDS]} hold."
+        f"the others from its text. Of {ours} checks of ours {found[OURS.kind, HOLDS]} hold."
     )

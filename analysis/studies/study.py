@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +14,31 @@ from ..figures import Curve, Figure
 from ..files import save_figure, write_csv
 from . import STUDIES, file_stem, is_figure
 
-#: Sources of a statement: the thesis's text, its program when run, our derivations and checks.
-TEXT, LISTING, OURS = "text", "listing", "ours"
+#: Kinds of sources: the thesis's text, and its program when run.
+TEXT, LISTING = "text", "listing"
 #: What a verdict may be.
 HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
+
+
+class Source(NamedTuple):
+    """Source of a statement: its kind, and its place in the thesis (section, lines L of the scanned text)."""
+
+    kind: str
+    place: str = ""
+
+
+#: Our own derivations and checks.
+OURS = Source("ours")
+
+
+def text(place: str) -> Source:
+    """Return a place in the thesis's text as a source."""
+    return Source(TEXT, place)
+
+
+def listing(place: str) -> Source:
+    """Return the thesis's program when run as a source."""
+    return Source(LISTING, place)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,10 +49,7 @@ class Verdict:
     ----------
     statement : str
         The statement in words, without its number.
-    source : str
-        `TEXT`, `LISTING` or `OURS`.
-    place : str
-        Section, and lines (L) of the scanned text; empty for ours.
+    source : Source
     stated, computed : float or None
         The two values in ``unit``; None where the statement cannot be judged.
     lower, upper : float
@@ -40,8 +59,7 @@ class Verdict:
     """
 
     statement: str
-    source: str
-    place: str = ""
+    source: Source
     stated: float | None = None
     computed: float | None = None
     lower: float = -np.inf
@@ -50,7 +68,7 @@ class Verdict:
     why: str = ""
 
     def __str__(self) -> str:
-        source = f"{self.source}, {self.place}" if self.place else self.source
+        source = ", ".join(part for part in self.source if part)
         if self.computed is None:
             return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
         outcome = HOLDS if self.holds else f"{FAILS.upper()}{self.why and f': {self.why}'}"
@@ -81,53 +99,38 @@ class Verdict:
 
 
 def near(
-    statement: str,
-    source: str,
-    stated: float,
-    computed: float,
-    tolerance: float,
-    unit: str = "",
-    *,
-    place: str = "",
-    why: str = "",
+    statement: str, source: Source, stated: float, computed: float, tolerance: float, unit: str = "", *, why: str = ""
 ) -> Verdict:
     """Judge a value that is stated to within a tolerance."""
     bounds = {"lower": stated - tolerance, "upper": stated + tolerance}
-    return _judged(statement, source, stated, computed, unit, place, why, **bounds)
+    return _judged(statement, source, stated, computed, unit, why, **bounds)
 
 
 def at_least(
-    statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
+    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
 ) -> Verdict:
     """Judge a value that is stated as a lower bound."""
-    return _judged(statement, source, stated, computed, unit, place, why, lower=stated)
+    return _judged(statement, source, stated, computed, unit, why, lower=stated)
 
 
 def at_most(
-    statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
+    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
 ) -> Verdict:
     """Judge a value that is stated as an upper bound."""
-    return _judged(statement, source, stated, computed, unit, place, why, upper=stated)
+    return _judged(statement, source, stated, computed, unit, why, upper=stated)
 
 
 def _judged(
-    statement: str, source: str, stated: float, computed: float, unit: str, place: str, why: str, **bounds: float
+    statement: str, source: Source, stated: float, computed: float, unit: str, why: str, **bounds: float
 ) -> Verdict:
     return Verdict(
-        statement=statement,
-        source=source,
-        place=place,
-        stated=stated,
-        computed=float(computed),
-        unit=unit,
-        why=why,
-        **bounds,
+        statement=statement, source=source, stated=stated, computed=float(computed), unit=unit, why=why, **bounds
     )
 
 
-def unjudged(statement: str, source: str, why: str, *, place: str) -> Verdict:
+def unjudged(statement: str, source: Source, why: str) -> Verdict:
     """Record a statement that cannot be judged, with the reason."""
-    return Verdict(statement=statement, source=source, place=place, why=why)
+    return Verdict(statement=statement, source=source, why=why)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

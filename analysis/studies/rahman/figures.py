@@ -36,7 +36,7 @@ from ...slider_crank import (
     ranges,
 )
 from ...units import INCH
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
 from .table import (
     AXIAL_LB,
     COMPONENTS,
@@ -167,15 +167,15 @@ def _motion(family: str) -> list[Verdict]:
         sine = (first * np.exp(1j * np.radians(ANGLES_DEG))).real
         away = np.abs(position(case) - np.mean(position(case)[:-1]) - sine).max() / (0.5 * _stroke(case))
         statement = f"greatest departure of the displacement from a sine, relative to half the stroke; {case.name}"
-        verdicts.append(at_most(statement, TEXT, ALMOST, away, place=place))
+        verdicts.append(at_most(statement, text(place), ALMOST, away))
         if case.twist_deg == IDEAL.twist_deg:
             longer, name = _stroke(case) / _stroke(IDEAL), f"stroke relative to the ideal one's; {case.name}"
-            verdicts.append(at_most(name, TEXT, 1.0, longer, place=place, why="a4 lengthens it"))
+            verdicts.append(at_most(name, text(place), 1.0, longer, why="a4 lengthens it"))
     if family == "offset":
         power = [float(np.mean(_torque(case)[:-1]) * CRANK_SPEED) for case in (IDEAL, *cases)]
         saved, name = power[0] - min(power[1:]), "mean power that an offset saves at the same RPM without a load"
         why = "a motion without friction takes none"
-        verdicts.append(at_least(name, TEXT, NOTHING, saved, "lb.in/s", place=place, why=why))
+        verdicts.append(at_least(name, text(place), NOTHING, saved, "lb.in/s", why=why))
         for a4, stroke in STROKES_IN.items():
             planar = Case("", a4, 0.0, 270.0)
             verdicts.append(near(f"stroke; a4 = {a4:g} in with S1 = 0", OURS, stroke, _stroke(planar), 5e-4, "in"))
@@ -213,20 +213,18 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
         stated, counts = SPIKES.get(symbol, 2), [spikes.size for spikes in found]
         count = max(counts, key=lambda n: abs(n - stated))
         why = "3F3j, 3F3k have none, the others two" if count != stated else ""
-        verdicts.append(
-            near(f"spikes of {symbol} in a turn", TEXT, stated, count, 0.0, place="section 3.3, L1125", why=why)
-        )
+        verdicts.append(near(f"spikes of {symbol} in a turn", text("section 3.3, L1125"), stated, count, 0.0, why=why))
     if any(spikes.size for spikes in found):
         distance = max(float(np.abs(spikes - SPIKES_DEG).max()) for spikes in found)
         name = f"distance of the spikes of {symbol} from 100 and 300 deg"
-        verdicts.append(at_most(name, TEXT, SPIKES_TO, distance, "deg", place="sections 3.2, 3.3, L1115, L1125"))
+        verdicts.append(at_most(name, text("sections 3.2, 3.3, L1115, L1125"), SPIKES_TO, distance, "deg"))
         distance = max(float(np.abs(spikes - dead_centres_deg(case)).max()) for case, spikes in zip(cases, found))
         verdicts.append(at_most(f"distance of the spikes of {symbol} from dead centres", OURS, 0.005, distance, "deg"))
     if family == "offset":
         name = f"greatest magnitude of {symbol}, least gain from one a4 to the next"
         gain, with_load = (_offsets_gain(component, given) for given in ("torque", "load"))
         why = "nearer to a dead centre than the others" if gain < 0.0 else ""
-        verdicts.append(at_least(name, TEXT, 0.0, gain, component.unit, place="section 3.3, L1125", why=why))
+        verdicts.append(at_least(name, text("section 3.3, L1125"), 0.0, gain, component.unit, why=why))
         # along the guide nothing acts without a load
         if component.source != "slider_force":
             verdicts.append(at_least(f"{name}, with the slider's load given", OURS, 0.0, with_load, component.unit))
@@ -264,12 +262,12 @@ def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict
         moment = values(case, component)
         printed, full = (greatest(case, moment - formula) for formula in moment_by_forces(case, axis))
         name, why = f"greatest magnitude of {symbol} - ({short}); {case.name}", f"lacks{lacking}"
-        verdicts.append(near(name, TEXT, 0.0, printed, NOTHING, "lb.in", place=place, why=why))
+        verdicts.append(near(name, text(place), 0.0, printed, NOTHING, "lb.in", why=why))
         name = f"greatest magnitude of {symbol} - ({short}{lacking}); {case.name}"
         verdicts.append(near(name, OURS, 0.0, full, NOTHING, "lb.in"))
     least = min(greatest(case, values(case, component)) for case in cases)
     name = f"greatest magnitude of {symbol}, which S1 brings about, least of the cases"
-    return [*verdicts, at_least(name, TEXT, NOTHING, least, "lb.in", place="section 3.3, L1125-1127")]
+    return [*verdicts, at_least(name, text("section 3.3, L1125-1127"), NOTHING, least, "lb.in")]
 
 
 def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
@@ -299,7 +297,7 @@ def _constant() -> list[Verdict]:
 
     def none(name: str, case: Case, size: float, unit: str, place: str, why: str) -> Verdict:
         what = f"greatest magnitude of {name}; {case.name}"
-        return near(what, TEXT, 0.0, size, NOTHING, unit, place=place, why=why if size > NOTHING else "")
+        return near(what, text(place), 0.0, size, NOTHING, unit, why=why if size > NOTHING else "")
 
     for case, axial, pin in zip(cases, about["1F1k"], about["2F2k"]):
         size, given = greatest(case, pin), "section 2.8, after eq 64, L945-949"
@@ -321,14 +319,12 @@ def _constant() -> list[Verdict]:
     )
     for which, pick in (("least", np.nanmin), ("greatest", np.nanmax)):
         pin, torque = (pick([pick(found) for found in about[name]]) for name in ("2F2j", "1T1k"))
-        verdicts.append(near(f"{which} 2F2j of all cases", TEXT, -8.33, pin, 0.005, "lb", place=place))
+        verdicts.append(near(f"{which} 2F2j of all cases", text(place), -8.33, pin, 0.005, "lb"))
         given = "section 3.1, L1079"
-        verdicts.append(near(f"{which} 1T1k of all cases", TEXT, TORQUE, torque, NOTHING, "lb.in", place=given))
+        verdicts.append(near(f"{which} 1T1k of all cases", text(given), TORQUE, torque, NOTHING, "lb.in"))
     for symbol in ("4T4i", "4T4j", "4T4k"):
         size = max(float(np.abs(values(case, COMPONENTS[symbol])).max()) for case in (IDEAL, *cases))
-        verdicts.append(
-            near(f"greatest magnitude of {symbol} in all cases", TEXT, 0.0, size, NOTHING, "lb.in", place=place)
-        )
+        verdicts.append(near(f"greatest magnitude of {symbol} in all cases", text(place), 0.0, size, NOTHING, "lb.in"))
     return verdicts
 
 

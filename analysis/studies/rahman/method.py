@@ -20,7 +20,7 @@ from ...numerics.dual import Dual, about_i, about_j, about_k, axial
 from ...slider_crank import CLEAR_DEG, Settled, assembly_margin, constant_shift, greatest_shift, settle
 from ...slider_crank.closure import Rows, chain, equations, freedoms, planar, residuals
 from ...units import INCH
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .figures import ANGLE, ANGLES_DEG, CRANK, NOTHING, TORQUE, clear, dead_centres_deg, printed, printed_symbol, values
 from .printed import (
     GRID_DEG,
@@ -84,7 +84,7 @@ def joints(unknowns: FloatArray) -> Joints:
 
 def _nothing(name: str, size: ArrayLike, unit: str, place: str, why: str = "") -> Verdict:
     """Judge that a quantity vanishes, usually the difference between an equation and its correct value."""
-    return near(name, TEXT, 0.0, float(np.abs(size)), NOTHING, unit, place=place, why=why)
+    return near(name, text(place), 0.0, float(np.abs(size)), NOTHING, unit, why=why)
 
 
 # ---------------------------------------------------------------- the loop
@@ -116,7 +116,7 @@ def _limits() -> list[Verdict]:
     within = "the thesis does not say how many corrections it allows"
     rounding = "where the iteration ends there depends on rounding: 1e-9 in more or less of S1 decide it"
     verdicts = [
-        unjudged(statement, TEXT, rounding, place=place)
+        unjudged(statement, text(place), rounding)
         for statement in (
             f"the iteration converges up to S1 = {SHIFTS_REACHED_IN[0.0]:g} in at a4 = 0",
             "beyond its limits closure is lost, or the slider goes to the opposite side",
@@ -126,26 +126,26 @@ def _limits() -> list[Verdict]:
         settled = turn(parameters(a4), stated + np.array([0.0, 0.5, 1.0])).settled
         reached = stated + 0.5 * (int(np.cumprod(settled).sum()) - 1)
         name = f"greatest S1, by halves, at which the printed iteration settles, to within 1 in; a4 = {a4:g} in"
-        verdicts.append(near(name, TEXT, stated, reached, 1.0, "in", place=place, why=within))
+        verdicts.append(near(name, text(place), stated, reached, 1.0, "in", why=within))
     for which, stated, way in zip(("least", "greatest"), TWISTS_REACHED_DEG, (-1.0, 1.0)):
         reached = stated
         while turn(parameters(20.0, reached + way), 0.0).settled.all():
             reached += way
         name = f"{which} alpha4, by degrees, at which the printed iteration settles, to within 1 deg"
         why = within if reached != stated else ""
-        verdicts.append(near(name, TEXT, stated, reached, 1.0, "deg", place=place, why=why))
+        verdicts.append(near(name, text(place), stated, reached, 1.0, "deg", why=why))
     shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in GREATEST_SHIFTS_IN}
     for a4, stated in SHIFTS_REACHED_IN.items():
         name, why = f"greatest S1 at which the mechanism works; a4 = {a4:g} in", "a limit of the iteration alone"
-        verdicts.append(near(name, TEXT, stated, shifts[a4], 0.5, "in", place=place, why=why))
+        verdicts.append(near(name, text(place), stated, shifts[a4], 0.5, "in", why=why))
     gain = min(after - before for before, after in pairwise(shifts.values()))
     name = "gain of the greatest S1 from one a4 to the next, least of all"
-    verdicts.append(at_least(name, TEXT, 0.0, gain, "in", place=place, why="it falls with a4"))
+    verdicts.append(at_least(name, text(place), 0.0, gain, "in", why="it falls with a4"))
     rest, (least, most) = constant_shift(0.0), TWISTS_REACHED_DEG
     margins = [assembly_margin(parameters(20.0, twist), rest).length / INCH for twist in range(0, 360, 5)]
     name, works = "range of alpha4 in which the mechanism works", 5.0 * sum(margin > 0.0 for margin in margins)
     why = "it turns fully at every alpha4"
-    verdicts.append(near(name, TEXT, most - least, works, 5.0, "deg", place=place, why=why))
+    verdicts.append(near(name, text(place), most - least, works, 5.0, "deg", why=why))
     verdicts.append(at_least("least margin of assembly at every 5 deg of alpha4", OURS, 0.0, min(margins), "in"))
     return verdicts + [
         near(f"greatest S1 at which the crank turns fully; a4 = {a4:g} in", OURS, stated, shifts[a4], 5e-4, "in")
@@ -184,8 +184,8 @@ def _in_the_plane() -> list[Verdict]:
     )
     least = f"fewest {many}, in the plane, from estimates 20 deg off"
     return [
-        at_least(least, TEXT, 3.0, np.min(close_by), place=place),
-        *(at_most(name, TEXT, most, size, unit, place=where, why=why) for name, most, size, unit, where, why in rows),
+        at_least(least, text(place), 3.0, np.min(close_by)),
+        *(at_most(name, text(where), most, size, unit, why=why) for name, most, size, unit, where, why in rows),
     ]
 
 
@@ -196,9 +196,9 @@ def closure() -> StudyResult:
     (first, *_) = OPEN
     p, ended = parameters(first.offset_in), followed(first).unknowns[4, 0] * [1.0, 1.0, 1.0, 1.0, INCH]
     left = freedoms(p, float(np.radians(GRID_DEG[4])), first.shift_in * INCH, ended)
-    verdicts.append(near(name, TEXT, 2.0, left, 0.0, place="eqs 1 to 5, L193, L358, L465-471", why=why))
+    verdicts.append(near(name, text("eqs 1 to 5, L193, L358, L465-471"), 2.0, left, 0.0, why=why))
     name = "operators times matrices less difference quotients"
-    verdicts.append(at_most(name, TEXT, ROUGH, _operators(), place="eqs 2a to 4a, L320-352"))
+    verdicts.append(at_most(name, text("eqs 2a to 4a, L320-352"), ROUGH, _operators()))
     smallest, unmet = np.inf, 0.0
     for case, reference in OPEN.items():
         found, mechanism = followed(case), parameters(case.offset_in, case.twist_deg)
@@ -222,7 +222,7 @@ def closure() -> StudyResult:
     name = "greatest entry of A Delta - V where the iteration ends"
     verdicts.append(_nothing(name, unmet, "", "eqs 23, 23a, L457-463", "erratum 1: there A'V = 0 alone"))
     name = "least singular value of A relative to its greatest, over the turns"
-    verdicts.append(at_least(name, TEXT, NOTHING, smallest, place="section 3.3, L1131"))
+    verdicts.append(at_least(name, text("section 3.3, L1131"), NOTHING, smallest))
     for words, rows, from_before, rotation, error, digit in VARIANTS:
         other, name = followed(first, rows, from_before), f"loop open by a rotation, {words}"
         verdicts.append(near(name, OURS, rotation, np.max(other.rotation_deg), digit, "deg"))
@@ -274,7 +274,7 @@ def _printed_rates() -> list[Verdict]:
     slip = shift_rate - ratio * shift * np.cos(ratio * angle)
     coefficients, less = "rank of the coefficients of eq 38", "less the solution of 37a to 37e"
     verdicts = [
-        near(name, TEXT, 5.0, rank, 0.0, place="eq 38, L561-563", why=why)
+        near(name, text("eq 38, L561-563"), 5.0, rank, 0.0, why=why)
         for name, rank, why in (
             (coefficients, ranks[0], ""),
             (f"{coefficients} with its right side", ranks[1], "erratum 3: six equations, of which five are solved"),
@@ -323,7 +323,7 @@ def _dead_centres() -> list[Verdict]:
         "greatest accelerations by eqs 38a, 39a, 42a within 10 deg of a spike relative to elsewhere, ten being abnormal"
     )
     why = "the spikes are not of roundoff: at dead centres the torque has no lever on the slider"
-    return [*verdicts, at_least(name, TEXT, 10.0, worst, place=place, why=why)]
+    return [*verdicts, at_least(name, text(place), 10.0, worst, why=why)]
 
 
 def velocities() -> StudyResult:
@@ -344,7 +344,7 @@ def velocities() -> StudyResult:
         name = f"row 37f with erratum 2 mended, independent reconstruction; {case.name}"
         verdicts.append(near(name, OURS, mended_stated, float(np.abs(mended).max()), 0.5, "in/s"))
     lost = "the scan has lost the second dots; the thesis computes with eqs 57 and 58 in their place (L859)"
-    verdicts.append(unjudged("eqs 55 and 56 are the rates of 50a and 51a", TEXT, lost, place="eqs 55, 56, L758-846"))
+    verdicts.append(unjudged("eqs 55 and 56 are the rates of 50a and 51a", text("eqs 55, 56, L758-846"), lost))
     return StudyResult(
         number="rahman-rates",
         claim="Eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
@@ -414,20 +414,8 @@ def forces() -> StudyResult:
     mended = planar_forces(erratum_5=True, erratum_6=True)
     for words, five, six, place, why in (
         ("as printed", False, False, "section 3.2, L1111", "errata 5 and 6"),
-        (
-            "erratum 6 mended",
-            False,
-            True,
-            "eqs 62, 64, L887-891",
-            "erratum 5: signs of f1 and f3",
-        ),
-        (
-            "erratum 5 mended",
-            True,
-            False,
-            "section 3.1, L1085-1087",
-            "erratum 6: signs of g1 and g2",
-        ),
+        ("erratum 6 mended", False, True, "eqs 62, 64, L887-891", "erratum 5: signs of f1 and f3"),
+        ("erratum 5 mended", True, False, "section 3.1, L1085-1087", "erratum 6: signs of g1 and g2"),
         ("both mended", True, True, "", ""),
     ):
         found = planar_forces(erratum_5=five, erratum_6=six)
@@ -445,9 +433,7 @@ def forces() -> StudyResult:
         verdicts=(
             *verdicts,
             *_slips(mended),
-            unjudged(
-                "with an offset fatigue failure is likely at high speed", TEXT, strength, place="section 3.3, L1125"
-            ),
+            unjudged("with an offset fatigue failure is likely at high speed", text("section 3.3, L1125"), strength),
         ),
     )
 

@@ -25,7 +25,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import mean_effective_mass
 from ...run import Event, Inputs, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, text
 from . import free_crank
 from .runs import (
     LINEAR,
@@ -139,14 +139,14 @@ def drift_result() -> StudyResult:
             f"turns of a transient down to 5 %; {_mu(mu)}",
             "" if mu == 1e4 else "the damper ends it sooner",
         )
-        settling.append(near(statement, TEXT, 2.0, turns, 0.5, place="L1907", why=why))
+        settling.append(near(statement, text("L1907"), 2.0, turns, 0.5, why=why))
         statement, why = f"third turn's drift relative to the first's; {_mu(mu)}", "" if mu >= 5e5 else "it accelerates"
-        drifts.append(near(statement, TEXT, 1.0, run.growth, LINEAR, place="L1911", why=why))
+        drifts.append(near(statement, text("L1911"), 1.0, run.growth, LINEAR, why=why))
         if mu > 1e4:
             statement = (
                 f"change of the motion's shape from the third turn to the fourth, relative to its range; {_mu(mu)}"
             )
-            shapes.append(at_most(statement, TEXT, LINEAR, run.unsteadiness, place="L1909", why=why))
+            shapes.append(at_most(statement, text("L1909"), LINEAR, run.unsteadiness, why=why))
         if mu in COLLINEAR:
             stated, tolerance = COLLINEAR[mu]
             folds.append(near(f"links collinear; {_mu(mu)}", OURS, stated, run.collinear_turn, tolerance, "turns"))
@@ -163,8 +163,8 @@ def drift_result() -> StudyResult:
         columns=padded(columns),
         verdicts=(
             *(*settling, *shapes, *drifts),
-            at_most("third turn's drift relative to that with the next weaker damper", TEXT, 1.0, rates, place="L1917"),
-            at_most("turns until collinear relative to the next stronger damper", TEXT, 1.0, sooner, place="L1919"),
+            at_most("third turn's drift relative to that with the next weaker damper", text("L1917"), 1.0, rates),
+            at_most("turns until collinear relative to the next stronger damper", text("L1919"), 1.0, sooner),
             at_least("third turn's drift less the first's, least of all dampers", OURS, 0.0, gain, "cm"),
             *folds,
         ),
@@ -182,10 +182,8 @@ def weightless_result() -> StudyResult:
         weighing, weightless = (sum(drift(mu, g).per_turn(n) for n in (1, 2, 3)) / 3.0 for g in (9.81, 0.0))
         ratio, statement = weightless / weighing, f"M without gravity less M with it; {_mu(mu)}"
         verdicts += [
-            at_most(
-                f"size of M without gravity over that with it; {_mu(mu)}", TEXT, 1.0, ratio, place="L1930", why=why
-            ),
-            at_most(statement, TEXT, 0.0, weightless - weighing, "cm a turn", place="L1930"),
+            at_most(f"size of M without gravity over that with it; {_mu(mu)}", text("L1930"), 1.0, ratio, why=why),
+            at_most(statement, text("L1930"), 0.0, weightless - weighing, "cm a turn"),
             near(f"drift over three turns without gravity over that with it; {_mu(mu)}", OURS, 1.25, ratio, 0.03),
         ]
     for words, g, stated in (("with gravity", 9.81, -1.93), ("without gravity", 0.0, -2.38)):
@@ -269,28 +267,21 @@ def _steady_verdicts() -> list[Verdict]:
         away = np.abs(second - turn.slider_cm[:-1:4]).max() / np.ptp(turn.slider_cm)
         statement = f"distance from the steady motion in the second turn, relative to its range; {_k(k)}"
         why = "" if k == 2e6 else "the transient goes on"
-        verdicts.append(at_most(statement, TEXT, ON_THE_GRAPH, away, place="L1948", why=why))
+        verdicts.append(at_most(statement, text("L1948"), ON_THE_GRAPH, away, why=why))
     change, softer = (
         max(turn.change for turn in turns.values()),
         "{} relative to that with the next softer spring".format,
     )
     sooner, nearer = (greatest_ratio(np.array(list(x.values()))) for x in (places, means))
     verdicts += [
-        at_most("change of u from one turn to the next", TEXT, 1e-7, change, "cm", place="L1950"),
-        at_most("mean of u, greatest of the three springs", TEXT, 0.0, max(means.values()), "cm", place="L1952"),
-        at_most(softer("mean of u"), TEXT, 1.0, nearer, place="L1954"),
+        at_most("change of u from one turn to the next", text("L1950"), 1e-7, change, "cm"),
+        at_most("mean of u, greatest of the three springs", text("L1952"), 0.0, max(means.values()), "cm"),
+        at_most(softer("mean of u"), text("L1954"), 1.0, nearer),
         # 22 and 0 were read from a figure
-        near(f"crank angle of the least u; {_k(5e5)}", TEXT, 22.0, places[5e5], 2.0, "deg", place="L1962"),
-        at_most(softer("crank angle of the least u"), TEXT, 1.0, sooner, place="L1964"),
+        near(f"crank angle of the least u; {_k(5e5)}", text("L1962"), 22.0, places[5e5], 2.0, "deg"),
+        at_most(softer("crank angle of the least u"), text("L1964"), 1.0, sooner),
         near(
-            f"crank angle of the least u; {_k(2e6)}",
-            TEXT,
-            0.0,
-            places[2e6],
-            2.0,
-            "deg",
-            place="L1966",
-            why="it comes later",
+            f"crank angle of the least u; {_k(2e6)}", text("L1966"), 0.0, places[2e6], 2.0, "deg", why="it comes later"
         ),
     ]
     for k, (angle, mean) in STEADY.items():
@@ -318,19 +309,11 @@ def _shape_verdicts() -> list[Verdict]:
         "the slider swings on its spring",
     )
     return [
-        near(same("least", "greatest"), TEXT, 1.0, rise, 0.2, place="L1968", why=steeper),
-        near(same("greatest", "least"), TEXT, 1.0, fall, 0.2, place="L1968"),
-        at_most(width("in crank angle from least to greatest"), TEXT, 1.0, greatest_ratio(widths), place="L1976"),
-        at_most(width("in u from least to greatest"), TEXT, 1.0, greatest_ratio(ranges), place="L1976", why=wider),
-        near(
-            f"range of the slope of the fall over its mean; {_k(1e7)}",
-            TEXT,
-            0.0,
-            varies,
-            0.2,
-            place="L1980",
-            why=swings,
-        ),
+        near(same("least", "greatest"), text("L1968"), 1.0, rise, 0.2, why=steeper),
+        near(same("greatest", "least"), text("L1968"), 1.0, fall, 0.2),
+        at_most(width("in crank angle from least to greatest"), text("L1976"), 1.0, greatest_ratio(widths)),
+        at_most(width("in u from least to greatest"), text("L1976"), 1.0, greatest_ratio(ranges), why=wider),
+        near(f"range of the slope of the fall over its mean; {_k(1e7)}", text("L1980"), 0.0, varies, 0.2, why=swings),
     ]
 
 
@@ -395,29 +378,19 @@ def torque_result() -> StudyResult:
         "extremes, where the slider's accelerations differ.",
         columns=columns,
         verdicts=(
-            near("crank angle of the sudden reversal", TEXT, 0.0, reversal, 10.0, "deg", place="L1993"),
-            at_most("difference between springs 30 deg from extremes", TEXT, ON_THE_GRAPH, elsewhere, place="L1995"),
-            near(
-                nearest("torque"),
-                TEXT,
-                0.0,
-                away[spread.argmax()],
-                10.0,
-                "deg",
-                place="L1999, L2019",
-                why=in_the_reversal,
-            ),
+            near("crank angle of the sudden reversal", text("L1993"), 0.0, reversal, 10.0, "deg"),
+            at_most("difference between springs 30 deg from extremes", text("L1995"), ON_THE_GRAPH, elsewhere),
+            near(nearest("torque"), text("L1999, L2019"), 0.0, away[spread.argmax()], 10.0, "deg", why=in_the_reversal),
             near(
                 nearest("slider's acceleration"),
-                TEXT,
+                text("L2001, L2023"),
                 0.0,
                 away[2 + accelerations.argmax()],
                 10.0,
                 "deg",
-                place="L2001, L2023",
                 why="they differ most where the torque hardly does",
             ),
-            at_most("mean torque beyond the damper's, over the peak", TEXT, 1e-5, unpaid, place="L2007-2017"),
+            at_most("mean torque beyond the damper's, over the peak", text("L2007-2017"), 1e-5, unpaid),
             near("difference between k = 5e5 and 2e6, relative to the peak", OURS, 0.096, spread.max(), 5e-4),
             near("greatest torque; k = 1e6 dyn/cm", OURS, 1.46e7, high, 0.005e7, "dyn.cm"),
             near("crank angle of the greatest torque", OURS, 327.0, high_at, 0.5, "deg"),

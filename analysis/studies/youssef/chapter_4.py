@@ -30,7 +30,7 @@ from ...youssef import (
     slider_equation,
     two_harmonics,
 )
-from ..study import LISTING, OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, listing, near, text
 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios I4 whose resonances by appendix 2 are known.
@@ -113,14 +113,13 @@ def growth_verdicts(columns: dict[str, NDArray[np.float64]], n: int, place: str)
     widths = [np.count_nonzero(harmonic(n, near_it, ratio) > level) for ratio in INERTIA_RATIOS]
     return [
         at_least(
-            "amplitude outside the resonance to that at the next smaller I4, least", TEXT, 1.0, min(ratios), place=place
+            "amplitude outside the resonance to that at the next smaller I4, least", text(place), 1.0, min(ratios)
         ),
         at_least(
             f"width of the region of resonance, amplitudes above {level:g}, at I4 = 1.5 to that at 0.5",
-            TEXT,
+            text(place),
             1.0,
             widths[2] / widths[0],
-            place=place,
         ),
     ]
 
@@ -135,22 +134,20 @@ def compute_first() -> StudyResult:
         verdicts += [
             at_most(
                 f"distance of the resonance below omega_k; I4 = {ratio:g}",
-                TEXT,
+                text("L3139-3143"),
                 1.0,
                 OMEGA_K - lower,
                 "rad/s",
-                place="L3139-3143",
                 why="" if ratio < 1.0 else "reached at I4 = 0.97",
             ),
-            at_most(f"resonance against omega_k; I4 = {ratio:g}", TEXT, OMEGA_K, upper, "rad/s", place="L3141, L3188"),
+            at_most(f"resonance against omega_k; I4 = {ratio:g}", text("L3141, L3188"), OMEGA_K, upper, "rad/s"),
             near(
                 f"resonance; I4 = {ratio:g}",
-                LISTING,
+                listing("appendix 2"),
                 listed,
                 lower,
                 5.1e-5,
                 "rad/s",
-                place="appendix 2",
                 why="M' zeta' is missing, terms in the crank's length are halved",
             ),
             near(f"resonance; I4 = {ratio:g}", OURS, reference, lower, 5.1e-5, "rad/s"),
@@ -162,10 +159,9 @@ def compute_first() -> StudyResult:
     verdicts += [
         at_least(
             "A1 or D1 to the greatest first harmonic of (4.21), whose factor cannot be read; I4 = 1",
-            TEXT,
+            text("L2797-2801"),
             1.0,
             min(raw.mass.mean, raw.spring_factor.mean) / max(2.0 * abs(wave[-1]) for wave in waves),
-            place="L2797-2801",
         ),
         near("resonance by the printed coefficients; I4 = 1", OURS, PRINTED_RESONANCE, printed, 5.1e-5, "rad/s"),
         *growth_verdicts(columns, 1, "L3156-3162, L3197"),
@@ -195,35 +191,28 @@ def compute_second() -> StudyResult:
     verdicts = [
         at_most(
             "resonance of the second harmonic, highest of the three I4, against omega_k / 2",
-            TEXT,
+            text("L3188-3195"),
             0.5 * OMEGA_K,
             max(resonance(chapter_4(ratio), harmonic=2)[1] for ratio in INERTIA_RATIOS),
             "rad/s",
-            place="L3188-3195",
         ),
         at_most(
-            "second harmonic to the first, greatest from 20 to 40 rad/s",
-            TEXT,
-            NEGLIGIBLE,
-            small,
-            place="L3162-3168, L3210",
+            "second harmonic to the first, greatest from 20 to 40 rad/s", text("L3162-3168, L3210"), NEGLIGIBLE, small
         ),
         at_most(
             "range of speeds near omega_k / 2 in which the second harmonic is greater than the first, widest",
-            TEXT,
+            text("L3162-3168, L3210"),
             0.0,
             max(exceeds),
             "rad/s",
-            place="L3162-3168, L3210",
             why="it resonates there",
         ),
         near(
             "second harmonic at its resonance; I4 = 1, omega_c = 0.45 1/s",
-            LISTING,
+            listing("appendix 2"),
             listed,
             right,
             0.01 * listed,
-            place="appendix 2",
             why="M' zeta' is missing, terms in the crank's length are halved",
         ),
         near("the same, right to that of the listing as transcribed", OURS, 7.0, right / listed, 0.5),
@@ -290,18 +279,16 @@ def compute_deviation() -> StudyResult:
         verdicts=(
             at_most(
                 "greatest distance of the deviation from a straight line through zero, of it; I4 up to 1.5",
-                TEXT,
+                text("L3148-3150"),
                 0.05,
                 bent,
-                place="L3148-3150",
             ),
-            near("deviation at I4 = 0", TEXT, 0.0, deviation[0], 1e-6, "rad/s", place="L3150"),
+            near("deviation at I4 = 0", text("L3150"), 0.0, deviation[0], 1e-6, "rad/s"),
             at_most(
                 "what the equation at I4 = 0 has beyond a mass on a spring, greatest coefficient",
-                TEXT,
+                text("L3152-3156"),
                 1e-12,
                 rest,
-                place="L3152-3156",
             ),
         ),
     )
@@ -373,34 +360,30 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
         at_most(
             f"change of the amplitude by omega_c = {STRONGEST:g} 1/s farther than {OUTSIDE:g} rad/s from the resonance, of the "
             f"peak at {DAMPERS[0]:g}",
-            TEXT,
+            text("L3176-3178, L3203"),
             UNSEEN,
             np.abs(strong - none)[outside].max() / tallest[1],
-            place="L3176-3178, L3203",
         ),
         at_most(
             f"shift of the peak from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
-            TEXT,
+            text("L3178-3180"),
             0.0,
             1e3 * shift,
             "mrad/s",
-            place="L3178-3180",
             why="the force grows with the square of the speed",
         ),
         at_most(
             f"shift of the frequency of the free motion from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
-            TEXT,
+            text("L3178-3180"),
             0.0,
             1e3 * (free_frequency(inertia_ratio, STRONGEST) - free_frequency(inertia_ratio, DAMPERS[0])),
             "mrad/s",
-            place="L3178-3180",
         ),
         at_most(
             f"amplitude less that of one mass on a spring, of the peak; omega_c = {DAMPERS[0]:g} 1/s",
-            TEXT,
+            text("L3206-3208"),
             0.05,
             np.abs(weak - one_mass(inertia_ratio, DAMPERS[0])).max() / tallest[1],
-            place="L3206-3208",
         ),
         near(f"peak relative to F1/lambda_c; omega_c = {DAMPERS[0]:g} 1/s", OURS, 1.0, tallest[1] / alone, 0.02),
         near(
@@ -416,10 +399,9 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
         verdicts.append(
             at_most(
                 f"damper that keeps the amplitude below {level:g}, to that at I4 = 1",
-                TEXT,
+                text("L3182-3184"),
                 1.0,
                 eliminating(inertia_ratio, level) / eliminating(1.0, level),
-                place="L3182-3184",
             )
         )
     return StudyResult(

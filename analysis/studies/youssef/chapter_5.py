@@ -32,7 +32,7 @@ from ...youssef import (
     perturbed_boundary,
     perturbed_region,
 )
-from ..study import LISTING, OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, listing, near, padded, text, unjudged
 from .regions import (
     LOOKS,
     WAYS,
@@ -107,10 +107,9 @@ def second_verdict(sweep: Sweep) -> Verdict:
     ratios = [hill(p, 2).width / hill(p).width for p in map(sweep.mechanism, sweep.values)]
     return at_most(
         "width of the second region to that of the first, greatest",
-        TEXT,
+        text("L3902-3906"),
         NEGLIGIBLE,
         max(ratios),
-        place="L3902-3906",
         why="the terms of first order largely cancel in the width of the first",
     )
 
@@ -168,21 +167,19 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
     verdicts = [
         at_most(
             "width of the region to its middle, greatest",
-            TEXT,
+            text("L3762"),
             NARROW,
             (widths(true) / (middles + 0.25)).max(),
-            place="L3762",
         ),
-        at_least("growth of the width with I4, least", TEXT, 0.0, np.diff(widths(true)).min(), place="L3762, L3944"),
+        at_least("growth of the width with I4, least", text("L3762, L3944"), 0.0, np.diff(widths(true)).min()),
         at_most(
             "distance of its middle from a straight line through 1/4 at I4 = 0, of the line's rise",
-            TEXT,
+            text("L3764-3766"),
             NARROW,
             np.abs(middles - slope * ratios).max() / middles[-1],
-            place="L3764-3766",
         ),
-        near("axis A at I4 = 0", TEXT, 2.0, axis(hill(chapter_4(1e-6))), 1e-5, place="L3768"),
-        at_most("growth of the axis A with I4, greatest", TEXT, 0.0, np.diff(axes(true)).max(), place="L3768, L3946"),
+        near("axis A at I4 = 0", text("L3768"), 2.0, axis(hill(chapter_4(1e-6))), 1e-5),
+        at_most("growth of the axis A with I4, greatest", text("L3768, L3946"), 0.0, np.diff(axes(true)).max()),
     ]
     for ratio, stated in APPENDIX_3.items():
         region = right(chapter_4(ratio))
@@ -190,7 +187,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
             name = f"{side} boundary in lambda_k^2; I4 = {ratio:g}"
             # half a unit of the last digit printed
             verdicts += [
-                near(name, LISTING, listed, value, 5.5e-6, place="appendix 3", why="M' zeta' is missing"),
+                near(name, listing("appendix 3"), listed, value, 5.5e-6, why="M' zeta' is missing"),
                 near(name, OURS, ours, value, 5.5e-7),
             ]
     own = [appendix_3(chapter_4(ratio)) for ratio in APPENDIX_3]
@@ -204,10 +201,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
         at_most("listing as transcribed less what it gives, boundaries", OURS, 5.5e-6, off),
         at_most(
             "largest multiplier at half the zeroth boundary; I4 = 1",
-            TEXT,
+            text("L3420-3424"),
             1.0,
             np.abs(hill_multipliers(exact.stiffened(0.5 * zeroth))).max(),
-            place="L3420-3424",
             why="not both of the regions that it parts are stable: below it the slider falls away",
         ),
         at_most(
@@ -237,36 +233,24 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
     true = found["true orbit"]
     widest = widths(regions("5.1")["true orbit"]).max()
     return [
-        at_least(
-            "growth of the width with sigma2, least", TEXT, 0.0, np.diff(widths(true)).min(), place="L3876, L3938"
-        ),
-        near(
-            "axis A at sigma2 = 0.01",
-            TEXT,
-            1.968,
-            axes(true)[0],
-            5e-4,
-            place="L3880",
-            why=f"it is that of {LISTED_RATIO}",
-        ),
+        at_least("growth of the width with sigma2, least", text("L3876, L3938"), 0.0, np.diff(widths(true)).min()),
+        near("axis A at sigma2 = 0.01", text("L3880"), 1.968, axes(true)[0], 5e-4, why=f"it is that of {LISTED_RATIO}"),
         near("axis A at sigma2 = 0.01", OURS, 1.936, axes(true)[0], 5e-4),
         near("axis A at sigma2 = 0.01; I4 = 0.5", OURS, 1.967, axis(right(with_crank(0.01, 0.5))), 5e-4),
         at_least(
             "growth of the axis A from sigma2 = 0.01 to 0.1",
-            TEXT,
+            text("L3880-3882"),
             0.0,
             axes(true)[-1] - axes(true)[0],
-            place="L3880-3882",
             why="it does in the listing",
         ),
-        at_most("greatest width to that of Fig 5.1", TEXT, 1.0, widths(true).max() / widest, place="L3882-3884"),
+        at_most("greatest width to that of Fig 5.1", text("L3882-3884"), 1.0, widths(true).max() / widest),
         at_most(
             "omega_c that removes the region, up to sigma2 = 0.1",
-            TEXT,
+            text("L3923-3927"),
             STATED,
             removing_estimate(with_crank(0.1)),
             "1/s",
-            place="L3923-3927",
         ),
     ]
 
@@ -301,36 +285,21 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
         verdicts += [
             at_most(
                 f"growth of the width with sigma3, greatest; {words}",
-                TEXT,
+                text("L3892, L3938"),
                 0.0,
                 np.diff(widths(true)).max(),
-                place="L3892, L3938",
                 why=why,
             ),
-            near(
-                f"axis A at sigma3 = 0.8; {words}",
-                TEXT,
-                1.96,
-                axes(true)[0],
-                0.0051,
-                place="L3894-3896",
-                why=off,
-            ),
+            near(f"axis A at sigma3 = 0.8; {words}", text("L3894-3896"), 1.96, axes(true)[0], 0.0051, why=off),
             at_most(
-                f"change of the axis A over sigma3; {words}",
-                TEXT,
-                0.01,
-                np.ptp(axes(true)),
-                place="L3896-3898",
-                why=why,
+                f"change of the axis A over sigma3; {words}", text("L3896-3898"), 0.01, np.ptp(axes(true)), why=why
             ),
             at_most(
                 f"omega_c that removes the region, sigma3 from 0.8 to 1.2; {words}",
-                TEXT,
+                text("L3923-3929"),
                 STATED,
                 max(removing_estimate(mechanism(x)) for x in SWEEPS["5.3"].values),
                 "1/s",
-                place="L3923-3929",
                 why=why,
             ),
         ]
@@ -338,10 +307,9 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
         *verdicts,
         at_most(
             "greatest width to that of Fig 5.1 and 5.2",
-            TEXT,
+            text("L3898-3900"),
             1.0,
             widths(found["true orbit"]).max() / others,
-            place="L3898-3900",
             why=f"it is so with {LISTED_RATIO}",
         ),
         near("axis A at sigma3 = 0.8 by the listing as transcribed", OURS, 1.87, axis(appendix_3(held(0.8))), 0.005),
@@ -461,27 +429,15 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
     at = [width_at(found, 1.5) for found in charts.values()]
     removes = "omega_c that removes the region, up to I4 = 1.5"
     return [
-        at_most(
-            "growth of the width with omega_c, greatest; I4 = 1.5", TEXT, 0.0, np.diff(at).max(), place="L3915, L3952"
-        ),
+        at_most("growth of the width with omega_c, greatest; I4 = 1.5", text("L3915, L3952"), 0.0, np.diff(at).max()),
         at_least(
             "growth with omega_c of the I4 at which the region begins, least",
-            TEXT,
+            text("L3917"),
             0.0,
             np.diff(list(tips.values())).min(),
-            place="L3917",
         ),
-        at_most(removes, TEXT, STATED, worst["true orbit"], "1/s", place="L3919-3921"),
-        near(
-            removes,
-            LISTING,
-            LISTED,
-            worst["true orbit"],
-            5e-4,
-            "1/s",
-            place="appendix 4",
-            why="its regions are too wide",
-        ),
+        at_most(removes, text("L3919-3921"), STATED, worst["true orbit"], "1/s"),
+        near(removes, listing("appendix 4"), LISTED, worst["true orbit"], 5e-4, "1/s", why="its regions are too wide"),
         near(removes, OURS, REMOVING, worst["true orbit"], 5e-4, "1/s"),
         near(
             "omega_c that removes the region by the listing as transcribed; I4 = 1.5",
@@ -493,21 +449,19 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
         ),
         at_most(
             "omega_c that removes regions 1 to 4 as well, I4 = 1.5",
-            TEXT,
+            text("L3952-3958"),
             STATED,
             max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)),
             "1/s",
-            place="L3952-3958",
         ),
         at_most(
             "outer boundary; (5.35) less (5.16), of the width, right coefficients",
-            TEXT,
+            text("L3964-3968"),
             NEGLIGIBLE,
             max(apart),
-            place="L3964-3968",
         ),
         at_most("(5.35) cut off after its ninth term, as the thesis has it, less Hill's determinant", OURS, 1e-6, cut),
-        unjudged("the computer-oriented method is fast", TEXT, "no times are given", place="L3960"),
+        unjudged("the computer-oriented method is fast", text("L3960"), "no times are given"),
         # at a tip that damping removes the region; the trace follows it in short steps
         *(
             near(

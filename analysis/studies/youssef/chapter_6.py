@@ -35,7 +35,7 @@ from ...synthesis import (
     turn,
 )
 from ...units import CM_PER_METRE
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
 from .problems import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 
 FloatArray = NDArray[np.float64]
@@ -148,7 +148,7 @@ def error_verdicts(row: Printed) -> tuple[Verdict, ...]:
     p, printed = PROBLEMS[row.problem], printed_error(row.problem)
     (stated, half), (reference, digits) = row.stated, row.reference
     return (
-        near("error of the printed linkage", TEXT, stated, printed, half, p.unit, place=row.place, why=row.why),
+        near("error of the printed linkage", text(row.place), stated, printed, half, p.unit, why=row.why),
         near("error of the printed linkage", OURS, reference, printed, digits, p.unit),
         at_most("error of our linkage", OURS, p.goal, our_error(row.problem), p.unit),
     )
@@ -189,7 +189,7 @@ def rounding_verdicts() -> tuple[Verdict, ...]:
 def harder_verdicts(harder: str, easier: str, place: str) -> tuple[Verdict, ...]:
     """Judge whether the longer ellipse has the larger least error."""
     ratio = our_error(harder) / our_error(easier)
-    return (at_least("least error that we find, of that of ellipse (a)", TEXT, 1.0, ratio, place=place),)
+    return (at_least("least error that we find, of that of ellipse (a)", text(place), 1.0, ratio),)
 
 
 def bounded_verdicts() -> tuple[Verdict, ...]:
@@ -198,8 +198,8 @@ def bounded_verdicts() -> tuple[Verdict, ...]:
     outside = sum(not low <= p.linkage.values()[name] <= high for name, (low, high) in p.bounds.items())
     cost = printed_error("ellipse-a-bounded") - printed_error("ellipse-a")
     return (
-        near("lengths of the printed linkage out of their bounds", TEXT, 0, outside, 0, place="6.4.2 A, L4911"),
-        near("increase of the error by the bounds", TEXT, 52.7, cost, 0.05, "cm2", place="6.4.2 A, L4935"),
+        near("lengths of the printed linkage out of their bounds", text("6.4.2 A, L4911"), 0, outside, 0),
+        near("increase of the error by the bounds", text("6.4.2 A, L4935"), 52.7, cost, 0.05, "cm2"),
     )
 
 
@@ -351,8 +351,8 @@ def window_verdicts() -> tuple[Verdict, ...]:
     free, _ = window_sums(mounted().linkage, mounting=True)
     place = "6.4.2 B, L4977"
     return (
-        at_most("error within the window, of that unweighted", TEXT, 1.0, inside / even_inside, place=place),
-        at_least("error out of the window, of that unweighted", TEXT, 1.0, outside / even_outside, place=place),
+        at_most("error within the window, of that unweighted", text(place), 1.0, inside / even_inside),
+        at_least("error out of the window, of that unweighted", text(place), 1.0, outside / even_outside),
         near(f"squared errors within the window, printed linkage; N = {N}", OURS, 104.9, inside, 0.05, "deg2"),
         at_most(f"the same with a free mounting angle; N = {N}", OURS, 3.5, free, "deg2"),
     )
@@ -440,10 +440,7 @@ MORE: Mapping[str, Callable[[], tuple[Verdict, ...]]] = {
     "6.7": fewer_verdicts,
     "6.8": window_verdicts,
     "6.9": partial(triangle_verdicts, "path-a"),
-    "6.10": lambda: (
-        *triangle_verdicts("path-b"),
-        *harder_verdicts("path-b", "path-a", "6.4.3, L5049"),
-    ),
+    "6.10": lambda: (*triangle_verdicts("path-b"), *harder_verdicts("path-b", "path-a", "6.4.3, L5049")),
 }
 
 

@@ -22,7 +22,7 @@ from ...numerics.fourier import FourierSeries
 from ...slider import VariationalMotion, slider_motion, variational_motion
 from ...synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import accessible, accessible_area
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -169,24 +169,17 @@ def family() -> StudyResult:
         assignment="The values of U are lost: 0.6 to 1.4 are our choice; the crank turns fully from 0.5 to 1.5.",
         columns=padded(columns),
         verdicts=(
-            near("closed coupler curves, of those of the family", TEXT, len(FAMILY), closed, 0, place="7.0, L5234"),
+            near("closed coupler curves, of those of the family", text("7.0, L5234"), len(FAMILY), closed, 0),
             near(
                 "share of the area within the outer boundary that P reaches",
-                TEXT,
+                text("7.0, L5242"),
                 1.0,
                 area.area / surrounded,
                 0.01,
-                place="7.0, L5242",
                 why="what all curves of the family go round is out of reach",
             ),
             near(
-                "farthest of an isochronous curve from its circle about B",
-                TEXT,
-                0.0,
-                spread,
-                1e-12,
-                "l3",
-                place="7.0, L5260",
+                "farthest of an isochronous curve from its circle about B", text("7.0, L5260"), 0.0, spread, 1e-12, "l3"
             ),
             at_most("accessible area, relative error", OURS, 1e-4, area.error / area.area),
             at_most("farthest of 5000 random configurations outside of it", OURS, 2e-3, farthest, "l3"),
@@ -234,7 +227,7 @@ def curve_wanted() -> StudyResult:
         ),
         columns=padded(columns),
         verdicts=(
-            unjudged("the desired points", TEXT, why, place="7.3.1, L5567"),
+            unjudged("the desired points", text("7.3.1, L5567"), why),
             near("desired points that P does not reach", OURS, 0, z.size - int(reached.sum()), 0),
         ),
     )
@@ -278,37 +271,33 @@ def two_positions() -> StudyResult:
         verdicts=(
             near(
                 "length of the rocker in either position, the coupler in line with the point",
-                TEXT,
+                text("7.3.1, L5656"),
                 1.0,
                 rocker[np.argmax(np.abs(rocker - 1.0))],
                 1e-12,
                 "l4",
-                place="7.3.1, L5656",
             ),
             near(
                 "U by (7.14) and (7.15): greatest difference from the variational motion",
-                TEXT,
+                text("7.3.1, L5641"),
                 0.0,
                 missed.max(),
                 1e-9,
                 "l3",
-                place="7.3.1, L5641",
             ),
             near(
                 "upright rockers, of those where (7.14) has no root",
-                TEXT,
+                text("7.3.1, L5687"),
                 1.0,
                 (standing > 0.999).mean(),
                 0.0,
-                place="7.3.1, L5687",
             ),
             near(
                 "the same of random desired points",
-                TEXT,
+                text("7.3.1, L5687"),
                 1.0,
                 (of_random > 0.999).mean(),
                 0.0,
-                place="7.3.1, L5687",
                 why="it may also hang, th4 = -90 deg",
             ),
             at_least("upright or hanging, of random desired points", OURS, 0.999, np.abs(of_random).min()),
@@ -367,35 +356,25 @@ def motion_verdicts() -> tuple[Verdict, ...]:
     place = "7.3.1, L5743"
     effort = "the effort of neither method is stated, and in this mechanism the equations are solved in closed form"
     return (
-        near(
-            "least error over all slider positions, of that of (a)",
-            TEXT,
-            1.0,
-            brute / least,
-            1e-3,
-            place="7.3.1, L5764",
-        ),
-        at_least("error of (b), of that of (a)", TEXT, 1.0, found.error / least, place="7.3.1, L5766"),
-        near("error of 41 terms, of that of (a)", TEXT, 1.0, direct(20).error / least, 0.01, place="7.3.1, L5768"),
-        at_least("optima of the simplex from six random starts", TEXT, 2, distinct, place=place),
+        near("least error over all slider positions, of that of (a)", text("7.3.1, L5764"), 1.0, brute / least, 1e-3),
+        at_least("error of (b), of that of (a)", text("7.3.1, L5766"), 1.0, found.error / least),
+        near("error of 41 terms, of that of (a)", text("7.3.1, L5768"), 1.0, direct(20).error / least, 0.01),
+        at_least("optima of the simplex from six random starts", text(place), 2, distinct),
         near("least of these, of that of exact derivatives from any start", OURS, 1.0, min(ends) / found.error, 1e-3),
         at_least(
             "greatest second derivative of U over th2 in (a), of that in (b)",
-            TEXT,
+            text("7.3.1, L5791"),
             1.0,
             corners / smooth,
-            place="7.3.1, L5791",
         ),
-        unjudged("the variational method takes far more effort in many cases", TEXT, effort, place="7.3.1, L5885"),
+        unjudged("the variational method takes far more effort in many cases", text("7.3.1, L5885"), effort),
     )
 
 
 def error_verdicts() -> tuple[Verdict, ...]:
     """Judge Fig 7.7."""
     excess = float((variational().error - direct().evaluation.errors).max())
-    return (
-        at_most("greatest excess of the error of (a) over that of (b)", TEXT, 1e-9, excess, "l3", place="7.3.1, L5764"),
-    )
+    return (at_most("greatest excess of the error of (a) over that of (b)", text("7.3.1, L5764"), 1e-9, excess, "l3"),)
 
 
 def path_verdicts() -> tuple[Verdict, ...]:
@@ -403,7 +382,7 @@ def path_verdicts() -> tuple[Verdict, ...]:
     held = min(float((np.abs(point(ROTATION, u) - desired()) ** 2).sum()) for u in np.linspace(-0.49, 0.49, 197))
     place = "7.0, L5252"
     return tuple(
-        at_most(f"squared error of {name}, of that of the best fixed U", TEXT, 1.0, error / held, place=place)
+        at_most(f"squared error of {name}, of that of the best fixed U", text(place), 1.0, error / held)
         for name, error in (("(a)", variational().squared_error), ("(b)", direct().error))
     )
 
@@ -416,10 +395,9 @@ def weighted_verdicts() -> tuple[Verdict, ...]:
     return (
         at_most(
             "error on p1 p2 with the rest weighted 0.01, of that with 1; second derivative of U at most 1",
-            TEXT,
+            text("7.3.1, L5839"),
             1.0,
             relaxed / strict,
-            place="7.3.1, L5839",
         ),
     )
 
@@ -428,8 +406,8 @@ def weighted_path_verdicts() -> tuple[Verdict, ...]:
     """Judge Fig 7.10."""
     inside, outside = (new / old for new, old in zip(squared_errors(direct(inside=WEIGHT)), squared_errors(direct())))
     return (
-        at_most("squared error on p1 p2, of that unweighted", TEXT, 1.0, inside, place="7.3.1, L5834"),
-        at_least("squared error on the rest, of that unweighted", TEXT, 1.0, outside, place="7.3.1, L5834"),
+        at_most("squared error on p1 p2, of that unweighted", text("7.3.1, L5834"), 1.0, inside),
+        at_least("squared error on the rest, of that unweighted", text("7.3.1, L5834"), 1.0, outside),
     )
 
 

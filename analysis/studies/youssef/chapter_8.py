@@ -19,7 +19,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...numerics.decay import fit_decay
 from ...periodic import mean_effective_mass
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, text, unjudged
 from . import rig_1, rig_2
 from .rigs import (
     LOST,
@@ -91,7 +91,7 @@ def compute_decay() -> StudyResult:
         added, left = (fit_decay(time, rubbed, friction=f).damping(mass)[0] - stated for f in (False, True))
         dry = f"what {DRY:g} N of dry friction adds to the coefficient"
         verdicts += [
-            unjudged(f"average damping coefficient of rig {number}", TEXT, LOST, place="8.3.3, L6401"),
+            unjudged(f"average damping coefficient of rig {number}", text("8.3.3, L6401"), LOST),
             near(f"coefficient from a record with scatter; {name}", OURS, stated, found, 4.0 * error, "N.s/m"),
             near(f"natural frequency of the disconnected slider; {name}", OURS, right, natural, 1e-3 * right, "rad/s"),
             at_least(f"{dry} if it counts as damping; {name}", OURS, 0.0, added, "N.s/m"),
@@ -192,11 +192,9 @@ def _periodic() -> list[Verdict]:
     words = "largest multiplier of the motion of one cycle at all speeds run"
     largest = {s: largest_multiplier(s, SLOWEST, STOPPED[s]) for s in "AB"}
     return [
-        at_most(
-            "change of the steady u from one crank cycle to the next", TEXT, SAME, change, "cm", place="8.4.1.1, L6437"
-        ),
-        unjudged("the motion observed at 360 rpm has the period of a crank cycle", TEXT, LOST, place="8.4.1.1, L6441"),
-        *(at_most(f"{words}; spring {s}", TEXT, 1.0, largest[s], place="8.4.1.1, L6449") for s in "AB"),
+        at_most("change of the steady u from one crank cycle to the next", text("8.4.1.1, L6437"), SAME, change, "cm"),
+        unjudged("the motion observed at 360 rpm has the period of a crank cycle", text("8.4.1.1, L6441"), LOST),
+        *(at_most(f"{words}; spring {s}", text("8.4.1.1, L6449"), 1.0, largest[s]) for s in "AB"),
     ]
 
 
@@ -206,17 +204,17 @@ def _compared(spring: str, speed: float) -> list[Verdict]:
         spring
     ]
     why = f"{LOST}; what friction does to the theory is in rig-1-friction"
-    verdicts = [unjudged(f"almost total agreement in phase, {words}", TEXT, why, place=f"8.4.1.1, {line}")]
+    verdicts = [unjudged(f"almost total agreement in phase, {words}", text(f"8.4.1.1, {line}"), why)]
     if speed == 450.0:
         found, words = (
             speed_of_fewer_peaks("A", 400.0, 500.0),
             "speed at which first and last peak meet in a point of inflection",
         )
-        verdicts.append(near(words, TEXT, 450.0, found, 5.0, "rpm", place="8.4.1.2, L6726"))
+        verdicts.append(near(words, text("8.4.1.2, L6726"), 450.0, found, 5.0, "rpm"))
         verdicts.append(near(words, OURS, 451.0, found, 1.0, "rpm"))
     if speed == 720.0:
         words = "agreement at other speeds, good in phase and reasonable in amplitude"
-        verdicts.append(unjudged(words, TEXT, LOST, place="8.4.1.1, L6533"))
+        verdicts.append(unjudged(words, text("8.4.1.1, L6533"), LOST))
     return verdicts
 
 
@@ -224,7 +222,7 @@ def _peaks(spring: str, speeds: Sequence[float], line: str, stated: int = 4) -> 
     """Judge the number of maxima and minima together at each speed."""
     counted = {speed: peaks(turn(spring, speed)) for speed in speeds}
     words, place = "peaks of the oscillation at", f"8.4.1.2, {line}"
-    return [near(f"{words} {speed:g} rpm", TEXT, stated, n, 0.0, place=place) for speed, n in counted.items()]
+    return [near(f"{words} {speed:g} rpm", text(place), stated, n, 0.0) for speed, n in counted.items()]
 
 
 def _rises(spring: str, speeds: Sequence[float]) -> float:
@@ -243,10 +241,10 @@ def _natural_and_half(spring: str, speeds: Sequence[float], line: str) -> list[V
     )
     rising = f"least rise of the amplitude from one speed to the next, {speeds[0]:g} to {speeds[-1]:g} rpm"
     return [
-        near("calculated natural frequency", TEXT, natural, found, 5.0, "rpm", place="8.4.1.2, L6551", why=why),
+        near("calculated natural frequency", text("8.4.1.2, L6551"), natural, found, 5.0, "rpm", why=why),
         near("natural frequency from the mean effective mass", OURS, right, found, 0.5, "rpm"),
-        at_least(rising, TEXT, 0.0, rise, "cm", place=place),
-        near("speed of the local maximum", TEXT, half, at_half, 5.0, "rpm", place=place, why=why_half),
+        at_least(rising, text(place), 0.0, rise, "cm"),
+        near("speed of the local maximum", text(place), half, at_half, 5.0, "rpm", why=why_half),
         near("speed of the local maximum", OURS, right_half, at_half, 0.5, "rpm"),
     ]
 
@@ -256,15 +254,13 @@ def _harmonics(spring: str) -> list[Verdict]:
     sizes = np.array([[harmonic(turn(spring, speed), n) for n in (1, 2, 3)] for speed in SPEEDS[spring]])
     second, third = (sizes[:, 1] / sizes[:, 0]).min(), (sizes[:, 2] / sizes[:, :2].max(axis=1)).max()
     verdicts = [
-        at_least("harmonic 2 over harmonic 1, least of six speeds", TEXT, NOTICED, second, place="8.4.1.2, L6583"),
-        at_most(
-            "harmonic 3 over the greater of 1 and 2, most of six", TEXT, 2.0 * NOTICED, third, place="8.4.1.2, L6777"
-        ),
+        at_least("harmonic 2 over harmonic 1, least of six speeds", text("8.4.1.2, L6583"), NOTICED, second),
+        at_most("harmonic 3 over the greater of 1 and 2, most of six", text("8.4.1.2, L6777"), 2.0 * NOTICED, third),
     ]
     for order, part in ((3, "a third"), (4, "a quarter")):
         rise, words = rise_at(spring, order), f"rise of the amplitude at {part} of the natural frequency, relative"
         why = f"harmonic {order} meets the natural frequency there" if rise > NOTICED else ""
-        verdicts.append(at_most(words, TEXT, NOTICED, rise, place="8.4.1.2, L6770", why=why))
+        verdicts.append(at_most(words, text("8.4.1.2, L6770"), NOTICED, rise, why=why))
     return verdicts
 
 
@@ -276,7 +272,7 @@ def _travel(spring: str) -> Verdict:
     )
     words = f"greatest displacement at {last:g} rpm, where the guide was too short, over that at all speeds below"
     why = "" if there > max(before) else f"{there:.2f} cm; {max(before):.2f} near half the natural frequency"
-    return at_least(words, TEXT, 1.0, there / max(before), place="8.4.1.2, L6555", why=why)
+    return at_least(words, text("8.4.1.2, L6555"), 1.0, there / max(before), why=why)
 
 
 def _fig_8_14() -> list[Verdict]:
@@ -291,10 +287,10 @@ def _fig_8_15() -> list[Verdict]:
     return [
         *_peaks("A", (300.0, 360.0), "L6579"),
         *_peaks("A", (500.0,), "L6732", stated=2),
-        near("points of inflection at 500 rpm, as of a sine", TEXT, 2, bends, 0, place="8.4.1.2, L6728", why=shoulder),
-        near(words, TEXT, 345.0, lowest, 5.0, "rpm", place="8.4.1.2, L6740", why="0.62 of the natural frequency"),
+        near("points of inflection at 500 rpm, as of a sine", text("8.4.1.2, L6728"), 2, bends, 0, why=shoulder),
+        near(words, text("8.4.1.2, L6740"), 345.0, lowest, 5.0, "rpm", why="0.62 of the natural frequency"),
         near(words, OURS, 367.0, lowest, 0.5, "rpm"),
-        at_least("least rise of the amplitude by 10 rpm, 370 to 500", TEXT, 0.0, rise, "cm", place="8.4.1.2, L6740"),
+        at_least("least rise of the amplitude by 10 rpm, 370 to 500", text("8.4.1.2, L6740"), 0.0, rise, "cm"),
         _travel("A"),
     ]
 
@@ -303,7 +299,7 @@ def _fig_8_16() -> list[Verdict]:
     ratio, why = natural_speed("B") / natural_speed("A"), "the springs are as 11 to 3"
     return [
         *_natural_and_half("B", (500.0, 540.0, 560.0), "L6754"),
-        near("natural frequency over spring A's", TEXT, 2.0, ratio, 0.01, place="8.4.1.2, L6551", why=why),
+        near("natural frequency over spring A's", text("8.4.1.2, L6551"), 2.0, ratio, 0.01, why=why),
         near("natural frequency over spring A's, sqrt(11/3)", OURS, sqrt(11.0 / 3.0), ratio, 1e-9),
         *_peaks("B", SPEEDS["B"][:3], "L6752"),
         *_harmonics("B"),
@@ -316,9 +312,9 @@ def _fig_8_17() -> list[Verdict]:
     words = "speed at which first and last peak meet, out of the rig's reach"
     return [
         *_peaks("B", SPEEDS["B"][3:], "L6752"),
-        at_least("fall of the amplitude from 620 to 680 rpm", TEXT, 0.0, before - least, "cm", place=place),
-        at_least("rise of the amplitude from 680 to 800 rpm", TEXT, 0.0, after - least, "cm", place=place),
-        at_least(words, TEXT, STOPPED["B"], meeting, "rpm", place="8.4.1.2, L6762"),
+        at_least("fall of the amplitude from 620 to 680 rpm", text(place), 0.0, before - least, "cm"),
+        at_least("rise of the amplitude from 680 to 800 rpm", text(place), 0.0, after - least, "cm"),
+        at_least(words, text("8.4.1.2, L6762"), STOPPED["B"], meeting, "rpm"),
         _travel("B"),
     ]
 
@@ -344,26 +340,18 @@ def _fig_8_18() -> list[Verdict]:
         "spread of the force over speed squared on a damped mass-spring system",
     )
     return [
-        at_most(
-            "harmonic 2 over harmonic 1, greatest at the speeds shown", TEXT, 0.1, shown, place=f"{section}, L6806"
-        ),
-        at_most("largest multiplier of the motion of one cycle", TEXT, 1.0, largest, place=f"{section}, L6808"),
-        at_least("change of the phase, 300 to 1000 rpm", TEXT, 90.0, shift, "deg", place=f"{section}, L6812"),
+        at_most("harmonic 2 over harmonic 1, greatest at the speeds shown", text(f"{section}, L6806"), 0.1, shown),
+        at_most("largest multiplier of the motion of one cycle", text(f"{section}, L6808"), 1.0, largest),
+        at_least("change of the phase, 300 to 1000 rpm", text(f"{section}, L6812"), 90.0, shift, "deg"),
         *(
             verdict
             for s, (second, third) in ratios.items()
             for verdict in (
-                at_most(
-                    f"harmonic 2 over 1, {range_of}; spring {s}", TEXT, 0.1, second, place=f"{section}, L6810", why=why
-                ),
-                at_most(
-                    f"harmonic 3 over 1, {range_of}; spring {s}", TEXT, NOTICED, third, place=f"{section}, L6820, L6968"
-                ),
+                at_most(f"harmonic 2 over 1, {range_of}; spring {s}", text(f"{section}, L6810"), 0.1, second, why=why),
+                at_most(f"harmonic 3 over 1, {range_of}; spring {s}", text(f"{section}, L6820, L6968"), NOTICED, third),
             )
         ),
-        at_most(
-            f"{oscillator} that gives harmonic 1, relative", TEXT, NOTICED, spread, place=f"{section}, L6822, L6970"
-        ),
+        at_most(f"{oscillator} that gives harmonic 1, relative", text(f"{section}, L6822, L6970"), NOTICED, spread),
     ]
 
 

@@ -23,7 +23,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...linear import Design, design_pid, linearise_along
 from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .series_2 import rocker_motion
 
 NUMBER = "control"
@@ -114,7 +114,7 @@ def without_counterpart() -> tuple[Verdict, ...]:
             "7.4, L5998",
         ),
     }
-    return tuple(unjudged(statement, TEXT, why, place=place) for statement, (why, place) in rows.items())
+    return tuple(unjudged(statement, text(place), why) for statement, (why, place) in rows.items())
 
 
 def compute() -> StudyResult:
@@ -146,31 +146,24 @@ def compute() -> StudyResult:
             at_least("rms force without a spring, of that with the best", OURS, 1.5, bare / sprung),
             at_least(
                 "an independent drive without feedback loses the motion; status of the run",
-                TEXT,
+                text("7.1.1 (c), L5327"),
                 1.0,
                 open_loop.loop.status,
-                place="7.1.1 (c), L5327",
             ),
-            near(
-                "feedback keeps it to the stored motion; status", TEXT, 0, closed.loop.status, 0, place="7.1.2, L5340"
-            ),
-            at_least(
-                "rms force at twice the speed, of that at 120 rpm", TEXT, 1.0, faster / bare, place="7.1.2, L5360"
-            ),
+            near("feedback keeps it to the stored motion; status", text("7.1.2, L5340"), 0, closed.loop.status, 0),
+            at_least("rms force at twice the speed, of that at 120 rpm", text("7.1.2, L5360"), 1.0, faster / bare),
             at_most(
                 "rms deviation of the last trial cycle, of that of the first",
-                TEXT,
+                text("7.1.3, L5380; 7.3.1, L5855"),
                 1.0,
                 errors[-1] / errors[0],
-                place="7.1.3, L5380; 7.3.1, L5855",
             ),
             at_most(
                 "greatest growth of the rms deviation from cycle to cycle",
-                TEXT,
+                text("7.1.3, L5388"),
                 0.0,
                 np.diff(errors).max(),
                 "mm",
-                place="7.1.3, L5388",
             ),
             *without_counterpart(),
         ),

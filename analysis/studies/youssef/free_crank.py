@@ -22,7 +22,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .runs import LINEAR, ON_THE_GRAPH, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
 
 #: Torques of Fig 3.6 to 3.8, and those of the curve of 3.7 (dyn.cm).
@@ -216,10 +216,7 @@ def _rise_verdicts(runs: Sequence[Trajectory], place: str) -> list[Verdict]:
         bows.append(np.abs(w / w[-1] - t / t[-1]).max())
         angles.append(run["crank.angle"][peak])
     line, end = "crank speed's distance from a line up to its peak, over the peak", "crank angle of the peak, greatest"
-    return [
-        at_most(line, TEXT, LINEAR, max(bows), place=place),
-        at_most(end, TEXT, 1.0, max(angles), "rad", place=place),
-    ]
+    return [at_most(line, text(place), LINEAR, max(bows)), at_most(end, text(place), 1.0, max(angles), "rad")]
 
 
 def _swing_verdicts(runs: Iterable[Trajectory], start: float, places: tuple[str, str, str]) -> list[Verdict]:
@@ -233,9 +230,9 @@ def _swing_verdicts(runs: Iterable[Trajectory], start: float, places: tuple[str,
         shares.append(np.ptp(run["energy.dissipated"][free]) / (energy[0] - energy[-1]))
     swing, fall, share = min(swings), max(falls), min(shares)
     return [
-        at_least("range of the crank speed over its mean, least of all turns", TEXT, 0.1, swing, place=places[0]),
-        at_most("mean crank speed relative to the turn before, greatest", TEXT, 1.0, fall, place=places[1]),
-        near("part of the energy's fall that the damper takes", TEXT, 1.0, share, 1e-6, place=places[2]),
+        at_least("range of the crank speed over its mean, least of all turns", text(places[0]), 0.1, swing),
+        at_most("mean crank speed relative to the turn before, greatest", text(places[1]), 1.0, fall),
+        near("part of the energy's fall that the damper takes", text(places[2]), 1.0, share, 1e-6),
     ]
 
 
@@ -247,7 +244,7 @@ def _after(runs: Mapping[str, Trajectory]) -> list[Turns]:
 def _decay_verdict(turns: Sequence[Turns], place: str) -> Verdict:
     """Judge whether the mean position decays after the transient."""
     decay = max(greatest_ratio(t.slider[t.transient :]) for t in turns)
-    return at_most("mean of u relative to the turn before, after the transient", TEXT, 1.0, decay, place=place)
+    return at_most("mean of u relative to the turn before, after the transient", text(place), 1.0, decay)
 
 
 def launch_speeds() -> StudyResult:
@@ -276,9 +273,9 @@ def torque_over_time() -> StudyResult:
         assignment=UNSAID,
         columns={"T0 [dyn.cm]": TORQUE_RANGE, "time to 1 rad [s]": time, "T0 t^2 [dyn.cm.s2]": constant},
         verdicts=(
-            near("exponent of T0 in the time to 1 rad", TEXT, -1.0, slope, 0.05, place="L2140", why=nearly),
-            near("T0 as the time grows", TEXT, 0.0, least_torque(), 5e5, "dyn.cm", place="L2142", why=falls),
-            near("time to 1 rad as T0 grows: 1e12 dyn.cm", TEXT, 0.0, release_time(1e12), 1e-3, "s", place="L2142"),
+            near("exponent of T0 in the time to 1 rad", text("L2140"), -1.0, slope, 0.05, why=nearly),
+            near("T0 as the time grows", text("L2142"), 0.0, least_torque(), 5e5, "dyn.cm", why=falls),
+            near("time to 1 rad as T0 grows: 1e12 dyn.cm", text("L2142"), 0.0, release_time(1e12), 1e-3, "s"),
             near("exponent, mean of the two between the three torques", OURS, -1.95, slope, 0.005),
             near("exponent, fitted to all of the curve", OURS, -1.95, fitted, 0.02),
             at_most("spread of T0 t^2 over a factor of 20 in T0", OURS, 0.15, np.ptp(constant) / constant.mean()),
@@ -316,13 +313,13 @@ def launch_positions() -> StudyResult:
     later = turns[2].transient - max(t.transient for t in turns[:2])
     shift = turns[2].slider.mean() / turns[1].slider.mean()
     verdicts = [
-        at_least("turns until u decays, T0 = 2e8 less the lower ones", TEXT, 1.0, later, "turns", place="L2157"),
-        at_least("mean of u, T0 = 2e8 relative to T0 = 1e8 dyn.cm", TEXT, 1.0, shift, place="L2165"),
+        at_least("turns until u decays, T0 = 2e8 less the lower ones", text("L2157"), 1.0, later, "turns"),
+        at_least("mean of u, T0 = 2e8 relative to T0 = 1e8 dyn.cm", text("L2165"), 1.0, shift),
     ]
     for label, run in runs.items():
         u, within = CM_PER_METRE * run["slider.position"].max(), CM_PER_METRE * ON_THE_GRAPH * largest
         statement, why = f"greatest u; {label}", "" if u < within else "it swings to both sides"
-        verdicts.append(near(statement, TEXT, 0.0, u, within, "cm", place="L2161", why=why))
+        verdicts.append(near(statement, text("L2161"), 0.0, u, within, "cm", why=why))
     verdicts.append(_decay_verdict(turns, "L2159"))
     claim = "The harder the launch, the further the slider moves from its start, and the later it settles to a decay."
     return _launch_result("3.8", claim, runs, SLIDER, *verdicts, _reference_position())
@@ -339,7 +336,7 @@ def launch_speeds_by_spring() -> StudyResult:
         _by_spring(),
         CRANK_SPEED,
         *_rise_verdicts(rises, "L2175-2181"),
-        at_most("spread of the crank speed while the torque acts", TEXT, ON_THE_GRAPH, apart, place="L2187"),
+        at_most("spread of the crank speed while the torque acts", text("L2187"), ON_THE_GRAPH, apart),
         *_swing_verdicts(_by_spring().values(), 1.0, ("L2181", "L2183", "L2185")),
         near("crank angle at 0.25 s; T0 = 1e8 dyn.cm, k = 1e6 dyn/cm", OURS, 17.8051227, angle, 5e-8, "rad"),
     )
@@ -358,10 +355,10 @@ def launch_positions_by_spring() -> StudyResult:
         "and torque, and then a steady decay.",
         runs,
         SLIDER,
-        at_most("spread of u while the torque acts, relative to the graph", TEXT, ON_THE_GRAPH, apart, place="L2191"),
+        at_most("spread of u while the torque acts, relative to the graph", text("L2191"), ON_THE_GRAPH, apart),
         _decay_verdict(_after(runs), "L2199"),
-        at_least(longer("springs"), TEXT, 1.0, springs, "turns", place="L2195-2205"),
-        at_least(longer("torques"), TEXT, 1.0, torques, "turns", place="L2195-2205"),
+        at_least(longer("springs"), text("L2195-2205"), 1.0, springs, "turns"),
+        at_least(longer("torques"), text("L2195-2205"), 1.0, torques, "turns"),
         _reference_position(),
     )
 
@@ -402,8 +399,8 @@ def free_speed(number: str, stiffness: float) -> StudyResult:
             f"crank speed; {label} [rad/s]": run["crank.speed"],
         },
         *_swing_verdicts([run], 0.0, ("L2243", "L2249", "L2255")),
-        at_most("range of the crank speed relative to the turn before, greatest", TEXT, 1.0, ratio, place="L2245"),
-        at_most(relative, TEXT, 0.25, turns.energy_share.max(), place="L2253"),
+        at_most("range of the crank speed relative to the turn before, greatest", text("L2245"), 1.0, ratio),
+        at_most(relative, text("L2253"), 0.25, turns.energy_share.max()),
         at_most("rise of the mechanical energy between two samples", OURS, 1e-8, np.diff(energy).max(), "J"),
     )
 
@@ -431,13 +428,11 @@ def _phase_plane(number: str, stiffness: float, *verdicts: Verdict) -> StudyResu
             f"slider position u; {label} [cm]": CM_PER_METRE * run["slider.position"],
             f"slider velocity; {label} [cm/s]": CM_PER_METRE * run["slider.velocity"],
         },
-        at_most(
-            "range of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, swing, place="L2281"
-        ),
-        at_most("mean of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, mean, place="L2283"),
-        at_least("second harmonic of u relative to the first, least of all turns", TEXT, 0.1, second, place="L2293"),
+        at_most("range of u relative to the turn before, from the fourth on, greatest", text("L2281"), 1.0, swing),
+        at_most("mean of u relative to the turn before, from the fourth on, greatest", text("L2283"), 1.0, mean),
+        at_least("second harmonic of u relative to the first, least of all turns", text("L2293"), 0.1, second),
         *verdicts,
-        unjudged("the curves are smooth but for the sampling", TEXT, drawing, place="L2266-2276"),
+        unjudged("the curves are smooth but for the sampling", text("L2266-2276"), drawing),
     )
 
 
@@ -449,8 +444,8 @@ def soft_phase_plane() -> StudyResult:
     return _phase_plane(
         "3.13",
         SOFT,
-        at_least(words("drift of the mean of u"), TEXT, 1.0, drift, place="L2289"),
-        at_least(words("distance of the mean of u from 0 at the start"), TEXT, 1.0, distance, place="L2291"),
+        at_least(words("drift of the mean of u"), text("L2289"), 1.0, drift),
+        at_least(words("distance of the mean of u from 0 at the start"), text("L2291"), 1.0, distance),
     )
 
 
@@ -474,12 +469,12 @@ def stiff_phase_plane() -> StudyResult:
     return _phase_plane(
         "3.14",
         STIFF,
-        at_least(compared, TEXT, 1.0, seen[0] / seen[1], place="L2299"),
-        near(greatest("first"), TEXT, HARMONIC_SPEED, most, ABOUT, "rad/s", place="L2301", why=broad),
-        near(with_mass("mean"), TEXT, HARMONIC_SPEED, half, ABOUT, "rad/s", place="L2303"),
-        near(greatest(squared), TEXT, 1.0, resonance / half, lowered, place="L2305"),
-        at_least(with_mass("least"), TEXT, HARMONIC_SPEED, over_turn.max(), "rad/s", place="L2309-2317"),
-        at_most(with_mass("greatest"), TEXT, HARMONIC_SPEED, over_turn.min(), "rad/s", place="L2309-2317"),
+        at_least(compared, text("L2299"), 1.0, seen[0] / seen[1]),
+        near(greatest("first"), text("L2301"), HARMONIC_SPEED, most, ABOUT, "rad/s", why=broad),
+        near(with_mass("mean"), text("L2303"), HARMONIC_SPEED, half, ABOUT, "rad/s"),
+        near(greatest(squared), text("L2305"), 1.0, resonance / half, lowered),
+        at_least(with_mass("least"), text("L2309-2317"), HARMONIC_SPEED, over_turn.max(), "rad/s"),
+        at_most(with_mass("greatest"), text("L2309-2317"), HARMONIC_SPEED, over_turn.min(), "rad/s"),
         near("half the natural frequency", OURS, 25.55, half, 0.005, "rad/s"),
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...synthesis import area_between, hausdorff, straightest_part, turn
 from ...units import CM_PER_METRE
-from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, at_least, at_most, near, padded, text, unjudged
 from .chapter_6 import (
     FOUND,
     PRINTED,
@@ -103,22 +103,20 @@ def compute() -> StudyResult:
         ),
         columns=padded(columns),
         verdicts=(
-            unjudged("the path is within the region", TEXT, "the bounds of the region are lost", place="6.4.3, L5101"),
+            unjudged("the path is within the region", text("6.4.3, L5101"), "the bounds of the region are lost"),
             at_least(
                 "travel within 120 degrees; AB is 154 cm between the program's points",
-                TEXT,
+                text(place),
                 154.0,
                 CM_PER_METRE * printed.travel,
                 "cm",
-                place=place,
             ),
-            at_most("height of the printed crank shaft", TEXT, line, above, "cm", place="6.4.3, L5107"),
+            at_most("height of the printed crank shaft", text("6.4.3, L5107"), line, above, "cm"),
             at_most(
                 "quality function of the nineteen points, printed linkage, of ours",
-                TEXT,
+                text("6.4.3, L5115"),
                 1.0,
                 best_of_printed,
-                place="6.4.3, L5115",
                 why="not the optimum linkage, though its straight part is longer",
             ),
             at_most("the same of the printed linkage: less than the area", OURS, 1444.0, areas["printed"], "cm2"),

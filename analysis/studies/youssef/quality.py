@@ -18,7 +18,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import Linkage, Search, TimedPath, UntimedPath, area_between, evaluate, synthesize, turn
-from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded
+from ..study import OURS, Study, StudyResult, at_least, at_most, near, padded, text
 from .chapter_6 import TRANSMISSION, FloatArray, best, our_error, printed_error
 from .problems import AREA_N, CM2_PER_M2, PROBLEMS, ellipse
 
@@ -127,37 +127,30 @@ def compute() -> StudyResult:
         assignment="The thesis gives no example: problem, equal weights and the limit of the links are our choice.",
         columns=padded(columns),
         verdicts=(
-            at_most(
-                "timed error of the combined optimum, of the path's", TEXT, 1.0, found.timed / path.timed, place=place
-            ),
-            at_most(
-                "area of the combined optimum, of the timed one's", TEXT, 1.0, found.area / timed.area, place=place
-            ),
+            at_most("timed error of the combined optimum, of the path's", text(place), 1.0, found.timed / path.timed),
+            at_most("area of the combined optimum, of the timed one's", text(place), 1.0, found.area / timed.area),
             at_most("combined error, of the lesser of the two optima's", OURS, 1.0, found.combined / least),
             at_least("its timed error, of the timed optimum's", OURS, 1.0, found.timed / timed.timed),
             at_least("its area, of the path's optimum's", OURS, 1.0, found.area / path.area),
             near(
                 f"four-bars of {SAMPLES} whose constraint (6.12) is least away from cos wt = 1 and -1",
-                TEXT,
+                text("6.3.2, L4514"),
                 0,
                 least_away_from_ends(),
                 0,
-                place="6.3.2, L4514",
             ),
             at_least(
                 "minima found at 72 points, more than at 12; timed ellipse (a)",
-                TEXT,
+                text("6.3.1, L4348"),
                 1,
                 minima(72) - minima(12),
-                place="6.3.1, L4348",
                 why="the same four at either",
             ),
             at_most(
                 "error of the printed linkage, of the least with no longer link; timed ellipse (a)",
-                TEXT,
+                text("6.3.1, L4366"),
                 1.0,
                 printed_error("ellipse-a") / our_error("ellipse-a"),
-                place="6.3.1, L4366",
                 why="the simplex did not locate the global minimum",
             ),
         ),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Crossing, PeriodicOrbit, SpecialPoint, Sweep, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, text, unjudged
 from .rigs import (
     FASTEST,
     GRID,
@@ -193,21 +193,15 @@ def _with(coefficient: float) -> list[Verdict]:
     fractions = "rise of the amplitude at a third and a quarter of the natural frequency, spring"
     agree, most = "8.4.1.1, L6484", taken["A"].max()
     return [
-        at_most(f"amplitude taken off at 390 to 450 rpm, spring A{words}", TEXT, 0.1, most, place=agree, why=more),
-        at_most(
-            f"shift of the phase at 390 to 450 rpm, spring A{words}", TEXT, 5.0, shift, "deg", place=agree, why=more
-        ),
-        at_most(
-            f"work of Coulomb over viscous friction, 420 rpm{words}", TEXT, 1.0, work, place="8.4.1.1, L6494", why=more
-        ),
-        at_least(f"amplitude taken off, spring B over A{words}", TEXT, 1.0, ratio, place="8.4.1.1, L6526", why=less),
+        at_most(f"amplitude taken off at 390 to 450 rpm, spring A{words}", text(agree), 0.1, most, why=more),
+        at_most(f"shift of the phase at 390 to 450 rpm, spring A{words}", text(agree), 5.0, shift, "deg", why=more),
+        at_most(f"work of Coulomb over viscous friction, 420 rpm{words}", text("8.4.1.1, L6494"), 1.0, work, why=more),
+        at_least(f"amplitude taken off, spring B over A{words}", text("8.4.1.1, L6526"), 1.0, ratio, why=less),
         *(
-            at_most(f"{fractions} {s}{words}", TEXT, NOTICED, value, place="8.4.1.2, L6770", why=hidden[s])
+            at_most(f"{fractions} {s}{words}", text("8.4.1.2, L6770"), NOTICED, value, why=hidden[s])
             for s, value in rises.items()
         ),
-        at_least(
-            f"displacement at 800 over 570 rpm, B{words}", TEXT, 1.0, last / half, place="8.4.1.2, L6555", why=remains
-        ),
+        at_least(f"displacement at 800 over 570 rpm, B{words}", text("8.4.1.2, L6555"), 1.0, last / half, why=remains),
     ]
 
 
@@ -241,27 +235,17 @@ def compute_friction() -> StudyResult:
         columns=padded(columns),
         verdicts=(
             at_least(
-                "greatest force of the guide in a cycle over its mean, 420 rpm",
-                TEXT,
-                1.1,
-                within,
-                place="8.4.1.1, L6496",
+                "greatest force of the guide in a cycle over its mean, 420 rpm", text("8.4.1.1, L6496"), 1.1, within
             ),
-            at_least("greatest force of the guide at 450 over 390 rpm", TEXT, 1.1, over, place="8.4.1.1, L6496"),
+            at_least("greatest force of the guide at 450 over 390 rpm", text("8.4.1.1, L6496"), 1.1, over),
             at_most(
-                "force of the guide less the joint's, 420 rpm",
-                TEXT,
-                0.1,
-                weight,
-                "N",
-                place="8.4.1.1, L6498",
-                why=carried,
+                "force of the guide less the joint's, 420 rpm", text("8.4.1.1, L6498"), 0.1, weight, "N", why=carried
             ),
-            at_least(tried, TEXT, 1.0, whole, place="8.4.1.1, L6486", why="what hides one departure makes another"),
+            at_least(tried, text("8.4.1.1, L6486"), 1.0, whole, why="what hides one departure makes another"),
             *_with(SLIGHT),
             *_with(STRONG),
-            unjudged("the average of the damping coefficient contributes", TEXT, why, place="8.4.1.1, L6510"),
-            unjudged("friction in the pins contributes", TEXT, why_pins, place="8.4.1.1, L6512"),
+            unjudged("the average of the damping coefficient contributes", text("8.4.1.1, L6510"), why),
+            unjudged("friction in the pins contributes", text("8.4.1.1, L6512"), why_pins),
         ),
     )
 

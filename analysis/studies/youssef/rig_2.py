@@ -12,7 +12,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Branch
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, nonlinear_harmonic_balance, slider_equation, two_harmonics
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .rigs import (
     FASTEST,
     LOST,
@@ -83,7 +83,7 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
         verdicts=(
             *_natural_frequencies(spring, place),
             *_beyond(spring),
-            at_most("error of the linear equation at resonance, relative", TEXT, 0.01, error, place="8.4.2.2, L6976"),
+            at_most("error of the linear equation at resonance, relative", text("8.4.2.2, L6976"), 0.01, error),
             at_most("difference between orbits and nonlinear harmonic balance", OURS, SAME, apart, "cm"),
             runs_verdict(spring, checked),
             at_most("largest Floquet multiplier over all speeds", OURS, 1.0, largest),
@@ -96,8 +96,8 @@ def _natural_frequencies(spring: str, place: float) -> list[Verdict]:
     (seen, calculated, right), natural = NATURAL[spring], natural_speed(spring)
     why, section = "582 and 829 rpm are not as 1 to the root of 2", "8.4.2.2, L6867"
     verdicts = [
-        near("speed of the greatest amplitude", TEXT, seen, place, 5.0, "rpm", place="8.4.2.2, L6861"),
-        near("calculated natural frequency", TEXT, calculated, natural, 0.5, "rpm", place=section, why=why),
+        near("speed of the greatest amplitude", text("8.4.2.2, L6861"), seen, place, 5.0, "rpm"),
+        near("calculated natural frequency", text(section), calculated, natural, 0.5, "rpm", why=why),
         near("natural frequency from the mean effective mass", OURS, right, natural, 0.05, "rpm"),
     ]
     if spring == "C":
@@ -105,15 +105,7 @@ def _natural_frequencies(spring: str, place: float) -> list[Verdict]:
     ratio, rounding = natural / natural_speed("C"), 0.5 / 582.0 + 0.5 / 829.0
     return [
         *verdicts,
-        near(
-            "natural frequency over spring C's",
-            TEXT,
-            829.0 / 582.0,
-            ratio,
-            rounding,
-            place=section,
-            why="the root of 2",
-        ),
+        near("natural frequency over spring C's", text(section), 829.0 / 582.0, ratio, rounding, why="the root of 2"),
         near("natural frequency over spring C's, the root of 2", OURS, sqrt(2.0), ratio, 1e-9),
     ]
 
@@ -132,9 +124,9 @@ def _beyond(spring: str) -> list[Verdict]:
     }
     words, section, why = f"amplitude at {BEYOND:g} rpm over that of the theory", "8.4.2.2, L6847", "it is lowered"
     return [
-        unjudged("theory and experiment agree up to resonance", TEXT, LOST, place="8.4.2.2, L6839"),
-        unjudged("theory has a narrower resonance, smaller amplitudes beyond", TEXT, LOST, place="8.4.2.2, L6841"),
-        *(at_least(f"{words}, {name}", TEXT, 1.0, r, place=section, why=why) for name, r in ratios.items()),
+        unjudged("theory and experiment agree up to resonance", text("8.4.2.2, L6839"), LOST),
+        unjudged("theory has a narrower resonance, smaller amplitudes beyond", text("8.4.2.2, L6841"), LOST),
+        *(at_least(f"{words}, {name}", text(section), 1.0, r, why=why) for name, r in ratios.items()),
     ]
 
 
@@ -186,14 +178,14 @@ def compute_harmonics() -> StudyResult:
             "greatest harmonic 1 over greatest harmonic 2",
             f"{sizes[1][at] / sizes[2][at]:.0f} at resonance itself",
         )
-        verdicts.append(near(f"{words}; {name}", TEXT, 50.0, ratio, 5.0, place="8.4.2.2, L6881", why=why))
+        verdicts.append(near(f"{words}; {name}", text("8.4.2.2, L6881"), 50.0, ratio, 5.0, why=why))
         for n, part in ((2, "half"), (3, "a third"), (4, "a quarter")):
             above, words = rise_at(spring, n), f"rise of the amplitude at {part} of the natural frequency, relative"
             why = f"harmonic {n} makes {10.0 * near_fraction(spring, n)[1]:.2f} mm there" if above > NOTICED else ""
-            verdicts.append(at_most(f"{words}; {name}", TEXT, NOTICED, above, place="8.4.2.2, L6871", why=why))
+            verdicts.append(at_most(f"{words}; {name}", text("8.4.2.2, L6871"), NOTICED, above, why=why))
         words, left = f"the same at half with friction by {SLIGHT:g} of the guide's force", rise(spring, SLIGHT, 2)
         why = "more than linear bearings have does not hide it"
-        verdicts.append(at_most(f"{words}; {name}", TEXT, NOTICED, left, place="8.4.2.2, L6857, L6871", why=why))
+        verdicts.append(at_most(f"{words}; {name}", text("8.4.2.2, L6857, L6871"), NOTICED, left, why=why))
         verdicts.append(at_most(f"error of harmonic 2 by the linear equation, relative; {name}", OURS, 0.1, error))
     return StudyResult(
         number="8.21",

@@ -34,7 +34,7 @@ from ...synthesis import (
     turn,
 )
 from ...units import CM_PER_METRE
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
 from .chapter_7 import slider
 from .problems import PROBLEMS, WEIGHT, packaging_path
 
@@ -46,10 +46,7 @@ TARGET, FIXED = "0.25", "0.55"
 ROCKER_STARTS = 24
 PATH_SEARCHES = {2: (8, 0.25), 3: (8, 0.25), 5: (24, 0.18)}
 #: Printed series: A0, A1, A2 and B1, B2 (cm), guide angle (deg).
-SERIES = {
-    ROCKER: ((1.46, -0.425, -0.855), (-0.256, 0.569), -41.0),
-    PATH: ((3.1, 0.772, 0.568), (-0.34, -0.136), -0.9),
-}
+SERIES = {ROCKER: ((1.46, -0.425, -0.855), (-0.256, 0.569), -41.0), PATH: ((3.1, 0.772, 0.568), (-0.34, -0.136), -0.9)}
 #: Crank rotations of the curves (rad).
 TURN = np.linspace(0.0, 2.0 * pi, 721)
 
@@ -174,28 +171,24 @@ def moved_rocker() -> StudyResult:
         verdicts=(
             near(
                 "error of the printed series, least of its readings",
-                TEXT,
+                text("7.3.2, L5957"),
                 4.8,
                 min(readings(ROCKER)),
                 0.05,
                 "deg2",
-                place="7.3.2, L5957",
                 why="as printed the links cannot be joined over the turn",
             ),
-            at_most("error with two harmonics", TEXT, 4.8, errors[2], "deg2", place=place),
+            at_most("error with two harmonics", text(place), 4.8, errors[2], "deg2"),
             at_most("error with two harmonics", OURS, 0.76, errors[2], "deg2"),
             near("error with the pivot fixed, N = 24", OURS, 35.8, error_of(ROCKER, p.linkage), 0.05, "deg2"),
-            at_most("rms error within the window, of that without", TEXT, 1.0, in_window, place="7.3.2, L5963"),
-            at_most(
-                "error with three harmonics, of that with two", TEXT, 1.0, errors[3] / errors[2], place="7.3.2, L5969"
-            ),
+            at_most("rms error within the window, of that without", text("7.3.2, L5963"), 1.0, in_window),
+            at_most("error with three harmonics, of that with two", text("7.3.2, L5969"), 1.0, errors[3] / errors[2]),
             at_least("error with one harmonic, of that with two", OURS, 1.0, errors[1] / errors[2]),
             at_most(
                 "greatest error with two harmonics, of that with the pivot fixed; all eight problems of chapter VI",
-                TEXT,
+                text("7.3.2, L5935; 6.4.2, L4874, L4969"),
                 1.0,
                 reduced(),
-                place="7.3.2, L5935; 6.4.2, L4874, L4969",
             ),
             sound(*found.values()),
             at_least("least transmission angle with any of them", OURS, 20.0, least, "deg"),
@@ -286,17 +279,16 @@ def moved_path() -> StudyResult:
         claim="The slider moved by two harmonics brings the area between path (b) and the curve from 12.6 to 4.3 cm2.",
         columns=padded(columns),
         verdicts=(
-            near("area with the printed series", TEXT, 4.3, as_printed, 0.05, "cm2", place=place, why=why),
+            near("area with the printed series", text(place), 4.3, as_printed, 0.05, "cm2", why=why),
             near(
                 "the same with A0 = 0.31 cm, the guide's angle from the horizontal",
-                TEXT,
+                text(place),
                 4.3,
                 error_of(PATH, mended()),
                 0.05,
                 "cm2",
-                place=place,
             ),
-            at_most("area with two harmonics", TEXT, 4.3, errors[2], "cm2", place="7.3.2, L5994"),
+            at_most("area with two harmonics", text("7.3.2, L5994"), 4.3, errors[2], "cm2"),
             at_most("the same with the guide's angle from the ground link", OURS, 4.3, tenth, "cm2"),
             near("area with the pivot fixed", OURS, 12.61, error_of(PATH, p.linkage), 0.005, "cm2"),
             at_most("area with two harmonics", OURS, 4.05, errors[2], "cm2"),
