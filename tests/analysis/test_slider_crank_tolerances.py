@@ -146,7 +146,7 @@ def test_everything_by_differences(problem: dict[str, Any], law: str) -> None:
             a, b, c, d = (x[quantity] for x in places)
             slope = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
             allowed = 3e-7 * (np.abs(slope).max() + scales[QUANTITIES[quantity]])
-            assert np.max(np.abs(found.of(quantity, name) - slope)) < allowed, (quantity, name)
+            assert np.max(np.abs(found.derivative(quantity, name) - slope)) < allowed, (quantity, name)
 
 
 def test_motion_alone_is_the_motion_with_the_forces() -> None:
@@ -229,11 +229,11 @@ def test_linear_estimate_is_the_sum_of_variances() -> None:
     found = tolerance_effects(turn, TOLERANCES, quantities)
     slopes = sensitivities(turn, [t.name for t in TOLERANCES], quantities)
     for name in quantities:
-        parts: Any = [(slopes.of(name, t.name) * t.deviation) ** 2 for t in TOLERANCES]
+        parts: Any = [(slopes.derivative(name, t.name) * t.deviation) ** 2 for t in TOLERANCES]
         assert found[name].deviation.data ** 2 == pytest.approx(sum(parts).data)
         assert found[name].shares.sum(axis=0).data == pytest.approx(np.ones(13))
         assert (found[name].shares[3] * sum(parts)).data == pytest.approx(parts[3].data)
-        worst: Any = sum(np.abs(slopes.of(name, t.name)) * t.extent for t in TOLERANCES)
+        worst: Any = sum(np.abs(slopes.derivative(name, t.name)) * t.extent for t in TOLERANCES)
         assert found[name].worst.data == pytest.approx(worst.data)
         assert found[name].second_shares.sum(axis=0).data == pytest.approx(np.ones(13))
 
@@ -450,7 +450,7 @@ def test_wrong_input_is_reported() -> None:
     with pytest.raises(ParameterError, match=r"rod\.colour"):
         sensitivities(turn, ["rod.colour"])
     with pytest.raises(ParameterError, match=r"rod\.mass"):
-        sensitivities(turn).of("slider.position", "rod.mass")
+        sensitivities(turn).derivative("slider.position", "rod.mass")
     with pytest.raises(InputError, match="no tolerance"):
         monte_carlo(turn, [])
     with pytest.raises(InputError, match=r"2 tolerances of rod\.length"):

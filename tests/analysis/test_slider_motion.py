@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.slider import SmoothnessInterrupted, greatest, motion, slider_motion, smoothness_curve
+from analysis.slider import SmoothnessInterrupted, greatest_derivative, motion, slider_motion, smoothness_curve
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import (
     ANGLES,
@@ -262,7 +262,7 @@ def bounded(name: str) -> tuple[float, float, Linkage, Synthesis]:
         if name == "stroke":
             assert isinstance(linkage.pivot, SliderMotion)
             return linkage.pivot.stroke
-        return greatest(linkage, {"speed": 1, "acceleration": 2}[name])
+        return greatest_derivative(linkage, {"speed": 1, "acceleration": 2}[name])
 
     bound = 0.7 * has(free)
     result = moved(2, **{name: bound})
@@ -448,7 +448,7 @@ def test_an_interrupted_smoothness_curve_keeps_what_it_has(monkeypatch: pytest.M
 def test_smoothness_as_a_weight_does_the_same() -> None:
     rough, smooth = moved(2), moved(2, smoothness=1.0)
     assert smooth.best.error > rough.best.error
-    assert greatest(smooth.best.linkage, 2) < greatest(rough.best.linkage, 2)
+    assert greatest_derivative(smooth.best.linkage, 2) < greatest_derivative(rough.best.linkage, 2)
 
 
 # Manners

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import VariationalMotion, variational_motion
-from analysis.slider.variational import _path
+from analysis.slider.variational import _choose_minima
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion
 from analysis.synthesis.linkage.kernels import link_directions
 from linkwork.errors import AssemblyError, InputError, ParameterError
@@ -483,7 +483,7 @@ class TestJumps:
 
             allowed = [c for c in product(range(m), repeat=n) if all(chosen_from[i, k] for k, i in enumerate(c))]
             best = min(allowed, key=rank)
-            assert rank(tuple(_path(squares, travel, chosen_from, bridged, closed).tolist())) == rank(best)
+            assert rank(tuple(_choose_minima(squares, travel, chosen_from, bridged, closed).tolist())) == rank(best)
 
 
 class TestThesis:
