@@ -16,7 +16,6 @@ from shapely.geometry import Point, Polygon
 from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
-from analysis.files.drawings import LAYERS
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     InfeasibleError,
@@ -40,6 +39,7 @@ from analysis.synthesis import (
     report,
     turn,
 )
+from analysis.synthesis.result.drawing import LAYERS
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 
