@@ -166,13 +166,13 @@ class SliderCase:
     Attributes
     ----------
     synthesis : SynthesisCase
-        Task, bounds, constraints, search, and what the linkage is made of.
+        Task, bounds, constraints, search, and masses of the linkage.
     linkage : Linkage or None
         The one whose pivot is moved; None if it is to be found first.
     slider : SliderTable
         The motion that is sought.
     strategy, drive, tracking
-        What is asked for besides; None for what is not.
+        Further computations; None if not asked for.
     load : Load, optional
     """
 
@@ -363,7 +363,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or what it says is not usable.
+        If the file cannot be read, or an entry is not usable.
     InfeasibleError
         If bounds and constraints contradict one another.
     """

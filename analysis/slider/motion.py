@@ -208,7 +208,7 @@ def smoothness_curve(
         On Ctrl-C, with the best so far at each bound.
     """
     if not isinstance(unknown, SliderUnknown):
-        raise InputError(f"the smoothness of {unknown!r}: it must be that of a SliderUnknown")
+        raise InputError(f"the unknown is {unknown!r}: a smoothness curve needs a SliderUnknown")
     values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
     if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
@@ -226,7 +226,7 @@ def smoothness_curve(
 
     found: dict[int, Solution] = {}
     done: int | None = 0
-    # what is best without a bound is the start for a wide one
+    # the best motion without a bound is the start for a wide bound
     with suppress(SynthesisInterrupted, KeyboardInterrupt):
         try:
             widest = best(inf, [], search.starts)

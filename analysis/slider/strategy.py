@@ -118,7 +118,7 @@ def simplest_mechanism(
         Of the quality function (m2; of a rocker function rad2), or of the worst error (m, of a motion with its errors of angle
         times its length; rad).
     criterion : "error" or "worst"
-        Which of them; with ``"worst"`` it is also what is made small, whatever the task's objective.
+        The criterion; ``"worst"`` is also minimised, whatever the task's objective.
     bounds, constraints
         Of the links, as for `synthesize`: they hold for every mechanism.
     stroke : float, optional
@@ -159,7 +159,7 @@ def simplest_mechanism(
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
     if criterion == "worst":
-        # what is judged is what is made small
+        # the criterion is also the objective
         task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
     four_bar = tried.four_bar()

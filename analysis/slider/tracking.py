@@ -223,7 +223,7 @@ def track(
     plant : FiveBarParameters, optional
         Of the plant; by default it is the controller's model.
     load : (float, float) or function of the crank angle
-        At P (N), held over a period at its value in the middle of it; what the feed-forward knows of it is the controller's.
+        At P (N), held over a period at its value in the middle of it; the feed-forward uses the controller's load.
     initial : InitialState, optional
         By default on the reference at crank angle 0.
     fmu : path, optional
@@ -241,7 +241,7 @@ def track(
     InputError
         If something given is not usable.
     AssemblyError
-        If the links of the model cannot be joined somewhere on the reference, or those of the plant at the start.
+        If the links cannot be joined: the model's somewhere on the reference, or the plant's at the start.
     """
     check_speed(crank_speed)
     if not 0.0 < revolutions < inf:

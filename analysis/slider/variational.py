@@ -164,7 +164,7 @@ class _Problem:
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
         most = sqrt((l3 + l4) ** 2 - 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
-        # with B on D the directions of coupler and rocker are those of neither limit: the perpendicular ones are candidates
+        # with B on D the directions of coupler and rocker are undetermined: perpendicular ones are candidates
         return [(pi - low, most, 1.0)] + ([(low, least, -1.0)] if least > 0.0 else [])
 
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
@@ -193,7 +193,7 @@ class _Problem:
             wanted = target.real - k.output_angle - self.guide_angle
             own, other, offset = l4, l3, -b.imag
 
-        # angles of the own and the other link from the guide where the error is stationary
+        # angles from the guide of the target link and the other link where the error is stationary
         sine = (own * np.sin(wanted) + offset) / other
         side = np.arcsin(np.clip(sine, -1.0, 1.0))
         x, y = [wanted, wanted], [side, pi - side]
@@ -450,7 +450,7 @@ def _choose_minima(
         before[k] = ways.argmin(axis=1)
         total = ways.min(axis=1) + cost[:, k]
     if not closed:
-        # what leads back to the first rotation does not count
+        # the step back to the first rotation does not count
         step[-1] = 0.0
     first, row = np.unravel_index(int((total + step[-1].T).argmin()), (m, m))
     choice = np.empty(n, dtype=int)
