@@ -12,14 +12,14 @@ and one freedom is left, the slider position u. It moves the links by
 For a path, P turns with the coupler about B and |P - p*|^2 falls with the angle between BP and the direction from B to p*; for
 a function the rocker has to be at th4*. So the error as a function of u has its minima
 
-    with the link at the angle that is wanted, the other link on either side of the perpendicular to the guide;
+    with the link at the target angle, the other link on either side of the perpendicular to the guide;
     with the other link perpendicular to the guide, either way, and the link on either side: cos t = 0 for a path, cos s = 0
     for a function;
     at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
-The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the best may lie
-in the other assembly, past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least
-transmission angle before.
+The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the optimum may lie in the
+other assembly, past a dead centre. A linkage that keeps its assembly stops there, and earlier if it keeps a least transmission
+angle.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ class VariationalMotion:
     branch : ndarray of int, shape (n,)
         Assembly, the sign of sin(th4 - th3).
     kind : ndarray of str, shape (n,)
-        Why the error is least: "target" (the link is at the angle that is wanted), "perpendicular" (the other link is, to the
+        Why the error is least: "target" (the link is at the target angle), "perpendicular" (the other link is, to the
         guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
     error : ndarray, shape (n,)
         Distance from the target point (m), or from the target angle (rad).
     weights : ndarray, shape (n,)
-        Of the squared errors.
+        Weights of the squared errors.
     jumps : ndarray of int
         Every k for which the slider would have to jump from rotation k to the next: no path of minima of one assembly leads
         across.
