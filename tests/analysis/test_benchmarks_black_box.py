@@ -27,9 +27,9 @@ from analysis.synthesis import (
     normal_form,
     turn,
 )
-from analysis.synthesis.search.polish import quality_of
-from analysis.synthesis.search.start import linkage_of, start_of
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.search.polish import sum_of_squares
+from analysis.synthesis.search.start import make_linkage, make_start
+from analysis.synthesis.task.limits import make_limits
 from benchmarks.black_box import BlackBox, descend, evolve, initial_simplex
 from tests.linkages import drawn, ellipse
 
@@ -41,12 +41,12 @@ SMALL = LargestLink(length=0.5)
 
 def box(task: Task, *constraints: Constraint, branch: int = 1) -> BlackBox:
     normal = normal_form(task)
-    return BlackBox(normal, limits_of(task, normal, None, constraints), branch)
+    return BlackBox(normal, make_limits(task, normal, None, constraints), branch)
 
 
 def unknowns(black: BlackBox, linkage: Linkage, *more: float) -> FloatArray:
     """A linkage as a row of the black box's unknowns."""
-    q = start_of(linkage, black.normal).q
+    q = make_start(linkage, black.normal).q
     return np.array([[*q[black.limits.high > black.limits.low], *more]])
 
 
@@ -82,7 +82,7 @@ class TestQuality:
         black = box(self.tasks()[kind])
         # of a rocker function the ground link is given
         linkage = self.KNOWN.scaled(0.1 / self.KNOWN.ground_length) if kind == "rocker" else self.KNOWN
-        expected = quality_of(black.normal, start_of(linkage, black.normal))
+        expected = sum_of_squares(black.normal, make_start(linkage, black.normal))
         x = unknowns(black, linkage)
         assert black.quality(np.vstack([x, x]))[1] == pytest.approx(expected, rel=1e-12)
 
@@ -187,6 +187,6 @@ class TestSearch:
         boxes = [box(task, *USUAL, branch=branch) for branch in (1, -1)]
         answers = [boxes[k % 2].answer(search(boxes[k % 2], np.random.default_rng([0, k]))) for k in range(8)]
         best = min((answer for answer in answers if answer.feasible), key=lambda answer: answer.start.quality)
-        found = linkage_of(best.start, boxes[0].normal)
+        found = make_linkage(best.start, boxes[0].normal)
         assert np.abs(found.rocker_angle(turn(24)) - task.angle).max() < 0.02
         assert found.least_transmission > radians(39.9)

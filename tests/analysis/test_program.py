@@ -42,12 +42,12 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.search.polish import fit_least_squares, polish, quality_of, residuals
+from analysis.synthesis.search.polish import fit_least_squares, polish, residuals, sum_of_squares
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.scan import scan
-from analysis.synthesis.search.start import Start, linkage_of, start_of
+from analysis.synthesis.search.start import Start, make_linkage, make_start
 from analysis.synthesis.search.statement import BETWEEN
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse
@@ -79,7 +79,7 @@ class TestOptimum:
 
         def quality(x: FloatArray) -> float:
             at = Start(q=x[:11], branch=start.branch, rotation=x[11:] if rotation else None)
-            return quality_of(normal, at)
+            return sum_of_squares(normal, at)
 
         limits = program.limits
 
@@ -111,13 +111,13 @@ class TestOptimum:
 
     def test_of_a_timed_path(self) -> None:
         normal = normal_form(TASK)
-        limits = limits_of(TASK, normal, None, (SMALL, LeastTransmission(angle=radians(60))))
+        limits = make_limits(TASK, normal, None, (SMALL, LeastTransmission(angle=radians(60))))
         program = Program(normal, limits)
         for start in scan(normal, limits, seed=0, candidates=4096, starts=4):
             answer = program.solve(start)
             assert answer.feasible
             assert answer.converged
-            assert answer.start.quality == pytest.approx(quality_of(normal, answer.start), rel=1e-9)
+            assert answer.start.quality == pytest.approx(sum_of_squares(normal, answer.start), rel=1e-9)
             assert answer.start.quality < start.quality
             assert self.stationary(program, normal, answer.start, rotation=False) < 1e-4
 
@@ -127,9 +127,9 @@ class TestOptimum:
         noise = np.random.default_rng(0).normal(scale=0.02, size=(8, 2))
         task = Motion(points=known.path(rotation) + noise, angle=known.coupler_angle(rotation))
         normal = normal_form(task)
-        limits = limits_of(task, normal, None, USUAL)
+        limits = make_limits(task, normal, None, USUAL)
         program = Program(normal, limits)
-        answer = program.solve(start_of(known, normal, rotation=rotation))
+        answer = program.solve(make_start(known, normal, rotation=rotation))
         assert answer.feasible
         assert answer.converged
         assert np.all(np.diff(answer.start.rotation) > 0.01)
@@ -139,7 +139,7 @@ class TestOptimum:
         angle = 1.2 + 0.5 * np.sin(turn(24)) + 0.1 * np.cos(2.0 * turn(24))
         task = RockerFunction(angle=angle)
         normal = normal_form(task)
-        limits = limits_of(task, normal, {"ground_length": (0.1, 0.1)}, USUAL)
+        limits = make_limits(task, normal, {"ground_length": (0.1, 0.1)}, USUAL)
         program = Program(normal, limits)
         answer = program.solve(scan(normal, limits, seed=0, candidates=4096, starts=1)[0])
         assert answer.feasible
@@ -149,7 +149,7 @@ class TestOptimum:
 class TestLeastSquares:
     def test_it_agrees_with_ipopt_where_bounds_are_all_that_is_asked(self) -> None:
         normal = normal_form(TASK)
-        limits = limits_of(TASK, normal, {"crank_length": (0.02, 0.06), "ground_length": (0.1, 0.4)}, ())
+        limits = make_limits(TASK, normal, {"crank_length": (0.02, 0.06), "ground_length": (0.1, 0.4)}, ())
         assert limits.bounds_only
         known = Linkage(
             pivot_x=0.2, pivot_y=-0.1, ground_length=0.3, crank_length=0.05, coupler_length=0.35, rocker_length=0.3,
@@ -163,7 +163,7 @@ class TestLeastSquares:
             assert squares.feasible
             assert ipopt.start.quality == pytest.approx(squares.start.quality, rel=1e-5)
             qualities.append(squares.start.quality)
-        assert min(qualities) < quality_of(normal, start_of(known, normal))
+        assert min(qualities) < sum_of_squares(normal, make_start(known, normal))
 
     @pytest.mark.parametrize("kind", ["path", "rocker", "motion"])
     def test_residuals_have_the_jacobian_that_differences_give(self, kind: str) -> None:
@@ -181,7 +181,7 @@ class TestLeastSquares:
             ),
         }
         normal = normal_form(tasks[kind])
-        q = start_of(known, normal).q
+        q = make_start(known, normal).q
         residual, jacobian, rate = residuals(normal, known.branch, q, rotation)
         assert np.abs(residual).max() < 1e-12
         q = q + 0.01 * random.normal(size=11)
@@ -373,9 +373,9 @@ class TestMovedPivot:
             pivot = SliderMotion(FourierSeries(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.4, 0.5])), 0.7)
         else:
             pivot = SecondCrank(0.02, 2, 0.3, FourierSeries(np.array([0.0, 0.2]), np.array([0.0, 0.4])))
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(pivot)
         normal = normal_form(TASK)
-        again = linkage_of(start_of(linkage, normal, unknown), normal, unknown)
+        again = make_linkage(make_start(linkage, normal, unknown), normal, unknown)
         np.testing.assert_allclose(again.displacement(turn(9)), linkage.displacement(turn(9)), atol=1e-14)
         assert again.values() == pytest.approx(linkage.values())
 
@@ -407,8 +407,8 @@ class TestMovedPivot:
         ):
             solution = best(*USUAL, LargestLink(length=0.3), pivot=unknown, search=replace(FEW, starts=1))
             normal = normal_form(TASK)
-            limits = limits_of(TASK, normal, None, (*USUAL, LargestLink(length=0.3)))
-            again = Program(normal, limits, unknown).solve(start_of(solution.linkage, normal, unknown))
+            limits = make_limits(TASK, normal, None, (*USUAL, LargestLink(length=0.3)))
+            again = Program(normal, limits, unknown).solve(make_start(solution.linkage, normal, unknown))
             assert again.start.quality * normal.unit**2 == pytest.approx(solution.error, rel=1e-3)
 
 
@@ -443,28 +443,28 @@ class TestBetween:
             )  # fmt: skip
             unknown = SliderUnknown(harmonics=harmonics, **{bound: most})
             normal = normal_form(TASK)
-            program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
+            program = Program(normal, make_limits(TASK, normal, None, USUAL), unknown)
             for first in (False, True):
-                over = violations(program, start_of(linkage, normal, unknown), first=first)[name]
+                over = violations(program, make_start(linkage, normal, unknown), first=first)[name]
                 assert (over > 0.0) == (factor > 1.0)
 
     @pytest.mark.parametrize("u", [0.39, 0.41, -0.39, -0.41])
     def test_a_slider_stays_within_the_ground_link_of_its_middle(self, u: float) -> None:
         pivot = SliderMotion(FourierSeries(np.array([u, 0.0]), np.zeros(2)), 0.3)
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(pivot)
         normal, unknown = normal_form(TASK), SliderUnknown(harmonics=1)
-        program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
-        over = violations(program, start_of(linkage, normal, unknown))["slider position"]
+        program = Program(normal, make_limits(TASK, normal, None, USUAL), unknown)
+        over = violations(program, make_start(linkage, normal, unknown))["slider position"]
         assert (over > 0.0) == (abs(u) > linkage.ground_length)
 
     @pytest.mark.parametrize("rate", [0.4999, 0.5001, -0.4999, -0.5001])
     def test_speed_of_the_second_crank(self, rate: float) -> None:
         pivot = SecondCrank(0.02, 1, 0.3, FourierSeries(np.zeros(2), np.array([0.0, rate])))
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(pivot)
         unknown = CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5)
         normal = normal_form(TASK)
-        program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
-        over = violations(program, start_of(linkage, normal, unknown))["speed of the second crank"]
+        program = Program(normal, make_limits(TASK, normal, None, USUAL), unknown)
+        over = violations(program, make_start(linkage, normal, unknown))["speed of the second crank"]
         assert (over > 0.0) == (abs(rate) > 0.5)
 
     @pytest.mark.parametrize(("share", "refused"), [(1.1e-3, False), (0.9e-3, True), (7.9, False), (8.1, True)])
@@ -474,8 +474,8 @@ class TestBetween:
         normal = normal_form(task)
         gaps = np.full(normal.n, (normal.n - share) / (normal.n - 1.0)) * 2.0 * math.pi / normal.n
         gaps[3] = share * 2.0 * math.pi / normal.n
-        start = replace(start_of(linkage, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
-        over = violations(Program(normal, limits_of(task, normal, None, USUAL)), start)["order of the stations"]
+        start = replace(make_start(linkage, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
+        over = violations(Program(normal, make_limits(task, normal, None, USUAL)), start)["order of the stations"]
         assert (over > 0.0) == refused
 
     def test_transmission_angle_on_the_way(self) -> None:
@@ -490,8 +490,8 @@ class TestBetween:
         normal = normal_form(task)
         for off in (-1e-5, 1e-5):
             asked = (LeastTransmission(angle=least + off, over="task"), LargestLink(length=1.0))
-            limits = limits_of(task, normal, None, asked)
-            over = violations(Program(normal, limits), start_of(linkage, normal))["transmission angle"]
+            limits = make_limits(task, normal, None, asked)
+            over = violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"]
             assert (over > 0.0) == (off > 0.0)
 
     def test_transmission_angle_over_a_turn_with_a_moved_pivot(self) -> None:
@@ -502,8 +502,8 @@ class TestBetween:
         normal, unknown = normal_form(TASK), SliderUnknown(harmonics=1)
         # what is held at 96 places is held with 2.5e-3 rad to spare
         for spare in (1e-3, 4e-3):
-            limits = limits_of(TASK, normal, None, (LeastTransmission(angle=linkage.least_transmission - spare),))
-            over = violations(Program(normal, limits, unknown), start_of(linkage, normal, unknown))[
+            limits = make_limits(TASK, normal, None, (LeastTransmission(angle=linkage.least_transmission - spare),))
+            over = violations(Program(normal, limits, unknown), make_start(linkage, normal, unknown))[
                 "transmission angle"
             ]
             assert (over > 0.0) == (spare < BETWEEN)
@@ -525,17 +525,17 @@ class TestUntimed:
         phi = turn(180)
         task = UntimedPath(path=TargetPath(points=np.column_stack([np.cos(phi), 0.6 * np.sin(phi)]), closed=True))
         normal = normal_form(task)
-        limits = limits_of(task, normal, None, (LeastTransmission(), LargestLink(length=1.5)))
+        limits = make_limits(task, normal, None, (LeastTransmission(), LargestLink(length=1.5)))
         done = polish(normal, limits, scan(normal, limits, seed=0, candidates=4096, starts=3))
         answer = done.kept[0]
-        found = evaluate(task, linkage_of(answer.start, normal), answer.start.rotation)
+        found = evaluate(task, make_linkage(answer.start, normal), answer.start.rotation)
         assert answer.start.quality * normal.unit**2 == pytest.approx(found.error, rel=0.1)
 
     def test_program_needs_rotations_to_start_from(self) -> None:
         task = Motion(points=ellipse(6), angle=turn(6))
         normal = normal_form(task)
-        limits = limits_of(task, normal, None, USUAL)
-        start = start_of(drawn(np.random.default_rng(0)), normal)
+        limits = make_limits(task, normal, None, USUAL)
+        start = make_start(drawn(np.random.default_rng(0)), normal)
         with pytest.raises(InputError, match="needs the crank rotations of its stations"):
             Program(normal, limits).solve(start)
         with pytest.raises(InputError, match="needs the crank rotations of its stations"):

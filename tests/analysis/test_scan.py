@@ -29,10 +29,10 @@ from analysis.synthesis import (
     normal_form,
     turn,
 )
-from analysis.synthesis.search.polish import quality_of
+from analysis.synthesis.search.polish import sum_of_squares
 from analysis.synthesis.search.scan import SHAPES, Candidates, _placed, _shapes, scan
-from analysis.synthesis.search.start import linkage_of
-from analysis.synthesis.task.limits import Limits, limits_of
+from analysis.synthesis.search.start import make_linkage
+from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
 
 FloatArray = NDArray[np.float64]
@@ -54,7 +54,7 @@ KNOWN = Linkage(
 
 def stated(task: Task, *constraints: Constraint, **bounds: tuple[float, float]) -> tuple[Normal, Limits]:
     normal = normal_form(task)
-    return normal, limits_of(task, normal, bounds, constraints)
+    return normal, make_limits(task, normal, bounds, constraints)
 
 
 def shape(linkage: Linkage, *, phase: float = 0.0, distance: float = 0.0, direction: float = 0.0) -> FloatArray:
@@ -67,7 +67,7 @@ def first(candidates: Candidates, normal: Normal) -> Linkage:
     """The first candidate's linkage."""
     from analysis.synthesis.search.start import Start
 
-    return linkage_of(Start(q=candidates.q[0], branch=candidates.branch), normal)
+    return make_linkage(Start(q=candidates.q[0], branch=candidates.branch), normal)
 
 
 def same(a: Linkage, b: Linkage) -> None:
@@ -248,8 +248,8 @@ class TestStarts:
         qualities = [s.quality for s in starts]
         assert qualities == sorted(qualities)
         for start in starts:
-            assert quality_of(normal, start) == pytest.approx(start.quality, rel=1e-6)
-            linkage = linkage_of(start, normal)
+            assert sum_of_squares(normal, start) == pytest.approx(start.quality, rel=1e-6)
+            linkage = make_linkage(start, normal)
             assert evaluate(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
 
     @pytest.mark.parametrize("closed", [True, False])

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from analysis.run import Inputs, case_from, simulate
 from analysis.synthesis import (
     DeadCentre,
+    FiveBar,
     InfeasibleError,
     LeastPinForce,
     LeastTransmission,
-    Linkage,
     Make,
     MaxPinForce,
     MechanicalAdvantage,
@@ -26,6 +26,7 @@ from analysis.synthesis import (
     NoToggle,
     Search,
     SecondCrank,
+    SliderCrank,
     SliderFunction,
     Solution,
     TimedPath,
@@ -50,28 +51,27 @@ CLEAR = LeastTransmission(angle=radians(20.0))
 
 
 @st.composite
-def slider_cranks(draw: st.DrawFn) -> Linkage:
+def slider_cranks(draw: st.DrawFn) -> SliderCrank:
     offset, crank, coupler = draw(st.floats(-0.6, 0.6)), draw(st.floats(0.1, 1.0)), draw(st.floats(0.1, 1.0))
     # joined somewhere, and not next to where the crank just comes to turn
     assume(abs(offset) < 0.95 * (crank + coupler))
     assume(min(abs(abs(offset) + crank - coupler), abs(abs(abs(offset) - crank) - coupler)) > 0.02)
-    return Linkage(
+    return SliderCrank(
         ground_length=offset,
         crank_length=crank,
         coupler_length=coupler,
-        rocker_length=0.0,
         crank_phase=draw(st.floats(-3.0, 3.0)),
         branch=draw(st.sampled_from([1, -1])),
     )
 
 
-def slider(linkage: Linkage, rotation: Any) -> FloatArray:
+def slider(linkage: SliderCrank, rotation: Any) -> FloatArray:
     """Place of C along the guide, by the pins' own places."""
     here = [linkage.pins(float(at)) for at in np.atleast_1d(rotation)]
     return np.array([pins["C"][1] for pins in here])
 
 
-def advantage(linkage: Linkage, rotation: Any) -> FloatArray:
+def advantage(linkage: SliderCrank, rotation: Any) -> FloatArray:
     """Way of the crank pin for the slider's, by differences."""
     phi = np.atleast_1d(np.asarray(rotation, dtype=float))
     turned: FloatArray = replace(linkage, ground_angle=0.0).slider_position(phi + 1e-6)
@@ -82,7 +82,7 @@ def advantage(linkage: Linkage, rotation: Any) -> FloatArray:
 
 @settings(max_examples=100, deadline=None)
 @given(slider_cranks())
-def test_the_slider_rests_in_its_dead_centres_and_the_crank_goes_to_its_toggles(linkage: Linkage) -> None:
+def test_the_slider_rests_in_its_dead_centres_and_the_crank_goes_to_its_toggles(linkage: SliderCrank) -> None:
     phi = np.linspace(0.0, 2.0 * pi, 2881)
     rests, stops = dead_centres(linkage), toggles(linkage)
     assert (len(stops) == 0) == linkage.turns_fully
@@ -105,7 +105,7 @@ def test_the_slider_rests_in_its_dead_centres_and_the_crank_goes_to_its_toggles(
 
 @settings(max_examples=50, deadline=None)
 @given(slider_cranks(), st.floats(0.0, 6.0))
-def test_the_advantage_is_the_ratio_of_speeds(linkage: Linkage, rotation: float) -> None:
+def test_the_advantage_is_the_ratio_of_speeds(linkage: SliderCrank, rotation: float) -> None:
     assume(np.isfinite(linkage.path([rotation - 1e-3, rotation + 1e-3])).all())
     assume(linkage.transmission([rotation])[0] > 0.1)
     by_ways = float(advantage(linkage, rotation)[0])
@@ -157,14 +157,14 @@ def test_toggles_are_where_they_are_asked_or_not() -> None:
     with pytest.raises(InfeasibleError, match="cannot turn fully"):
         best(CLEAR, Toggle(at="110 deg"), task=part)
     with pytest.raises(ParameterError, match="nothing rests"):
-        dead_centres(Linkage(**made.values() | {"rocker_length": 0.2, "pivot": SecondCrank(0.1)}))
+        dead_centres(FiveBar(**made.values() | {"rocker_length": 0.2}, pivot=SecondCrank(0.1)))
 
 
 @pytest.mark.parametrize(("branch", "offset", "angle"), [(1, 0.03, -0.5 * pi), (-1, 0.02, 0.4), (1, -0.01, 2.0)])
 def test_the_forces_are_those_of_the_spatial_plant(branch: int, offset: float, angle: float) -> None:
     """The five-bar with its rocker pivot far away, run and by its equations, against the slider-crank's own equations."""
-    linkage = Linkage(
-        pivot_x=0.1, ground_length=offset, crank_length=0.05, coupler_length=0.16, rocker_length=0.0,
+    linkage = SliderCrank(
+        pivot_x=0.1, ground_length=offset, crank_length=0.05, coupler_length=0.16,
         point_distance=0.16, ground_angle=angle, crank_phase=0.3, branch=branch,
     )  # fmt: skip
     make = replace(MAKE, load=(0.0, 0.0))
@@ -205,16 +205,16 @@ def test_a_force_is_kept_and_the_case_runs_with_it(tmp_path: Path) -> None:
 def test_toggles_of_a_geared_five_bar() -> None:
     """A parallelogram's cranks, turning alike, keep B and D as far apart as the shafts; turning against one another, not."""
     links = {"ground_length": 0.2, "crank_length": 0.05, "coupler_length": 0.14, "rocker_length": 0.12}
-    assert toggles(Linkage(**links, pivot=SecondCrank(0.05, 1.0, 0.0))) == ()
+    assert toggles(FiveBar(**links, pivot=SecondCrank(0.05, 1.0, 0.0))) == ()
     # B and D are 0.2 - 0.1 cos phi apart where they turn in opposite ways from one line, and 0.26 at most
-    against = Linkage(**links, pivot=SecondCrank(0.05, -1.0, pi))
+    against = FiveBar(**links, pivot=SecondCrank(0.05, -1.0, pi))
     assert toggles(against) == pytest.approx([pi - acos(0.6), pi + acos(0.6)])
     task = TimedPath(points=against.path(0.5 * PHI[:6]), rotation=0.5 * PHI[:6])
     assert "toggles at crank rotations of 126.87, 233.13 deg" in report(Solution.of(task, against))
 
 
 def test_forces_are_those_of_links_that_are_joined() -> None:
-    short = Linkage(ground_length=0.0, crank_length=0.1, coupler_length=0.05, rocker_length=0.0)
+    short = SliderCrank(ground_length=0.0, crank_length=0.1, coupler_length=0.05)
     for run in (True, False):
         with pytest.raises(AssemblyError, match=r"cannot be joined|loop closure|do not"):
             pin_forces(short, MAKE, run=run)

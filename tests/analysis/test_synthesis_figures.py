@@ -62,7 +62,7 @@ LINKAGE = Linkage(
 #: It cannot turn fully: the longest link and the shortest are more than the other two.
 SWINGING = replace(LINKAGE, crank_length=0.25, ground_length=0.35)
 SLIDING = replace(LINKAGE, pivot=SliderMotion(FourierSeries([0.01, 0.02], [0.0, 0.01]), radians(20.0)))
-GEARED = replace(LINKAGE, pivot=SecondCrank(0.02, 2.0, 0.3))
+GEARED = LINKAGE.with_pivot(SecondCrank(0.02, 2.0, 0.3))
 
 
 def timed(linkage: Linkage = LINKAGE) -> Solution:

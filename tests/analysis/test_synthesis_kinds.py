@@ -16,6 +16,7 @@ from scipy.optimize import brentq, differential_evolution, fsolve
 from analysis.mechanisms import SLIDER_CRANK
 from analysis.synthesis import (
     USUAL,
+    FiveBar,
     Grashof,
     InfeasibleError,
     Kind,
@@ -30,6 +31,7 @@ from analysis.synthesis import (
     RockerFunction,
     Search,
     SecondCrank,
+    SliderCrank,
     SliderFunction,
     Solution,
     Stroke,
@@ -39,7 +41,6 @@ from analysis.synthesis import (
     UntimedPath,
     drawing,
     judge,
-    kind_of,
     normal_form,
     plates,
     rounded,
@@ -50,15 +51,15 @@ from analysis.synthesis import (
 from analysis.synthesis.linkage.kernels import COLUMNS, coupler_path_jacobian
 from analysis.synthesis.result.report import report
 from analysis.synthesis.search.scan import scan
-from analysis.synthesis.search.start import linkage_of
-from analysis.synthesis.task.limits import limits_of_kinds, second_crank
+from analysis.synthesis.search.start import make_linkage
+from analysis.synthesis.task.limits import limits_by_kind
 from linkwork.errors import InputError, ParameterError
 from linkwork.slider_crank import kinematics as plant
 
 FloatArray = NDArray[np.float64]
 
-SLIDER = Linkage(
-    pivot_x=0.3, pivot_y=-0.1, ground_length=0.04, crank_length=0.05, coupler_length=0.16, rocker_length=0.0,
+SLIDER = SliderCrank(
+    pivot_x=0.3, pivot_y=-0.1, ground_length=0.04, crank_length=0.05, coupler_length=0.16,
     point_distance=0.09, point_angle=0.7, ground_angle=0.4, crank_phase=1.1, output_angle=0.0,
 )  # fmt: skip
 QUICK = Search(starts=6, candidates=1 << 13, solutions=3)
@@ -116,7 +117,7 @@ def test_derivatives_of_the_coupler_point_are_limits_of_differences() -> None:
     for k, name in enumerate(COLUMNS[:10]):
         if name == "rocker_length":
             continue
-        ends = [Linkage.from_vector(q + side * h * (np.arange(10) == k)).path(phi).T for side in (1.0, -1.0)]
+        ends = [SliderCrank.from_vector(q + side * h * (np.arange(10) == k)).path(phi).T for side in (1.0, -1.0)]
         np.testing.assert_allclose(jacobian[k], (ends[0] - ends[1]) / (2.0 * h), rtol=1e-7, atol=1e-8, err_msg=name)
 
 
@@ -269,7 +270,7 @@ class TestSearch:
         task = TimedPath(points=replace(SLIDER, branch=branch).path(turn(24)))
         found = synthesize(task, kinds=("slider-crank",), search=QUICK)
         assert found.best.error < 1e-16
-        assert found.best.linkage.slides
+        assert isinstance(found.best.linkage, SliderCrank)
         assert found.best.linkage.crank_length == pytest.approx(0.05, rel=1e-5)
 
     def test_an_untimed_path(self) -> None:
@@ -289,7 +290,7 @@ class TestSearch:
         found = synthesize(SliderFunction(position=x), search=QUICK)
         assert found.best.error < 1e-16
         linkage = found.best.linkage
-        assert linkage.slider_is_point
+        assert linkage.point_is_pin
         np.testing.assert_allclose(linkage.path(turn(24)), np.column_stack([x, np.zeros(24)]), atol=1e-8)
         np.testing.assert_allclose([*linkage.vector[2:5]], [0.04, 0.05, 0.16], rtol=1e-4)
 
@@ -310,13 +311,17 @@ class TestSearch:
         task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)]))
         both = synthesize(task, kinds=("four-bar", "slider-crank"), search=QUICK)
         assert len(both.solutions) == 3
-        assert {s.linkage.slides for s in both.solutions} == {True, False}
+        assert {s.linkage.kind for s in both.solutions} == {"slider-crank", "four-bar"}
         errors = [s.error for s in both.solutions]
         assert errors == sorted(errors)
         alone = [synthesize(task, kinds=(kind,), search=QUICK).best.error for kind in ("four-bar", "slider-crank")]
         assert errors[0] == pytest.approx(min(alone), rel=1e-6)
-        again = synthesize(task, kinds=("slider-crank",), guesses=[s for s in both.solutions if s.linkage.slides][:1])
-        assert again.best.error <= min(s.error for s in both.solutions if s.linkage.slides) * (1.0 + 1e-9)
+        again = synthesize(
+            task, kinds=("slider-crank",), guesses=[s for s in both.solutions if isinstance(s.linkage, SliderCrank)][:1]
+        )
+        assert again.best.error <= min(s.error for s in both.solutions if isinstance(s.linkage, SliderCrank)) * (
+            1.0 + 1e-9
+        )
 
 
 @pytest.mark.parametrize(
@@ -377,7 +382,7 @@ class TestWhatIsMadeOfIt:
             "crank_phase",
         }
         made = rounded(found).linkage
-        assert made.slider_is_point
+        assert made.point_is_pin
         assert made.coupler_length == pytest.approx(round(1e4 * found.linkage.coupler_length) / 1e4)
 
     def test_drawings_have_a_guide_and_no_rocker(self) -> None:
@@ -393,10 +398,10 @@ class TestWhatIsMadeOfIt:
         assert np.hypot(*(guide[1] - guide[0])) == pytest.approx(textbook(SLIDER)[0], rel=1e-4)
 
     def test_the_five_bar_plant_has_none(self) -> None:
-        with pytest.raises(ParameterError, match="the five-bar slider is no slider-crank"):
+        with pytest.raises(ParameterError, match="five-bar slider"):
             SLIDER.to_five_bar()
-        with pytest.raises(ParameterError, match="a slider-crank, whose rocker has no length, has none"):
-            replace(SLIDER, pivot=SecondCrank(0.02))
+        with pytest.raises(ParameterError, match="rocker_length"):
+            SLIDER.with_pivot(SecondCrank(0.02))
 
 
 def four_bar_and_its_five_bar() -> tuple[Linkage, Linkage]:
@@ -411,15 +416,15 @@ def four_bar_and_its_five_bar() -> tuple[Linkage, Linkage]:
     k = four.point_distance / four.coupler_length * np.exp(1j * four.point_angle)
     turned = float(np.angle(k))
     second = SecondCrank(abs(1.0 - k) * 0.1, 1.0, 0.5 + float(np.angle(1.0 - k)) - turned)
-    five = Linkage(
+    five = FiveBar(
         ground_length=abs(k) * 0.4, crank_length=0.1, coupler_length=abs(k) * 0.3, rocker_length=abs(k) * 0.35,
         point_distance=abs(k) * 0.3, ground_angle=0.3 + turned, crank_phase=0.5 - turned, pivot=second,
     )  # fmt: skip
     return four, five
 
 
-def five_bar(ratio: float) -> Linkage:
-    return Linkage(
+def five_bar(ratio: float) -> FiveBar:
+    return FiveBar(
         pivot_x=0.1, pivot_y=0.2, ground_length=0.2, crank_length=0.06, coupler_length=0.19, rocker_length=0.16,
         point_distance=0.08, point_angle=0.6, ground_angle=0.4, crank_phase=0.8, pivot=SecondCrank(0.04, ratio, 1.3),
     )  # fmt: skip
@@ -451,7 +456,7 @@ class TestGearedFiveBar:
 
     def test_with_opposite_gears_a_symmetric_one_draws_a_straight_line(self) -> None:
         """By symmetry: exact, with turning joints alone; no four-bar comes as near as what is found."""
-        linkage = Linkage(
+        linkage = FiveBar(
             ground_length=0.3, crank_length=0.04, coupler_length=0.3, rocker_length=0.3, point_distance=0.3, crank_phase=0.4,
             pivot=SecondCrank(0.04, -1.0, pi - 0.4),
         )  # fmt: skip
@@ -519,9 +524,9 @@ def test_starts_of_the_scan_are_what_their_quality_says(kind: Kind, gears: tuple
     if slider:
         task = SliderFunction(position=task.points[:, 0])
     normal = normal_form(task)
-    for limits in limits_of_kinds(task, normal, None, USUAL, (kind,), gears):
+    for limits in limits_by_kind(task, normal, None, USUAL, (kind,), gears):
         for start in scan(normal, limits, seed=1, candidates=2048, starts=4):
-            linkage = linkage_of(start, normal, second_crank(limits, normal.unit))
-            assert kind_of(linkage) == kind
+            linkage = make_linkage(start, normal, limits.second_crank(normal.unit))
+            assert linkage.kind == kind
             assert linkage.least_transmission > radians(38.0)
             assert Solution.of(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)

@@ -39,8 +39,8 @@ from analysis.synthesis import (
 from analysis.synthesis.linkage.kernels import symmetric_difference
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.refine import Refinement
-from analysis.synthesis.search.start import start_of
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.search.start import make_start
+from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.target import even_odd_area
 from analysis.synthesis.task.task import Measure, Objective
 from tests.linkages import BASE, drawn
@@ -113,9 +113,9 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
         weights=None if weights is None else np.linspace(1.0, 2.0, 60),
     )
     normal = normal_form(task)
-    program = Program(normal, limits_of(task, normal, None, USUAL), objective="curve")
+    program = Program(normal, make_limits(task, normal, None, USUAL), objective="curve")
     refinement = Refinement(program)
-    start = start_of(known, normal, rotation=np.linspace(turned[0], turned[-1], normal.n))
+    start = make_start(known, normal, rotation=np.linspace(turned[0], turned[-1], normal.n))
     z, parameters = program.at(start)
     curve, slopes = refinement.traced(z, parameters)
     area, gradient = refinement.area(curve)

@@ -52,7 +52,7 @@ from analysis.synthesis import (
     turn,
 )
 from analysis.synthesis.search.polish import Polished, polish
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse
 
@@ -157,11 +157,11 @@ def judged(kind: str) -> Solution:
     if kind == "slider":
         a = 0.05 * linkage.crank_length
         pivot = SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
-        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=pivot))
+        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(pivot))
     if kind == "five-bar":
         series = FourierSeries(np.array([0.0, 0.2, -0.1]), np.array([0.0, 0.3, 0.1]))
         arm = SecondCrank(0.1 * linkage.crank_length, ratio=2, phase=0.7, series=series)
-        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=arm))
+        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(arm))
     task: Any = {
         "timed": lambda: TimedPath(points=points, rotation=phi, weights=weights),
         "rocker": lambda: RockerFunction(angle=linkage.rocker_angle(phi) + 0.02 * phi, rotation=phi, weights=weights),
@@ -691,9 +691,9 @@ class TestLimits:
             min(best.verdicts.least_transmission, np.pi - best.verdicts.greatest_transmission) >= radians(60.0) - 1e-4
         )
         normal = normal_form(task)
-        limits = limits_of(task, normal, None, both)
+        limits = make_limits(task, normal, None, both)
         assert (limits.turn, limits.way) == (radians(15.0), radians(60.0))
-        only = limits_of(task, normal, None, (FullTurn(), LeastTransmission(angle=1.0, over="task")))
+        only = make_limits(task, normal, None, (FullTurn(), LeastTransmission(angle=1.0, over="task")))
         assert (only.turn, only.way) == (0.0, 1.0)
 
     @pytest.mark.parametrize("low", [3.5, -3.5])
