@@ -1,4 +1,4 @@
-"""How results present themselves: one line where they are printed, with a small picture below it in a notebook."""
+"""Show results: one line where they are printed, with a small picture below it in a notebook."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pkgutil import resolve_name
 
 from linkwork.errors import LinkworkError
 
-#: What draws a result. By its name, because results know nothing of the package that draws them and need it here alone.
+#: Function that draws a result, by name, because results do not import the package that draws them.
 PICTURES = "analysis.figures:plot"
 #: Pixels to the inch: small enough to be kept in a notebook.
 DOTS_PER_INCH = 80
 
 
 class Shown:
-    """A result that a notebook shows as its `repr` with a picture below, where there is one."""
+    """Base of results that a notebook shows as their `repr`, with a picture below if there is one."""
 
     __slots__ = ()
 
@@ -34,7 +34,7 @@ class Shown:
 
 
 def format_range(values: Iterable[float], unit: str) -> str:
-    """The least and the greatest of some numbers that are finite, with their unit: "-0.01 to 0.02 m"."""
+    """Write the range of the finite ones of some numbers with their unit: "-0.01 to 0.02 m"."""
     finite = [float(value) for value in values if isfinite(value)]
     if not finite:
         return "no finite value"
@@ -44,7 +44,7 @@ def format_range(values: Iterable[float], unit: str) -> str:
 
 
 def format_count(count: int, what: str) -> str:
-    """A number of things: "1 branch", "2 branches", "no branches"."""
+    """Write a number of things: "1 branch", "2 branches", "no branches"."""
     several = (
         f"{what}es" if what.endswith(("ch", "s", "x")) else f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
     )

@@ -130,7 +130,7 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
     """The fixed pivot and the motions, a row each, in mm and degrees."""
-    from ..slider import greatest
+    from ..slider import greatest_derivative
     from ..synthesis import SliderMotion, format_transmission, quality_cells, quality_headings, quality_name
 
     task = solutions[0].task
@@ -154,7 +154,7 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
             words = f"slider, {order} harmonic{'' if order == 1 else 's'}"
             motion = [
                 f"{1e3 * pivot.stroke:.5g}",
-                *(f"{1e3 * greatest(s.linkage, k):.5g}" for k in (1, 2)),
+                *(f"{1e3 * greatest_derivative(s.linkage, k):.5g}" for k in (1, 2)),
                 f"{degrees(pivot.guide_angle):.2f}",
             ]
         rows.append((words, *quality_cells(s)[::2], *motion, format_transmission(s.verdicts)))

@@ -21,7 +21,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import check
-from ..numerics.codegen import code_folder
+from ..numerics.cache import code_folder
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals

@@ -15,10 +15,10 @@ from .loop import SampledController as SampledController
 from .loop import check_limit as check_limit
 from .loop import control_loop as control_loop
 from .loop import largest_difference as largest_difference
-from .loop import limited as limited
 from .loop import peak as peak
 from .loop import predict_loop as predict_loop
 from .loop import rms as rms
+from .loop import saturate as saturate
 from .model import LinearModel as LinearModel
 from .model import LinearModelError as LinearModelError
 from .model import linear_outputs as linear_outputs

@@ -1,4 +1,4 @@
-"""Operating points at rest: equilibria of a mechanism, free or with some of its freedoms held.
+"""Equilibria of a mechanism, free or with some of its freedoms held.
 
 They are found by Newton's method on the generalised forces at rest, M a, with exact derivatives by CasADi
 (`analysis.run.expressions`).
@@ -26,7 +26,7 @@ from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
 from ..run import Inputs, expressions, given, takes_published
 from ..units import Amount, in_si
-from .model import FloatArray, Layout, Modes, channels_along, layout
+from .model import FloatArray, Layout, Modes, layout, sampled_channels
 
 #: Points of the search for equilibria along a freedom that comes round again, over a turn, and along another, over its reach.
 GRID = (48, 81)
@@ -36,12 +36,12 @@ MOST_ITERATIONS = 60
 
 
 class EquilibriumError(LinkworkError):
-    """There is no equilibrium, or none was found from where the search began."""
+    """No equilibrium was found."""
 
 
 @cache
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
-    """Two functions of coordinates, channels and constants.
+    """Return two CasADi functions of coordinates, channels and constants: statics alone, and with derivatives.
 
     Of both the first result is the generalised forces at rest on the freedoms that are free; the others are the clearance,
     and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels. Nothing that a
@@ -105,26 +105,26 @@ class Equilibrium:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
             raise unknown_name(name, mechanism.output_names, f"output {name!r}")
-        modes, channels = channels_along(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
+        modes, channels = sampled_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
         applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
         outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)
         return float(outputs[mechanism.output_names.index(name)])
 
     @property
     def state(self) -> tuple[float, ...]:
-        """The state of the plant there."""
+        """State of the plant in this configuration."""
         return mechanism_of(self.parameters).state(self.initial)
 
     @property
     def initial(self) -> InitialState:
-        """The start of a run there."""
+        """Start of a run in this configuration."""
         mechanism = mechanism_of(self.parameters)
         names = [freedom.initial[0] for freedom in mechanism.freedoms]
         return mechanism.initial(**dict(zip(names, self.coordinates.tolist())))
 
     @property
     def stable(self) -> bool:
-        """Whether it is a minimum of the potential energy of springs, gravity and constant forces in the free freedoms."""
+        """Whether the potential energy of springs, gravity and constant forces has a minimum in the free freedoms."""
         balance = _Balance.of(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
@@ -145,7 +145,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
-    """The equations of rest: forces over the freedoms that are free, made comparable by the mechanism's own scales.
+    """Equations of rest: generalised forces on the free freedoms, scaled by the mechanism's own scales.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class _Balance:
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
         still = np.zeros((1, mechanism.size))
-        modes, channels = channels_along(mechanism, inputs, np.zeros(1), still)
+        modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), still)
         forces = {channel.argument for channel in mechanism.channels if channel.kind == "force"}
         held = layout(mechanism, modes).commanded
         loose = list(modes)
@@ -197,7 +197,7 @@ class _Balance:
         return np.array([*self.parameters.constants(), 0.0])
 
     def imbalance(self, coordinates: FloatArray) -> FloatArray:
-        """Norms of the forces over the free freedoms at coordinates, shape (freedoms, n); infinite beyond the limit."""
+        """Return norms of the forces on the free freedoms at coordinates (freedoms, n), infinite beyond the limit."""
         n = coordinates.shape[1]
         columns = (np.tile(value[:, None], n) for value in (self.channels, self.constants))
         forces, clearance = map(np.asarray, _statics(self.mechanism, self.modes)[0].map(n)(coordinates, *columns))
@@ -206,7 +206,7 @@ class _Balance:
         return np.where(joined, norms, np.inf)
 
     def solve(self, guess: FloatArray) -> Equilibrium:
-        """Newton's method with halved steps where the imbalance would grow.
+        """Find an equilibrium by Newton's method, with halved steps where the imbalance would grow.
 
         Raises EquilibriumError if it does not converge.
         """
@@ -236,7 +236,7 @@ class _Balance:
         )
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
-        """Magnitude of the generalised forces that have to balance (N.m)."""
+        """Return the magnitude of the generalised forces that have to balance (N.m)."""
         # what comes round again has no displacement that a spring would feel
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
@@ -263,7 +263,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Points of a grid over all configurations where the imbalance is less than at their neighbours."""
+        """Return the points of a grid over all configurations with less imbalance than their neighbours."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)
@@ -283,10 +283,10 @@ class _Balance:
         return list(columns[:, (np.isfinite(values) & (values <= least)).ravel()].T)
 
 
-def _held(
+def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
-    """The equations of rest, and coordinates that are zero but for those of freedoms that are held."""
+    """Return the equations of rest, and coordinates with the values of held freedoms and zero elsewhere."""
     mechanism = mechanism_of(parameters)
     inputs, _ = given(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
@@ -306,7 +306,7 @@ def _held(
 def find_equilibria(
     parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """All equilibria that a search from a grid over the configurations finds, the one of least potential energy first.
+    """Find equilibria from a grid over all configurations, sorted by potential energy.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def find_equilibria(
     InputError
         If a force is not constant, a freedom that is held moves or is driven by a force, or nothing is free.
     """
-    balance, coordinates = _held(parameters, inputs, held)
+    balance, coordinates = _balance_with_held(parameters, inputs, held)
     found: list[Equilibrium] = []
     for start in balance.starts(coordinates):
         try:
@@ -356,7 +356,7 @@ def find_equilibrium(
     held: Mapping[str, Amount] | None = None,
     guess: ArrayLike | None = None,
 ) -> Equilibrium:
-    """An equilibrium of a mechanism at rest: hanging freely, or with some of its freedoms held.
+    """Find an equilibrium of a mechanism, hanging freely or with some of its freedoms held.
 
     Parameters
     ----------
@@ -383,7 +383,7 @@ def find_equilibrium(
     '5.557 mm'
     """
     if guess is not None:
-        balance, coordinates = _held(parameters, inputs, held)
+        balance, coordinates = _balance_with_held(parameters, inputs, held)
         start = np.array(guess, dtype=float)
         if start.shape != coordinates.shape or not np.all(np.isfinite(start)):
             raise InputError(f"a guess {guess}: it must be {len(coordinates)} finite numbers")

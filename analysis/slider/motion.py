@@ -1,4 +1,4 @@
-"""The direct search for the slider's motion: a Fourier series of the crank's rotation (thesis, chapter VII).
+"""Direct search for the slider's motion as a Fourier series of the crank's rotation (thesis, chapter VII).
 
 The rocker pivot of a given linkage is moved so that it does its task better: mean, harmonics and the guide's angle are sought
 with exact Jacobians from several starts, within bounds of stroke, speed and acceleration; or the links together with them. The
@@ -53,7 +53,7 @@ def slider_motion(
     guesses: Sequence[Linkage | Solution] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Move the rocker pivot of a linkage so that it does a task as well as it can.
+    """Find the motion of the rocker pivot with which a linkage does a task best.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def slider_motion(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SmoothnessCurve:
-    """Error of the task against the smoothness of the slider's motion.
+    """Error of the task over the smoothness of the slider's motion.
 
     Attributes
     ----------
@@ -132,25 +132,26 @@ class SmoothnessCurve:
 
     @property
     def error(self) -> np.ma.MaskedArray:
-        """Quality function at each, masked where there is no solution; shape (n,)."""
+        """Value of the quality function at each bound, masked where there is no solution; shape (n,)."""
         return np.ma.masked_invalid(np.array([np.nan if s is None else s.error for s in self.solutions]))
 
     @property
     def attained(self) -> np.ma.MaskedArray:
         """Greatest ``|d2u/dphi2|`` of each motion (m/rad2)."""
-        return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
+        values = [np.nan if s is None else greatest_derivative(s.linkage, 2) for s in self.solutions]
+        return np.ma.masked_invalid(np.array(values))
 
 
 class SmoothnessInterrupted(Interrupted):
-    """A smoothness curve was stopped from the keyboard; ``curve`` has the best so far at each bound."""
+    """A smoothness curve was stopped from the keyboard; ``curve`` has the best motion so far at each bound."""
 
     def __init__(self, curve: SmoothnessCurve, done: int, problems: int) -> None:
         self.curve = curve
         super().__init__(f"stopped after {done} of {problems} problems of the smoothness curve")
 
 
-def greatest(linkage: Linkage, order: int) -> float:
-    """Greatest magnitude over a turn of the slider's position (order 0), or of a derivative of it by the crank's rotation."""
+def greatest_derivative(linkage: Linkage, order: int) -> float:
+    """Return the greatest magnitude over a turn of the slider's position (order 0) or of a derivative by the rotation."""
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0
     series = linkage.pivot.series
@@ -160,7 +161,7 @@ def greatest(linkage: Linkage, order: int) -> float:
 
 
 def motion_of_plant(linkage: Linkage) -> FourierSeries:
-    """The slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
+    """Return the slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
 
     Raises
     ------
@@ -186,7 +187,7 @@ def smoothness_curve(
     constraints: Sequence[Constraint] = (FullTurn(),),
     search: Search = USUAL_SEARCH,
 ) -> SmoothnessCurve:
-    """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
+    """Find the best motion for each bound of its second derivative: error against smoothness, warm started.
 
     From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one
     before, their harmonics shrunk to the new bound, and from its own random starts; then back, each problem keeping the
@@ -243,8 +244,8 @@ def smoothness_curve(
 
 
 def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:
-    """The linkage with its slider's harmonics made smaller, down to the bound."""
-    most = greatest(linkage, 2)
+    """Return the linkage with the slider's harmonics scaled down to a bound of the second derivative."""
+    most = greatest_derivative(linkage, 2)
     if not isinstance(linkage.pivot, SliderMotion) or most <= acceleration:
         return linkage
     series = linkage.pivot.series

@@ -1,4 +1,4 @@
-"""The simplest mechanism that meets a tolerance (thesis, section 7.4).
+"""Search for the simplest mechanism that meets a tolerance (thesis, section 7.4).
 
 A four-bar first; if its best is not good enough, a four-bar whose rocker pivot is moved by a slider, harmonic by harmonic,
 links and motion optimised together; then five-bars, whose rocker pivot is on a second crank, geared to the first or turned
@@ -39,7 +39,7 @@ RATIOS = (1, -1, 2, -2)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
-    """One mechanism that was tried.
+    """One mechanism of the search.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Strategy:
-    """What was tried, in order of simplicity, and what was chosen.
+    """Mechanisms tried in order of simplicity, and the chosen one.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Strategy:
 
     @property
     def chosen(self) -> Step:
-        """The step that meets the tolerance; without one, the simplest of those that come nearest, if any without a defect."""
+        """The step that meets the tolerance; without one, the nearest, those without a defect first."""
         if self.met:
             return self.steps[-1]
         return min(self.steps, key=lambda s: (s.solution is None or not s.solution.verdicts.sound, s.value))
@@ -89,7 +89,7 @@ class Strategy:
 
 
 class StrategyInterrupted(Interrupted):
-    """A search for the simplest mechanism was stopped; ``strategy`` holds the steps so far, or is None if there are none."""
+    """The search for the simplest mechanism was stopped; ``strategy`` holds the steps so far, or None."""
 
     def __init__(self, strategy: Strategy | None) -> None:
         self.strategy = strategy
@@ -109,7 +109,7 @@ def simplest_mechanism(
     second_crank: float | None = None,
     search: Search = QUICK_SEARCH,
 ) -> Strategy:
-    """The simplest mechanism without a circuit, branch or order defect whose error is within a tolerance.
+    """Find the simplest mechanism whose error is within a tolerance, without circuit, branch or order defect.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def simplest_mechanism(
 
 @dataclass(eq=False)
 class _Trials:
-    """The mechanisms tried so far; fields as the arguments of `simplest_mechanism`."""
+    """Mechanisms tried so far; fields as the arguments of `simplest_mechanism`."""
 
     task: Task
     tolerance: float
@@ -212,11 +212,11 @@ class _Trials:
     _met: bool = False
 
     def met(self) -> bool:
-        """Whether the last mechanism meets the tolerance without a defect."""
+        """Return whether the last mechanism meets the tolerance without a defect."""
         return self._met
 
     def four_bar(self) -> Solution:
-        """The best four-bar."""
+        """Find the best four-bar and record it."""
         search = replace(self.search, starts=2 * int(self.search.starts))
         solution = self._step("four-bar", self._found("four-bar", search))
         assert solution is not None
@@ -225,7 +225,7 @@ class _Trials:
     def attempt(
         self, mechanism: str, unknown: SliderUnknown | CrankUnknown, guesses: Sequence[Solution]
     ) -> Solution | None:
-        """Links and the pivot's motion together, from a scan and from simpler mechanisms."""
+        """Optimise links and pivot motion together, from a scan and from simpler mechanisms, and record the result."""
         try:
             found = self._found(mechanism, self.search, unknown, guesses)
         except InfeasibleError:
@@ -247,7 +247,7 @@ class _Trials:
             raise StrategyInterrupted(self.result() if self.steps else None) from None
 
     def _step(self, mechanism: str, found: Synthesis | None) -> Solution | None:
-        """Record a mechanism, with the reason why it is taken or not."""
+        """Record a mechanism with the reason why it is taken or not."""
         if found is None:
             self.steps.append(
                 Step(mechanism=mechanism, solution=None, value=inf, reason="none keeps the constraints: moved on")

@@ -1,4 +1,4 @@
-"""Feed-forward and feedback: the slider follows u(th2) on the full plant, and how well.
+"""Tracking of a slider motion u(th2) on the full plant by feed-forward and feedback.
 
 The force over a sampling period h is
 
@@ -31,17 +31,17 @@ from ..linear import (
     check_limit,
     check_period,
     control_loop,
-    limited,
     peak,
     rms,
+    saturate,
 )
 from ..numerics.fourier import FourierSeries
 from ..run import Function, Inputs
-from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at, slider_force
+from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at_angle, slider_force
 
 
 class TrackingController:
-    """Feed-forward by inverse dynamics on a model, feedback by a design, or both; a `Controller`.
+    """Controller with feed-forward by inverse dynamics on a model, feedback by a design, or both.
 
     Parameters
     ----------
@@ -95,17 +95,17 @@ class TrackingController:
 
     @property
     def method(self) -> str:
-        """What it consists of."""
+        """Name of the control: feed-forward, the feedback's method, or both."""
         parts = ["feed-forward"] if self.feedforward else []
         return " + ".join(parts + ([self.feedback.method] if self.feedback else []))
 
     def reset(self) -> None:
-        """Forget the integral."""
+        """Set the integral to zero."""
         if self.feedback:
             self.feedback.reset()
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """The force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
+        """Return the force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
         th2, u, w2, v = measured
         if self.feedforward:
             forward = self._forward(th2 + 0.5 * w2 * self.period, w2)
@@ -113,17 +113,17 @@ class TrackingController:
             assert self.feedback is not None
             forward = self.feedback.holding_force(reference)
         if self.feedback is None:
-            return limited(forward, self.limit)
+            return saturate(forward, self.limit)
         return self.feedback.follow(forward, u - reference, v - w2 * float(self._slope(th2)))
 
     def _forward(self, th2: float, w2: float) -> float:
         u, v, a = float(self.slider(th2)), w2 * float(self._slope(th2)), w2 * w2 * float(self._curvature(th2))
-        return slider_force(th2, u, w2, v, a, load_at(self.load, th2), self._p)
+        return slider_force(th2, u, w2, v, a, load_at_angle(self.load, th2), self._p)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingMetrics:
-    """How well a motion was followed over the last turn.
+    """Tracking errors, force and power over the last turn.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class TrackingMetrics:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrackingResult:
-    """A run of the slider along its reference, at the times at which the controller sampled.
+    """A run of the slider along its reference, at the controller's sampling times.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class TrackingResult:
     power: FloatArray
 
     def metrics(self) -> TrackingMetrics:
-        """Errors, force and power over the last turn.
+        """Compute errors, force and power over the last turn.
 
         Raises
         ------
@@ -209,7 +209,7 @@ def track(
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
 ) -> TrackingResult:
-    """Let the slider follow u(th2) on the full nonlinear plant, in process or as its FMU.
+    """Run the full nonlinear plant under a tracking controller, in process or as its FMU.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def track(
         return start.crank_angle + crank_speed * t
 
     def load_part(part: int) -> Function:
-        return Function(lambda t, *state: load_at(load, angle(t + 0.5 * controller.period))[part])
+        return Function(lambda t, *state: load_at_angle(load, angle(t + 0.5 * controller.period))[part])
 
     loop = control_loop(
         plant or parameters,
@@ -281,7 +281,7 @@ def track(
 
 
 def _point_error(parameters: FiveBarParameters, loop: LoopResult) -> FloatArray:
-    """Distance of the coupler point from where the model has it on the reference."""
+    """Return the distance of the coupler point from the model's coupler point on the reference."""
     assert loop.trajectory is not None
     p = parameters.constants()
     wanted = [

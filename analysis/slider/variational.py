@@ -1,4 +1,4 @@
-"""The slider's motion that brings the linkage as near to its target as it can come, at every crank angle, in closed form.
+"""The slider position of least error at every crank angle, in closed form: the variational method of the thesis.
 
 The links are given, and the crank is at phi. In the frame of the guide, with its zero at the end E of the ground link, let
 b = (B - E) exp(-i alpha), s = th3 - alpha, t = th4 - alpha. Loop closure is then (Youssef, section 7.3)
@@ -53,7 +53,7 @@ JUMP = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VariationalMotion:
-    """Slider positions at which the error is least, one for each crank rotation.
+    """Slider positions of least error, one for each crank rotation.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class VariationalMotion:
         return float(np.ptp(self.u))
 
     def to_series(self, order: int) -> FourierSeries:
-        """Fourier series of the crank's rotation nearest to u by weighted least squares: a start for a direct search.
+        """Fit a Fourier series of the crank's rotation to u by weighted least squares: a start for a direct search.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class VariationalMotion:
 
 
 class _Minima(NamedTuple):
-    """Candidates of every kind and assembly at crank rotations, each of shape (m, n); only the valid ones are minima."""
+    """Candidates of every kind and assembly at crank rotations, each of shape (m, n); ``valid`` marks the minima."""
 
     u: FloatArray
     coupler: FloatArray
@@ -131,7 +131,7 @@ class _Minima(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Problem:
-    """What is asked of a linkage; target points are complex numbers, target angles real ones."""
+    """Linkage, guide and bounds of the problem; target points are complex numbers, target angles real ones."""
 
     linkage: Linkage
     guide_angle: float
@@ -159,7 +159,7 @@ class _Problem:
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Limits of the range of u: angle at C between coupler and rocker, BD, and +1 if BD may not be longer."""
+        """Return the limits of the range of u: angle at C between coupler and rocker, BD, and +1 if BD may not be longer."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
@@ -168,7 +168,7 @@ class _Problem:
         return [(pi - low, most, 1.0)] + ([(low, least, -1.0)] if least > 0.0 else [])
 
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
-        """b: the crank pin B from the guide's zero, in the frame of the guide."""
+        """Return b, the position of the crank pin B from the guide's zero, in the frame of the guide."""
         k = self.linkage
         b: NDArray[np.complex128] = (
             k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length
@@ -176,7 +176,7 @@ class _Problem:
         return b
 
     def minima(self, rotation: FloatArray, target: NDArray[np.complex128] | FloatArray) -> _Minima:
-        """Every minimum of the error over the slider position."""
+        """Return the candidates for minima of the error over the slider position."""
         k = self.linkage
         l3, l4 = k.coupler_length, k.rocker_length
         path = np.iscomplexobj(target)
@@ -229,7 +229,7 @@ class _Problem:
         return _Minima(u, coupler + self.guide_angle, rocker + self.guide_angle, error, valid)
 
     def _ends(self, b: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Ends of the range of u: position, angle at C, direction in which the range lies, and whether it ends there."""
+        """Return the ends of the range of u: position, angle at C, direction into the range, whether the end exists."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low, high = self.stroke
         ends = []
@@ -262,7 +262,7 @@ def variational_motion(
     continuous: bool = False,
     closed: bool = True,
 ) -> VariationalMotion:
-    """The slider position of least error at each crank rotation, or the continuous motion through minima of the error.
+    """Find the slider position of least error at each crank rotation, or the best continuous motion through minima.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def variational_motion(
     chosen_from = minima.valid if continuous else error == error.min(axis=0)
     bridged = _bridged(problem, phi, goal, minima, chosen_from)
     travel = minima.u / (linkage.coupler_length + linkage.rocker_length)
-    choice = _path(w * minima.error**2, travel, chosen_from, bridged, closed)
+    choice = _choose_minima(w * minima.error**2, travel, chosen_from, bridged, closed)
     at = (choice, np.arange(n))
     kinds, branches = problem.labels
     steps = np.arange(n if closed else n - 1)
@@ -353,13 +353,13 @@ def variational_motion(
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
-    """The angle in (-pi, pi]."""
+    """Return the angle in (-pi, pi]."""
     value: FloatArray = pi - np.mod(pi - angle, 2.0 * pi)
     return value
 
 
 def _out_of_reach(problem: _Problem, phi: FloatArray, n: int) -> str:
-    """What is wrong at rotations, out of n, at which the links cannot be joined at any slider position: the worst of them."""
+    """Return a sentence about the worst of the rotations at which the links cannot be joined at any slider position."""
     b = problem.pin(phi)
     limits = problem._limits()
     most = limits[0][1]
@@ -391,7 +391,7 @@ def _bridged(
     minima: _Minima,
     chosen_from: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Whether minimum i at rotation k and minimum j at the next one belong to one path of minima, shape (n, m, m).
+    """Return whether a path of minima leads from minimum i at rotation k to minimum j at the next, shape (n, m, m).
 
     The last rotation is followed by the first, a turn later.
 
@@ -432,10 +432,10 @@ def _bridged(
     return bridged
 
 
-def _path(
+def _choose_minima(
     squares: FloatArray, travel: FloatArray, chosen_from: NDArray[np.bool_], bridged: NDArray[np.bool_], closed: bool
 ) -> NDArray[np.int64]:
-    """Dynamic programming: the row of each column, for the fewest jumps, then least sum of squares, then least travel."""
+    """Choose the row of each column by dynamic programming: fewest jumps, then least sum of squares, then least travel."""
     m, n = squares.shape
     whole = float(np.where(chosen_from, squares, 0.0).max(axis=0).sum())
     cost = np.where(chosen_from, squares / (whole or 1.0), inf)

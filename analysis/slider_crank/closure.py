@@ -39,7 +39,7 @@ MAX_ITERATIONS = 60
 
 
 class ClosureError(LinkworkError):
-    """The iteration did not find the closed loop of the assembly that is sought, although the links can be joined."""
+    """The iteration did not find the closed loop in the chosen assembly, although the links can be joined."""
 
 
 def scale(p: SliderCrankParameters, shift: Array) -> float:
@@ -198,7 +198,7 @@ def close(
         If the iteration ends in an open loop or in the other assembly.
     """
     p = parameters
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     lacking, length = shortage(p, th, s1), scale(p, s1)
     worst = int(np.argmax(lacking))
     if lacking[worst] > TOLERANCE * length:
@@ -243,7 +243,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
     InputError, AssemblyError, ClosureError
         As `close`; a step that would change the assembly is a ClosureError.
     """
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     points: list[Closure] = []
     for angle, position in zip(th, s1):
         points.append(close(parameters, angle, position, points[-1] if points else None))
@@ -252,7 +252,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
 
 
 def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
-    """By how much loops (..., 3, 3) are not closed: angle (rad) and length (unit of the loop), shape (...).
+    """Return the closure errors of loops (..., 3, 3): angle (rad) and length (unit of the loop), shape (...).
 
     The whole matrix is judged: its antisymmetric part alone, which the iteration makes zero, is zero as well where the loop
     closes but for half a turn.
@@ -262,8 +262,8 @@ def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     return 2.0 * np.arcsin(np.minimum(chord, 1.0)), np.linalg.norm(origin(product), axis=-1)
 
 
-def points_of(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
-    """Crank angles and shifts of one shape (n,)."""
+def broadcast_points(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
+    """Return crank angles and shifts broadcast to one shape (n,)."""
     try:
         th, s1 = np.broadcast_arrays(np.asarray(crank_angle, dtype=float), np.asarray(shift, dtype=float))
     except ValueError as error:
@@ -279,12 +279,12 @@ def points_of(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
 
 
 def _pin_frame(p: SliderCrankParameters, th: Array, s1: Array) -> Dual:
-    """M1: the crank's frame moved to the crank pin."""
+    """Return M1, the crank's frame moved to the crank pin."""
     return cast(Dual, about_k(Dual(th, s1)) @ about_i(Dual(0.0, p.crank_length)))
 
 
 def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatArray:
-    """Newton's step (n, 6): rotations about j, k of the rod, about i, j, k of the guide; slide as a share of ``length``.
+    """Return Newton's step (n, 6): rotations about rod axes j, k and guide axes i, j, k; slide as a share of ``length``.
 
     A joint's motion q along its screw s changes the loop E by [s]E q, and the vector of the antisymmetric part of that is
     (tr(E) I - E) s q / 2: the exact derivative, from closed or open loops.
@@ -365,7 +365,7 @@ _UPPER = np.array([[0, 0, 1], [1, 2, 2]])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settled:
-    """Where the iteration ends, for each of n crank angles.
+    """End of the thesis's iteration for each of n crank angles.
 
     ``unknowns`` (n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (m); ``steps`` how many corrections were made and
     ``settled`` whether the last was below the tolerance, which the thesis takes for convergence. ``rotation_residual`` (rad)
@@ -384,7 +384,7 @@ class Settled:
 
 
 def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dual, Dual]:
-    """The product M1 L2 L3 M4 (n, 3, 3) for the unknowns q (n, 5), and the screws of their rates in frame 1 (n, 3, 5)."""
+    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and their screws in frame 1 (n, 3, 5)."""
     zero = np.zeros_like(th)
     pin = about_k(Dual(th, s1)) @ about_i(Dual(zero, p.crank_length))
     turned = pin @ about_k(q[:, 0])
@@ -398,7 +398,7 @@ def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dua
 
 
 def planar(p: SliderCrankParameters, th: Array) -> FloatArray:
-    """The planar estimate of section 2.6.2 for the unknowns (n, 5), as for S1 = 0 and alpha4 = 270 deg."""
+    """Return the planar estimate of section 2.6.2 for the unknowns (n, 5), exact for S1 = 0 and alpha4 = 270 deg."""
     across = p.crank_length * np.cos(th) + p.guide_offset
     beyond = p.assembly_branch * np.sqrt(p.rod_length**2 - across**2)
     rod = np.arctan2(beyond, -across)
@@ -444,7 +444,7 @@ def settle(
     InputError, AssemblyError, ClosureError
         As `closure.close`, by which the truth is found.
     """
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     truth = close(parameters, th, s1)
     q = planar(parameters, th) if start is None else np.array(start, dtype=float)
     steps = np.zeros(th.size, dtype=int)
@@ -470,7 +470,7 @@ def settle(
 
 
 def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float, unknowns: Array) -> int:
-    """Freedoms of the chain at a configuration: seven joint rates less the rank of their screws.
+    """Return the number of freedoms of the chain at a configuration: seven joint rates less the rank of their screws.
 
     The screws are those of theta1, S1 and the five unknowns; lengths are counted in rod lengths.
     """
@@ -483,7 +483,7 @@ def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float
 
 
 def equations(product: Dual, screws: Dual, unit: float, rows: Rows) -> tuple[FloatArray, FloatArray]:
-    """The m equations of a step: their matrix (n, m, 5) and right side (n, m), the slide and all lengths in ``unit``.
+    """Return matrix (n, m, 5) and right side (n, m) of the m equations of a step, slide and lengths in ``unit``.
 
     A joint's motion q along its screw s changes the loop B by [s]B q. All entries of this are to be those of I - B; the thesis
     writes [s] q = B' - I (eq 11), its matrix A and its right side V (eqs 23 to 25).

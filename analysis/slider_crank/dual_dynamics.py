@@ -1,4 +1,4 @@
-"""Velocities, accelerations and all joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
+"""Velocities, accelerations and joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
 
 The velocity of a body is a dual vector, omega + eps v, with v that of the point of the body at the origin of the frame in
 which it is given; forces are F + eps M and momenta p + eps H in the same way. All these go from frame to frame by the dual
@@ -27,15 +27,15 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from ..numerics.dual import Dual, about_i, apply, cross, join, stack
 from .closure import Closure, close, scale
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
-from .quantities import DEAD_CENTRE, JOINTS, FloatArray, check_joint, each
-from .shifts import in_the_shaft, on_arrays
+from .quantities import DEAD_CENTRE, JOINTS, FloatArray, check_joint, per_angle
+from .shifts import has_shaft_groove, plant_functions
 
 #: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
 LIMIT_COSINE = 1e-9
 
 
 class DeadCentreError(LinkworkError):
-    """At a dead centre, dS4/dtheta1 = 0, the crank's torque does not determine the force on the slider.
+    """The crank torque does not determine the slider force: the configuration is a dead centre, dS4/dtheta1 = 0.
 
     ``points`` are the indices of the points concerned.
     """
@@ -47,7 +47,7 @@ class DeadCentreError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Binor:
-    """Inertia binor of a body in a frame fixed to it (eqs 46 to 48): what makes its dual momentum of its dual velocity.
+    """Inertia binor of a body in a body-fixed frame (eqs 46 to 48): maps its dual velocity to its dual momentum.
 
     ``mass`` in kg, ``moment`` the mass times the coordinates of the centre of mass (3,) in kg.m, ``inertia`` the matrix
     (3, 3) about the frame's origin in kg.m2.
@@ -58,7 +58,7 @@ class Binor:
     inertia: FloatArray
 
     def momentum(self, velocity: Dual) -> Dual:
-        """p + eps H of omega + eps v: p = m v + omega x m c, H = I omega + m c x v. Rates likewise, shape (..., 3)."""
+        """Return p + eps H for omega + eps v, shape (..., 3): p = m v + omega x m c, H = I omega + m c x v."""
         omega, v = velocity.real, velocity.dual
         return Dual(
             self.mass * v + np.cross(omega, self.moment),
@@ -66,13 +66,13 @@ class Binor:
         )
 
     def rate(self, velocity: Dual, acceleration: Dual) -> Dual:
-        """Rate of the dual momentum (eqs 49 to 58), for the velocity and the rate of its components in the frame."""
+        """Return the rate of the dual momentum (eqs 49 to 58) from the velocity and the rate of its components."""
         return cast(Dual, self.momentum(acceleration) + cross(velocity, self.momentum(velocity)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rates:
-    """Dual velocities of the links in frame 1 and their rates, and what the slider does.
+    """Dual velocities of the links in frame 1 with their rates, and velocity and acceleration of the slider.
 
     Dual vectors of shape (n, 3): omega + eps v with v that of the body's point at O. ``slider_velocity`` and
     ``slider_acceleration`` are S4' (m/s) and S4'' (m/s2), ``ratio`` is dS4/dtheta1 (m/rad), each of shape (n,).
@@ -91,7 +91,7 @@ class Rates:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointLoads:
-    """Forces and moments in all joints, by their components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
+    """Forces and moments in all joints, as components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
 
     ``bearing`` is the force of the bearing on the crank, without axial component, ``axial`` the force along the axis that
     the motion takes of whatever drives or holds the shift; ``bearing_moment`` is about O, the drive's ``torque`` included.
@@ -115,7 +115,7 @@ class JointLoads:
     residual: FloatArray
 
     def components(self, name: str, frame: int) -> FloatArray:
-        """Components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
+        """Return components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
 
         The moments keep the points about which they are taken.
 
@@ -143,7 +143,7 @@ def rates(
     acceleration: Any = 0.0,
     shift_acceleration: Any = 0.0,
 ) -> Rates:
-    """Dual velocities (eqs 29 to 45) and their rates, for theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
+    """Compute dual velocities (eqs 29 to 45) and their rates from theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
 
     The screws of the joints times their rates add up to nothing round the loop: six equations, all of them used (the
     thesis drops the last, erratum 3), and omega . u = 0 for the rod's spin. Their derivative, in which each screw moves
@@ -157,8 +157,8 @@ def rates(
         At the limit of assembly, where the rod is perpendicular to the guide.
     """
     n = closure.crank_angle.size
-    w, v = each("speed", speed, n), each("shift_velocity", shift_velocity, n)
-    e, a = each("acceleration", acceleration, n), each("shift_acceleration", shift_acceleration, n)
+    w, v = per_angle("speed", speed, n), per_angle("shift_velocity", shift_velocity, n)
+    e, a = per_angle("acceleration", acceleration, n), per_angle("shift_acceleration", shift_acceleration, n)
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
     cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
@@ -179,7 +179,7 @@ def rates(
     matrix[:, 6, 0] = 1.0
 
     def solve(known: Dual, turning: Dual) -> FloatArray:
-        """The joints' rates when the loop's known part is ``known`` and the rod's ``turning``."""
+        """Return the joints' rates for the known part of the loop and the known rotation of the rod."""
         spin = np.sum(turning.real * rod.real[..., 0], -1)
         right = np.concatenate([known.real, known.dual / length, spin[:, None]], -1)
         return cast(FloatArray, -np.linalg.solve(matrix, right[..., None])[..., 0])
@@ -209,7 +209,7 @@ def rates(
 
 
 def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
-    """Inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at the slider pin).
+    """Return the inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at its pin).
 
     Of the crank's inertia only what concerns its axis is of effect, of the rod's only that about transverse axes, of the
     slider's, which does not turn, none.
@@ -246,7 +246,7 @@ def joint_loads(
     torque: Any = None,
     slider_force: Any = None,
 ) -> JointLoads:
-    """All joint forces and moments for a given motion (eqs 62 to 69) and either the crank's torque or the slider's force.
+    """Compute all joint forces and moments of a motion (eqs 62 to 69) for a given crank torque or slider force.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def joint_loads(
     # the rod's moment about its line is the equation that is met by itself
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = each("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    known = per_angle("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
     free = np.delete(np.arange(18), given)
     unknown = np.linalg.solve(
         matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
@@ -310,14 +310,14 @@ def joint_loads(
 
 
 def _ball_frames(closure: Closure) -> tuple[Dual, Dual]:
-    """The crank's frame moved to the crank pin, and the rod's moved to the slider pin."""
+    """Return the crank's frame moved to the crank pin, and the rod's moved to the slider pin."""
     p = closure.parameters
     pin = closure.crank_frame @ about_i(Dual(0.0, p.crank_length))
     return cast(Dual, pin), cast(Dual, closure.rod_frame @ about_i(Dual(0.0, p.rod_length)))
 
 
 def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArray, FloatArray]:
-    """Matrix (n, 18, 18) and right-hand side (n, 18) of eqs 62 to 64, moments and moments' arms divided by ``length``.
+    """Return matrix (n, 18, 18) and right side (n, 18) of eqs 62 to 64, moments and arms divided by ``length``.
 
     The unknowns, by the screws of their lines of action or axes: bearing 1Fi, 1Fj, 1Ti, 1Tj, axial 1Fk, torque 1Tk; crank
     pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider.
@@ -365,12 +365,12 @@ def _check_dead_centres(closure: Closure, motion: Rates) -> None:
 
 
 def _axes(frame: Dual) -> Dual:
-    """The same axes with the origin in that of frame 1."""
+    """Return the same axes with the origin of frame 1."""
     return Dual(frame.real)
 
 
 def _rod_axes(closure: Closure) -> FloatArray:
-    """Axes of frame 3 in frame 1 (n, 3, 3): i along the rod, j perpendicular to it and to the crank axis."""
+    """Return the axes of frame 3 in frame 1 (n, 3, 3): i along the rod, j perpendicular to rod and crank axis."""
     i = closure.rod_frame.real[..., 0]
     across = np.hypot(i[:, 0], i[:, 1])
     if np.min(across) < 1e-12:
@@ -396,7 +396,7 @@ _FRAMES: dict[int, Callable[[Closure], FloatArray]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """How far two ways of finding a quantity are apart at most, in SI.
+    """Largest difference of a quantity between the two methods, in SI.
 
     ``largest`` is the greatest magnitude of the quantity, ``relative`` the difference over the greatest magnitude of any
     quantity of the same unit.
@@ -411,7 +411,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Dual numbers less vector mechanics.
+    """Differences between the dual-number method and vector mechanics.
 
     Attributes
     ----------
@@ -434,12 +434,12 @@ class Comparison:
     rod_moment: float
 
     def agrees(self, tolerance: float) -> bool:
-        """Whether all relative differences are within the tolerance."""
+        """Return whether all relative differences are within a tolerance."""
         return all(d.relative <= tolerance for d in self.differences)
 
 
 def compare(turn: ForceTurn) -> Comparison:
-    """Find motion and forces of a turn again by dual matrices with true ball joints and dual momenta.
+    """Compute motion and forces of a turn again by dual matrices and compare them with vector mechanics.
 
     Raises
     ------
@@ -448,7 +448,7 @@ def compare(turn: ForceTurn) -> Comparison:
         it is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
-    if sought and in_the_shaft(turn.law):
+    if sought and has_shaft_groove(turn.law):
         raise InputError(
             "the dual-number method seeks the slider's force of a shift that is driven apart from the crank: give the load, "
             "or a groove that is not in the shaft"
@@ -466,7 +466,7 @@ def compare(turn: ForceTurn) -> Comparison:
     }
     motion = rates(closure, **moving)
     # what the dual vectors call the slider's force is all along the guide, spring, damper and friction included
-    pushed = on_arrays().slider_resistance(
+    pushed = plant_functions().slider_resistance(
         closure.slider_position, motion.slider_velocity, 0.0, turn.parameters.constants()
     )
     if sought:

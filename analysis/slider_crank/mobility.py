@@ -1,4 +1,4 @@
-"""Where the slider-crank can be assembled and how far its slider goes: margin, ranges, dead centres, stroke.
+"""Mobility of the slider-crank: margin of assembly, ranges of the crank, dead centres, stroke.
 
 With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
 
@@ -87,7 +87,7 @@ class PeriodicShift:
 
 
 def constant_shift(shift: float) -> PeriodicShift:
-    """The law of a crank held at the shift S1 (m).
+    """Return the law of a crank held at the shift S1 (m).
 
     Raises
     ------
@@ -101,7 +101,7 @@ def constant_shift(shift: float) -> PeriodicShift:
 
 @takes_published()
 def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
-    """The law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
+    """Return the law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
 
 
 class Margin(NamedTuple):
-    """Rod length less the crank pin's distance from the guide, at an extreme of it over the turn (m), and the angle (rad)."""
+    """An extreme over the turn of the margin of assembly: rod length less distance of crank pin and guide (m); angle (rad)."""
 
     length: float
     crank_angle: float
@@ -163,7 +163,7 @@ class Range(NamedTuple):
     least: Place
 
     def full(self, span: float) -> bool:
-        """Whether it has no ends: the crank makes all of the law's turns, its ``span``."""
+        """Return whether the range has no ends: the crank makes all turns of the law, its ``span``."""
         return self.high - self.low >= span * (1.0 - 1e-12)
 
     @property
@@ -178,7 +178,7 @@ class _Zero(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """D, A and B at the middle of a piece, and the most by which each differs from that inside it."""
+    """D, A and B at the middle of a piece, and bounds of their change within it."""
 
     square: float
     pull: float
@@ -189,7 +189,7 @@ class _Change(NamedTuple):
 
 
 def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
-    """D, A and B and their spreads over ``middle`` +- ``half``; ``pitch`` is 0 where A and B leave S1' out, else 1."""
+    """Return D, A, B and their spreads over ``middle`` +- ``half``; with ``pitch`` 0 A and B leave out S1', else it is 1."""
     s1, ds1 = law.at(middle)[:2]
     if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
         raise InputError(
@@ -226,7 +226,7 @@ _Bounded = Callable[[float, float], tuple[float, float]]
 
 
 def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
-    """A, whose zeros are the extremes of the distance between crank pin and guide."""
+    """Return the function A, whose zeros are the extremes of the distance between crank pin and guide."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
         change = _change(middle, half, law, p, 1.0)
@@ -235,11 +235,11 @@ def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
     return slope
 
 
-def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -> _Bounded:
-    """A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
+def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> _Bounded:
+    """Return the function A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
-        change = change_of(middle, half)
+        change = changes(middle, half)
         h = sqrt(max(0.0, change.square))
         # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
         spread = sqrt(change.square_spread)
@@ -255,7 +255,7 @@ def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -
 
 
 def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
-    """Where ``positive`` changes between ``low`` and ``high``, at which it differs; to the last digit."""
+    """Find to the last digit where ``positive`` changes between ``low`` and ``high``."""
     at_low = positive(low)
     while True:
         middle = 0.5 * (low + high)
@@ -268,7 +268,7 @@ def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float
 
 
 def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
-    """All zeros of ``function`` between ``low`` and ``high`` in which it changes its sign, in order.
+    """Find all sign changes of ``function`` between ``low`` and ``high``, in order.
 
     Where it is zero to the rounding of ``scale`` over a stretch, the stretch is one zero if the signs before and after it
     differ, and none otherwise.
@@ -306,7 +306,7 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
 
 
 def _wrapped(angle: float, law: PeriodicShift) -> float:
-    """The angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
+    """Return the angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
     wrapped = angle % law.span
     return wrapped if wrapped < law.span else 0.0
 
@@ -316,14 +316,14 @@ def _square(angle: float, law: PeriodicShift, p: Constants) -> float:
 
 
 def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
-    """The angles at which the margin of assembly is least or greatest, in order; any one if it is the same everywhere."""
+    """Find the angles of least or greatest margin of assembly, in order; any one if it is the same everywhere."""
     zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
     return [zero.angle for zero in zeros] or [0.0]
 
 
 @takes_published()
 def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
-    """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
+    """Find the least margin of assembly over the turn, negative where the crank cannot turn fully.
 
     The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
     by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
@@ -333,19 +333,19 @@ def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Ma
 
 @takes_published()
 def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
-    """The greatest margin of assembly over the turn, negative where it can be assembled nowhere, and where it is."""
+    """Find the greatest margin of assembly over the turn, negative if it can be assembled nowhere."""
     return _margin(max, law, parameters.constants())
 
 
 def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> Margin:
-    """The margin at the extreme that ``choose``, min or max, takes."""
+    """Return the margin at the extreme chosen by ``choose``, min or max."""
     place = choose(_extremes(law, p), key=lambda angle: _square(angle, law, p))
     return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
 
 
 @takes_published()
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
-    """The greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
+    """Find the greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
 
     It turns fully at a shift of either sign up to this one. With the guide parallel to the crank axis any shift will do, and
     the value is infinite.
@@ -356,7 +356,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
     # value of a1 s |cos(alpha4)| + r, which is that of a slider in the plane but for the cosine
 
-    def change_of(middle: float, half: float) -> _Change:
+    def changes(middle: float, half: float) -> _Change:
         c, s = cos(middle), sin(middle)
         f = p.a1 * c + p.a4
         most = abs(f) + half * p.a1
@@ -370,9 +370,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
         f = p.a1 * cos(angle) + p.a4
         return p.a1 * sin(angle) * abs(p.ca) + sqrt(max(0.0, p.a2 * p.a2 - f * f))
 
-    least = min(
-        bound(zero.angle) for zero in _zeros(_slider_slope(change_of, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
-    )
+    least = min(bound(zero.angle) for zero in _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2))
     if least < 0.0:
         return None
     # a twist of pi has a sine of its rounding
@@ -381,7 +379,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
 
 
 def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
-    """Configuration at an angle at which the rod reaches the guide; at ``limit`` of assembly it is perpendicular to it."""
+    """Return the configuration at an angle; at the ``limit`` of assembly the rod is perpendicular to the guide."""
     shift = law.at(angle)[0]
     # at the limit the rounding of the angle would be a root of it in h
     h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
@@ -406,7 +404,7 @@ def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
 
 
 def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
-    """Ends of the ranges in which the rod reaches the guide."""
+    """Find the ends of the ranges in which the rod reaches the guide."""
     extremes = _extremes(law, p)
     reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
     if all(reached):
@@ -427,7 +425,7 @@ def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
 
 @takes_published()
 def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """The ranges of crank angles in which the rod reaches the guide, each with its dead centres and its stroke.
+    """Find the ranges of crank angles in which the rod reaches the guide, with dead centres and stroke.
 
     One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
     shift. Their ends, at which rod and guide are perpendicular, are those of geometry: the plant's steps stop as soon as the
@@ -439,7 +437,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
 
 @takes_published()
 def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """The `ranges` of a mechanism that can be assembled.
+    """Find the `ranges` of a mechanism that can be assembled.
 
     Raises
     ------
@@ -460,7 +458,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
 
 @takes_published()
 def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """All configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
+    """Find all configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
 
     None where the slider stands still at every angle. At a constant shift there are two where the crank turns fully, of at
     most four on both branches together.
@@ -473,7 +471,7 @@ def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple
 
 @takes_published()
 def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """The configurations along the law in which the crank's torque and the slider's force do not balance: kth = 0.
+    """Find the configurations along the law in which crank torque and slider force do not balance: kth = 0.
 
     kth is the derivative of the slider position by the crank angle at the shift held. Where the shift is driven by a force
     of its own, it is this that multiplies the slider force in the crank's equation of motion (the thesis's force problem),

@@ -33,7 +33,7 @@ from ..numerics.tracing import rebound
 from ..units import Amount, si
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
-from .shifts import ShiftMotion, in_the_shaft, on_arrays, with_groove
+from .shifts import ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
 #: What is in error besides the mechanism's parameters: the crank angle and the axial shift, by the names of their outputs.
 ANGLE, SHIFT = "crank.angle", "shift.position"
@@ -102,8 +102,8 @@ class Sensitivities:
     values: Mapping[str, MaskedArray]
     derivatives: Mapping[str, MaskedArray]
 
-    def of(self, quantity: str, error: str) -> MaskedArray:
-        """Derivative (n,) of a quantity by an error.
+    def derivative(self, quantity: str, error: str) -> MaskedArray:
+        """Return the derivative (n,) of a quantity by an error.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Sensitivities:
 def sensitivities(
     turn: ForceTurn, errors: Sequence[str] = DIMENSIONS, quantities: Sequence[str] = tuple(QUANTITIES)
 ) -> Sensitivities:
-    """Derivatives of motion, torque and joint forces by dimensions, masses and settings, over the turn.
+    """Compute derivatives of motion, torque and joint forces by dimensions, masses and settings over the turn.
 
     Parameters
     ----------
@@ -165,11 +165,11 @@ class Varied:
 
     @property
     def square(self) -> Any:
-        """What is positive where the rod reaches the guide (m2)."""
-        return on_arrays().assembly_square(self.angle, self.moving.shift, self.p)
+        """Rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
+        return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
 
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
-        """The quantities, and the lever of the slider's force.
+        """Compute the quantities, and the lever of the slider's force.
 
         Only what the quantities need is calculated; the lever is zero where no force is asked for.
         """
@@ -180,7 +180,7 @@ class Varied:
                 return self._motion(quantities, w, e), 0.0
             sought = turn.sought == SLIDER_FORCE
             given = (turn.torque if sought else turn.slider_force).data[self.at]
-            s = solve(p, self.angle, moving, w, e, given=given, torque=sought, groove=in_the_shaft(turn.law))
+            s = solve(p, self.angle, moving, w, e, given=given, torque=sought, groove=has_shaft_groove(turn.law))
         found = {
             "slider.position": s.position.s4,
             "slider.velocity": s.motion.slider_velocity,
@@ -193,7 +193,7 @@ class Varied:
         return {name: found[name] for name in quantities}, s.ratio
 
     def _motion(self, quantities: Collection[str], w: Any, e: Any) -> dict[str, Any]:
-        f, p, moving = on_arrays(), self.p, self.moving
+        f, p, moving = plant_functions(), self.p, self.moving
         q = f.position(self.angle, moving.shift, p)
         found = {"slider.position": q.s4}
         if set(quantities) != {"slider.position"}:
@@ -205,14 +205,14 @@ class Varied:
 
 
 def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
-    """The mechanism with the errors, arrays or dual numbers by name, at the points ``at`` of the turn."""
+    """Return the mechanism with errors, arrays or dual numbers by name, at the points ``at`` of the turn."""
     nominal = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
     changed = {
         field_name(name): nominal[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)
     }
     p = with_groove(_CONSTANTS(SimpleNamespace(**nominal | changed)), turn.law)
     angle = turn.angle[at] + errors.get(ANGLE, 0.0)
-    if in_the_shaft(turn.law):
+    if has_shaft_groove(turn.law):
         moving = turn.law.at(angle, turn.speed[at], turn.acceleration[at])
     else:
         moving = ShiftMotion(turn.shift[at], turn.shift_velocity[at], turn.shift_acceleration[at])
@@ -220,20 +220,20 @@ def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
 
 
 def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
-    """Errors at n points as independent variables, all zero but the one that is moved by a step."""
+    """Return errors at n points as independent variables, all zero but one, which is moved by a step."""
     values = np.zeros((len(names), n))
     values[moved] = step
     return dict(zip(names, independent(*values)))
 
 
 def undetermined(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
-    """Where the nominal mechanism is at a dead centre at which the quantity is not determined."""
+    """Return where a quantity of the nominal mechanism is undetermined at a dead centre."""
     dead = np.ma.getmaskarray(turn.slider_force)
     return np.zeros(len(turn), dtype=bool) if quantity in FREE_OF_LOAD else dead
 
 
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
-    """Make sure that there are quantities or errors of these names.
+    """Make sure that quantities or errors of these names exist.
 
     Raises UnknownNameError if one is not among the known.
     """
@@ -252,7 +252,7 @@ _DISTRIBUTIONS = {"normal": (NORMAL_EXTENT, 3.0), "uniform": (sqrt(3.0), 1.8), "
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """A random error of one dimension, independent of the others and with the mean zero.
+    """A random error of one dimension, independent of the others, with zero mean.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ class Tolerance:
         return self.deviation * _DISTRIBUTIONS[self.distribution][0]
 
     def draw(self, generator: np.random.Generator, samples: int) -> FloatArray:
-        """Random errors (samples,)."""
+        """Draw random errors (samples,)."""
         if self.distribution == "normal":
             return generator.normal(0.0, self.deviation, samples)
         if self.distribution == "uniform":
@@ -320,7 +320,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Estimate:
-    """What the tolerances do to one quantity over the turn, without samples; masked arrays.
+    """Effect of the tolerances on one quantity over the turn, without samples; masked arrays.
 
     Attributes
     ----------
@@ -353,7 +353,7 @@ class Estimate:
 def tolerance_effects(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str] = ("slider.position",)
 ) -> dict[str, Estimate]:
-    """The effect of tolerances to first and second order over the turn, by quantity.
+    """Compute the effect of tolerances to first and second order over the turn, by quantity.
 
     Raises
     ------
@@ -408,7 +408,7 @@ def tolerance_effects(
 
 
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
-    """Names of the tolerances; raises InputError if there is none, or two of the same name."""
+    """Return the names of the tolerances; raises InputError if there is none, or two of the same name."""
     names = tuple(t.name for t in tolerances)
     if not names:
         raise InputError("there is no tolerance: give at least one")
@@ -421,7 +421,7 @@ def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
 def _curvatures(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str]
 ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-    """Second derivatives (m, m, n) times both standard deviations, and where the mechanism is assembled for all of them.
+    """Return second derivatives (m, m, n) times both standard deviations, and where all their configurations assemble.
 
     They are half the differences of the first derivatives over one standard deviation to either side.
     """
@@ -442,7 +442,7 @@ def _curvatures(
 
 
 def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> NDArray[np.bool_]:
-    """Where errors at their extents make nothing of the lever of the slider's force, if that is sought (n,)."""
+    """Return where errors at their extents reach a zero of the slider force's lever, if that force is unknown (n,)."""
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)
@@ -452,7 +452,7 @@ def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> 
 
 
 def _share(parts: MaskedArray, whole: MaskedArray, none: NDArray[np.bool_]) -> MaskedArray:
-    """Parts (m, n) of a whole (n,), masked where there is none."""
+    """Return parts (m, n) divided by a whole (n,), masked where ``none`` is true."""
     shares = np.ma.masked_where(np.broadcast_to(none, parts.shape), parts) / np.ma.masked_where(none, whole)
     shares.fill_value = np.nan
     return cast(MaskedArray, shares)

@@ -1,4 +1,4 @@
-"""A wish from the tables of a TOML or JSON file, every quantity with its unit; see `docs/tuning.md`."""
+"""Case files of a tuning: TOML or JSON tables, every quantity with its unit; see `docs/tuning.md`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LEAST_CHANGE, _LEAST = "least change", "least "
 
 
 def _objective(value: Any, name: str) -> str:
-    """What is made least."""
+    """Read the objective: least change, or the least value of a parameter."""
     words = text(value, name)
     if words != _LEAST_CHANGE and not words.startswith(_LEAST):
         raise ParameterError(
@@ -63,7 +63,7 @@ class TuneTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TuningCase:
-    """What a case file asks for.
+    """A case file of a tuning.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class TuningCase:
     tables: Mapping[str, Any]
 
     def tuned_tables(self, tuned: Tuned) -> dict[str, Any]:
-        """The tables of a case with what was changed."""
+        """Return the tables of a case with the tuned values."""
         mechanism = mechanism_of(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
@@ -87,7 +87,7 @@ class TuningCase:
 
 
 def _start(case: Case, drive: Drive) -> list[float] | None:
-    """At rest but for the crank's speed at the start, where it is needed and given: see `find_orbit`."""
+    """Return a guess of the motion: rest but for the initial crank speed; None where no guess is needed."""
     mechanism = mechanism_of(case.parameters)
     flow, state = drive.flow(mechanism), mechanism.state(case.initial)
     if not (flow.torque and drive.motor is None):
@@ -114,7 +114,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def tuning_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> TuningCase:
-    """A case from the tables of a case file; ``folder`` is where its files are looked for."""
+    """Build a case from the tables of a case file; its files are looked for in ``folder``."""
     tables = overridden({"title": title} | dict(data), overrides or {})
     if "tune" not in tables:
         raise MissingParameterError("tune")

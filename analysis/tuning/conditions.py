@@ -50,11 +50,11 @@ _SAMPLES = 256
 
 
 class LostError(LinkworkError):
-    """A place was not found again."""
+    """A motion was not found again after the parameters changed."""
 
 
 class Expansion(NamedTuple):
-    """y(T) - y(0) at a place and the monodromy matrix, with their derivatives by y, the level and the k changes.
+    """Derivatives of y(T) - y(0) and the monodromy matrix at a place, by y, the level and the k changes.
 
     Attributes
     ----------
@@ -79,14 +79,14 @@ class Expansion(NamedTuple):
     constants: FloatArray
 
 
-def family_at(wish: Wish, x: FloatArray) -> Family:
-    """The periodic motions over the level, with changes in their tolerances."""
+def family(wish: Wish, x: FloatArray) -> Family:
+    """Return the periodic motions over the level for changes in their tolerances."""
     parameters, drive = wish.operation(x, wish.span[0])
     return Family(parameters=parameters, drive=drive, vary=wish.over)
 
 
 class Spot(NamedTuple):
-    """A place found: the changes, y, the level, and the turns of the period."""
+    """A motion on the response: the changes, y, the level, and the turns of the period."""
 
     x: FloatArray
     y: FloatArray
@@ -94,24 +94,24 @@ class Spot(NamedTuple):
     turns: int = 1
 
 
-def spot_of(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
-    """Where a motion is."""
-    return Spot(x, orbit.start, wish.level_of(orbit), orbit.turns)
+def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
+    """Return the changes, start and level of a motion."""
+    return Spot(x, orbit.start, wish.level(orbit), orbit.turns)
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
-    """The motion that begins there, as far as it closes."""
-    orbit: PeriodicOrbit = OrbitEquations(family_at(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    """Return the motion that begins at a spot, as far as it closes."""
+    orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
 def sampled(orbit: PeriodicOrbit) -> Turn:
-    """Its outputs over the period, each turn in as many samples."""
+    """Return the outputs over the period, each turn with the same number of samples."""
     return orbit.turn(_SAMPLES * orbit.turns)
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:
-    """The derivatives at a place, by the variational equations to second order; it need not be on a motion that closes."""
+    """Compute the derivatives at a spot by the variational equations to second order; the motion need not close."""
     along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
     v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)
@@ -127,7 +127,7 @@ def expansion(wish: Wish, spot: Spot) -> Expansion:
 
 
 def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """The matrix A of which det(I - A) is zero where a multiplier crosses a circle in this way, and positive within."""
+    """Return the matrix A with det(I - A) zero where multipliers cross a circle in this way, positive within."""
     if kind is not Crossing.TORUS:
         return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
     # the minors of order 2, whose eigenvalues are the products of two multipliers
@@ -138,42 +138,42 @@ def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) ->
     return np.array(minors) / radius**2
 
 
-def margin_of(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
-    """det(I - A) of `margin_matrix`."""
+def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
+    """Return det(I - A) of `margin_matrix`."""
     matrix = margin_matrix(monodromy, kind, radius)
     return float(np.linalg.det(np.eye(len(matrix)) - matrix))
 
 
 def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Derivatives of `margin_of` by y, the level and the parameters, exact for those of the matrix: a step along i."""
+    """Return the derivatives of `crossing_margin` by y, the level and the parameters, by exact complex steps."""
     step = 1e-30
     matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
     return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
 
 
 class Row(Protocol):
-    """The equation that picks a place from its branch."""
+    """Equation that picks a motion from its branch."""
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
-        """What is zero at the place."""
+        """Return the residual of the equation."""
 
     def slopes(self, found: Expansion) -> FloatArray:
-        """Its derivatives by y, the level and the changes."""
+        """Return its derivatives by y, the level and the changes."""
 
     def across(self, found: Callable[[], Expansion]) -> FloatArray:
-        """Those by y and the level alone."""
+        """Return its derivatives by y and the level alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Across:
-    """In a plane across the branch: normal . (y, level) = offset; at a fixed level where the normal is along it."""
+    """Plane across the branch: normal . (y, level) = offset; a fixed level if the normal is along it."""
 
     normal: FloatArray
     offset: float
 
     @classmethod
-    def at_level(cls, wish: Wish, spot: Spot, level: float) -> Across:
-        """At a level, of motions like the one at a place."""
+    def level_plane(cls, wish: Wish, spot: Spot, level: float) -> Across:
+        """Return the plane of a fixed level, for motions like the one at a spot."""
         return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
@@ -188,12 +188,12 @@ class Across:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """Where a multiplier crosses the unit circle."""
+    """Equation of lost stability: a multiplier crosses the unit circle."""
 
     kind: Crossing
 
     def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
-        return margin_of(monodromy, self.kind)
+        return crossing_margin(monodromy, self.kind)
 
     def slopes(self, found: Expansion) -> FloatArray:
         return margin_slopes(found, self.kind)
@@ -204,7 +204,7 @@ class Lost:
 
 
 class Found:
-    """A place at some parameters, and how it moves with them."""
+    """A motion picked from its branch at some parameters, and its derivatives by them."""
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.spot = spot
@@ -212,12 +212,12 @@ class Found:
 
     @cached_property
     def expansion(self) -> Expansion:
-        """The derivatives there."""
+        """Derivatives by the variational equations."""
         return expansion(self._wish, self.spot)
 
     @cached_property
     def orbit(self) -> PeriodicOrbit:
-        """The motion."""
+        """The periodic motion."""
         return motion(self._wish, self.spot)
 
     @cached_property
@@ -228,13 +228,13 @@ class Found:
         return -np.linalg.solve(rows[:, :n], rows[:, n:])
 
     def along(self, slopes: FloatArray) -> FloatArray:
-        """Derivatives by the changes of what has these by y, the level and the changes, shape (..., n + 1 + k)."""
+        """Return derivatives by the changes from derivatives by y, the level and the changes, shape (..., n + 1 + k)."""
         n = len(self.spot.y) + 1
         found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
         return found
 
     def output_slopes(self, number: int, angle: float) -> FloatArray:
-        """Derivatives by the changes of an output, by its number, at a crank angle; shape (k,)."""
+        """Return the derivatives of an output by the changes, by its number, at a crank angle; shape (k,)."""
         found = self.expansion
         v = found.variations
         angle = float(angle % (self.spot.turns * v.flow.period))
@@ -251,7 +251,7 @@ class Found:
 
 
 class Place:
-    """A place that is found again wherever the parameters go.
+    """A motion that one equation picks from its branch, found again as the parameters change.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ class Place:
         self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def at(self, x: FloatArray) -> Found:
-        """The place with changes in their tolerances; raises LostError if it is not found again."""
+        """Find the motion for changes in their tolerances; raises LostError if it is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
         size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
@@ -293,7 +293,7 @@ class Place:
         z = np.append(begin.y, begin.level)
         first = z = z if slope is None else z + ahead * slope
         n = len(begin.y)
-        evaluate = OrbitEquations(family_at(self.wish, x), begin.turns, *self.wish.span)
+        evaluate = OrbitEquations(family(self.wish, x), begin.turns, *self.wish.span)
         size = np.inf
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
@@ -317,7 +317,7 @@ class Place:
 
 
 def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
-    """What was sampled over a turn, as its Fourier series at any crank angle."""
+    """Return samples over a turn as a Fourier series, a function of the crank angle."""
     n = len(samples)
     c = np.fft.rfft(samples) / n
     c[1:] *= 2.0
@@ -328,37 +328,37 @@ def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
 
 
 def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
-    """What a limit is about at any crank angle: of a joint the magnitude of the force."""
+    """Return the limited quantity as a function of the crank angle: of a joint the magnitude of the force."""
     # of its components, which are smooth where the magnitude is not
     parts = [series(turn, turn[part]) for part in limit.parts]
     return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
 
 
 def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
-    """What a limit bounds, from the values at its crank angles: see `greatest`."""
+    """Return the limited quantity from its values at its crank angles: see `greatest`."""
     values = curve(turn, limit)(np.array(angles))
     return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
 
 
 def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
-    """What a limit bounds over a turn, and the crank angles of it: one, or those of the greatest and the least value."""
+    """Return the limited quantity over a turn and its crank angles: one, or those of greatest and least value."""
     samples = reduce(np.hypot, (turn[part] for part in limit.parts))
     places = [np.abs(samples).argmax()]
     if limit.output.startswith(AMPLITUDE):
         places = [samples.argmax(), samples.argmin()]
-    angles = climbed(turn, limit, [float(turn.angle[place]) for place in places])
+    angles = peak_angles(turn, limit, [float(turn.angle[place]) for place in places])
     return reading(turn, limit, angles), angles
 
 
-def climbed(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
-    """The crank angles about these at which what a limit bounds is greatest."""
+def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
+    """Return the crank angles near given ones at which the limited quantity is greatest."""
     value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
     signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
     return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
 
 
 def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) -> float:
-    """Where a function of the crank angle is greatest (sign +1) or least about an angle."""
+    """Find the maximum (sign +1) or minimum of a function of the crank angle near an angle."""
     for _ in range(_UPHILL):
         a, b, c = sign * value(angle + step * np.array([-1.0, 0.0, 1.0]))
         if b >= max(a, c):
@@ -386,17 +386,17 @@ class Condition(Protocol):
 
     @property
     def group(self) -> str:
-        """The requirement that it belongs to."""
+        """Name of its requirement."""
 
     def value(self, x: FloatArray) -> float:
-        """The function; raises LostError if the place is not found."""
+        """Return the function; raises LostError if the motion is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """Its derivatives by the changes, shape (k,)."""
+        """Return its derivatives by the changes, shape (k,)."""
 
 
 class Inside:
-    """No multiplier has crossed a circle in a way at a place: `margin_of` is not negative."""
+    """Condition that no multiplier has crossed a circle in a way: `crossing_margin` is not negative."""
 
     slack = 1e-9
 
@@ -404,7 +404,7 @@ class Inside:
         self.group, self.place, self.kind, self.radius = group, place, kind, radius
 
     def value(self, x: FloatArray) -> float:
-        return margin_of(self.place.at(x).orbit.monodromy, self.kind, self.radius)
+        return crossing_margin(self.place.at(x).orbit.monodromy, self.kind, self.radius)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         found = self.place.at(x)
@@ -412,7 +412,7 @@ class Inside:
 
 
 class Beyond:
-    """A point where stability is lost is above a level (side +1) or below it (-1)."""
+    """Condition that a point of lost stability is above a level (side +1) or below it (-1)."""
 
     slack = 1e-9
 
@@ -428,7 +428,7 @@ class Beyond:
 
 
 class PeakBeyond:
-    """A resonance, a maximum of the amplitude over the level, is above a level (side +1) or below it (-1)."""
+    """Condition that a resonance, a maximum of the amplitude, is above a level (side +1) or below it (-1)."""
 
     slack = 1e-8
 
@@ -437,7 +437,7 @@ class PeakBeyond:
         self._wish, self._last = wish, spot
 
     def _at(self, x: FloatArray) -> Gradient:
-        place, spot = peak(self._wish, x, self._last)
+        place, spot = find_resonance(self._wish, x, self._last)
         self._last = spot
         return place
 
@@ -448,18 +448,18 @@ class PeakBeyond:
         return self._share * self._at(x).by * self._wish.tolerance
 
 
-def peak(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
-    """The level of a resonance, with its derivatives by the parameters that may be changed, and the motion there.
+def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
+    """Find the level of a resonance, its derivatives by the parameters that may be changed, and the motion there.
 
     Raises LinkworkError if there is none near.
     """
-    orbit = Place(wish, Across.at_level(wish, near, near.level), near).at(x).orbit
+    orbit = Place(wish, Across.level_plane(wish, near, near.level), near).at(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)
-    return found.place, spot_of(wish, x, found.orbit)
+    return found.place, known_spot(wish, x, found.orbit)
 
 
 class Below:
-    """An output is below its limit where it is greatest: at a level of the range and crank angles that go with the changes."""
+    """Condition that an output is below its limit at its maximum over the range and the crank angle."""
 
     slack = 1e-7
 
@@ -469,7 +469,7 @@ class Below:
         self._known: tuple[bytes, Found, Turn] | None = None
 
     def _at(self, x: FloatArray) -> tuple[Found, Turn]:
-        """The motion there, found by parabolas through the output at three levels."""
+        """Find the motion with the greatest output by parabolas through the output at three levels."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
         found, value = self._reading(x, self._last.level)
@@ -477,12 +477,12 @@ class Below:
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
         turn = sampled(found.orbit)
-        self._last, self.angles = found.spot, climbed(turn, self.limit, self.angles)
+        self._last, self.angles = found.spot, peak_angles(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
 
     def _uphill(self, x: FloatArray, found: Found, value: float, step: float) -> tuple[Found, float]:
-        """The motion from which no parabola leads to a greater output."""
+        """Return the motion from which no parabola leads to a greater output."""
         for _ in range(_CLIMB):
             level = found.spot.level
             try:
@@ -501,9 +501,9 @@ class Below:
         return found, value
 
     def _reading(self, x: FloatArray, level: float) -> tuple[Found, float]:
-        found = Place(self._wish, Across.at_level(self._wish, self._last, level), self._last).at(x)
+        found = Place(self._wish, Across.level_plane(self._wish, self._last, level), self._last).at(x)
         turn = sampled(found.orbit)
-        return found, reading(turn, self.limit, climbed(turn, self.limit, self.angles))
+        return found, reading(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:
         return 1.0 - reading(self._at(x)[1], self.limit, self.angles) / float(self.limit.below)

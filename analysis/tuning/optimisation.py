@@ -28,10 +28,10 @@ from .conditions import (
     PeakBeyond,
     Place,
     Spot,
-    spot_of,
+    known_spot,
 )
 from .result import JUMP, RESONANCE, STABLE, Tuned, Verification, readings, requirements
-from .survey import MARGINAL, SOUGHT, Region, Survey, charted, others, survey
+from .survey import MARGINAL, SOUGHT, Region, Survey, charted, other_motions, survey
 from .wishes import Wish
 
 #: IPOPT's tolerance, iterations at most, and the violation of a condition that counts as none.
@@ -45,7 +45,7 @@ _REST = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """What a program came to.
+    """Solution of a nonlinear program.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Answer:
 
 
 def objective(wish: Wish, x: Any) -> Any:
-    """What is made least: squares of the changes, or a parameter in its tolerance; of numbers or of symbols."""
+    """Return the objective: squares of the changes, or a parameter in its tolerance; of numbers or symbols."""
     squares = symbolic.library().sumsqr(x)
     if not wish.least:
         return squares
@@ -81,7 +81,7 @@ def objective(wish: Wish, x: Any) -> Any:
 
 
 def nearest(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
-    """Solve from some changes; where no changes keep the conditions, make the sum of the violations least.
+    """Find the least change that keeps the conditions; if there is none, the least sum of violations.
 
     Raises LinkworkError if a place is not found even at the start.
     """
@@ -138,7 +138,7 @@ def _solve(wish: Wish, conditions: Sequence[Condition], x: FloatArray, *, elasti
 
 
 class _Values:
-    """The conditions' values and derivatives at the changes, those of the last point remembered; NaN where there are none."""
+    """Values and derivatives of the conditions at the changes, cached for the last point; NaN where a motion is lost."""
 
     def __init__(self, conditions: Sequence[Condition]) -> None:
         self.conditions = conditions
@@ -146,7 +146,7 @@ class _Values:
         self._lost = 0
 
     def __call__(self, x: FloatArray, slopes: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Shapes (m,) and (m, k)."""
+        """Return values (m,) and derivatives (m, k)."""
         key = x.tobytes()
         if self._last is not None and self._last[0] == key and self._last[1] >= slopes:
             return self._last[2:]
@@ -163,7 +163,7 @@ class _Values:
         return values, rows
 
     def function(self, count: int) -> Callable[[Any], Any]:
-        """The same for CasADi."""
+        """Return the values as a CasADi function."""
         function: Callable[[Any], Any] = symbolic.external("conditions", count, len(self.conditions), self.__call__)
         return function
 
@@ -181,7 +181,7 @@ _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """The way round what lies at a level: a region of a kind, or a resonance (kind None)."""
+    """Choice for a region of a kind, or a resonance (kind None): below the range, above it, or removed."""
 
     kind: Crossing | None
     level: float
@@ -190,7 +190,7 @@ class _Way:
 
 @dataclass(slots=True, eq=False)
 class _Search:
-    """What is known while a wish is tuned."""
+    """State of a tuning: motions beside the response, and the best changes so far."""
 
     wish: Wish
     rounds: int = 0
@@ -200,28 +200,28 @@ class _Search:
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def look(self, x: FloatArray) -> Survey:
-        """Follow the response with some changes."""
+        """Survey the range with some changes."""
         own = []
         for spot in self.more:
-            place = Place(self.wish, Across.at_level(self.wish, spot, spot.level), spot)
+            place = Place(self.wish, Across.level_plane(self.wish, spot, spot.level), spot)
             try:
                 own.append(place.at(x).orbit)
             except LostError:
                 continue  # its branch is gone there
         return survey(self.wish, x, own)
 
-    def look_beside(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
-        """Seek motions beside a response: whether there are new ones, and the levels with two stable ones."""
-        new, several = others(found)
-        self.more += [spot_of(self.wish, found.x, orbit) for orbit in new]
+    def search_others(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
+        """Search motions beside a response: return whether there are new ones, and levels with two stable ones."""
+        new, several = other_motions(found)
+        self.more += [known_spot(self.wish, found.x, orbit) for orbit in new]
         return bool(new), several
 
     def excess(self, found: Survey, several: tuple[float, ...]) -> float:
-        """Sum of what is missing."""
+        """Return the sum of the excesses of all requirements."""
         return sum(reading.excess for reading in readings(found, several).values())
 
     def keep(self, found: Survey, several: tuple[float, ...]) -> None:
-        """Remember what was found, if it is better."""
+        """Remember a survey if it is the best so far."""
         excess = self.excess(found, several)
         rank = excess > 0.0, excess, float(objective(self.wish, found.x))
         if self.best is None or rank < self.best[0]:
@@ -229,12 +229,12 @@ class _Search:
 
     @property
     def least(self) -> float:
-        """The least objective with which nothing is missing."""
+        """Least objective so far with all requirements met."""
         return np.inf if self.best is None or self.best[0][0] else self.best[0][2]
 
 
 def tune(wish: Wish, *, progress: bool = False) -> Tuned:
-    """Change parameters least so that a range of speeds is as it is wished.
+    """Find the least change of parameters that clears a range of speeds.
 
     What lies in the range is held out of it by conditions at places of the response, whose derivatives are known; IPOPT finds
     the least change that keeps them. The response is then followed anew, and what still lies in the range becomes a further
@@ -272,12 +272,12 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     start = np.clip(zero, wish.scaled(wish.low), wish.scaled(wish.high))
     before = search.look(zero)
     first = before if (start == zero).all() else search.look(start)
-    if search.look_beside(first)[0]:
+    if search.search_others(first)[0]:
         first = search.look(start)
         before = first if (start == zero).all() else search.look(zero)
     _try_ways(search, first, progress)
     if search.least == np.inf:
-        nearer = _next_to_a_clean_one(search, first)
+        nearer = _survey_near_solution(search, first)
         if nearer is not None:
             _try_ways(search, nearer, progress)
     if search.best is None:
@@ -286,7 +286,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 
 
 def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
-    """Try all ways from some changes."""
+    """Try all combinations of ways from some changes."""
     ways = _ways(first)
     with shown(progress, len(ways), "trying changes") as show:
         for number, way in enumerate(ways):
@@ -296,8 +296,8 @@ def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
                 search.keep(*found)
 
 
-def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
-    """What lies in the range just before nothing unwanted does, on the way from the first changes to others within the bounds.
+def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
+    """Find changes within the bounds that meet the requirements, and return the survey just before them.
 
     Where no way leads from the first changes to such as are wished, because places are lost on it, one may lead from there.
     None where none of some changes, spread over the bounds, leaves nothing unwanted.
@@ -306,14 +306,14 @@ def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
     low, high = wish.scaled(wish.low), wish.scaled(wish.high)
     spread = low + (high - low) * qmc.Sobol(len(low), rng=0).random(_SPREAD)
     for x in sorted([low, high, *spread], key=lambda x: float(objective(wish, x))):
-        if _looked(search, x)[0]:
+        if _try_changes(search, x)[0]:
             break
     else:
         return None
     dirty, clean, found = first.x, x, None
     for _ in range(_BISECTIONS):
         middle = 0.5 * (dirty + clean)
-        is_clean, there = _looked(search, middle)
+        is_clean, there = _try_changes(search, middle)
         if is_clean:
             clean = middle
         else:
@@ -321,13 +321,13 @@ def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
     return found
 
 
-def _looked(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
-    """Whether nothing is missing with some changes, and what lies in the range."""
+def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
+    """Return whether some changes meet all requirements, and the survey."""
     several: tuple[float, ...] = ()
     try:
         found = search.look(x)
         if search.excess(found, several) == 0.0:
-            new, several = search.look_beside(found)
+            new, several = search.search_others(found)
             found = search.look(x) if new else found
     except LinkworkError:
         return False, None
@@ -366,13 +366,13 @@ def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float,
 
 
 def _end(region: Region, side: int) -> SpecialPoint | None:
-    """The special point at the upper end of a region (side -1, to go below the range) or at its lower end."""
+    """Return the special point at the upper end of a region (side -1, to go below the range) or at its lower end."""
     ends = [s for s in (region.first, region.last) if s is not None]
     return next((s for s in ends if s.parameter == (region.high if side == _BELOW else region.low)), None)
 
 
 def _ways(found: Survey) -> list[tuple[_Way, ...]]:
-    """Combinations of ways round all that lies in the range, the nearest first."""
+    """Return combinations of ways round all regions and resonances in the range, the nearest first."""
     wish = found.wish
     low, high = wish.span
     choices: list[list[tuple[float, _Way]]] = []
@@ -410,7 +410,7 @@ def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | No
 
 
 def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey, tuple[float, ...]] | None:
-    """The least change by these ways, or the nearest that can be had, and levels with two stable motions.
+    """Find the least change by these ways, or the nearest to it, and the levels with two stable motions.
 
     None where a place is lost, or another way has found a change as small.
     """
@@ -422,7 +422,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
         try:
             new = [c for c in _conditions(found, ways) if _counts(c, answer)]
             if not new:
-                own, several = search.look_beside(found)
+                own, several = search.search_others(found)
                 if not own and (number > 0 or not wish.least):
                     return found, several
             # what is far from being active is found again where it matters
@@ -438,12 +438,12 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
 
 
 def _counts(condition: Condition, answer: Answer) -> bool:
-    """Whether a condition is violated by more than its requirement is already."""
+    """Return whether a condition is violated by more than its requirement already is."""
     return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
 
 
 def _value(condition: Condition, answer: Answer) -> float:
-    """A condition's value, infinite where its place is gone."""
+    """Return a condition's value, infinite where its motion is lost."""
     try:
         return condition.value(answer.x)
     except LinkworkError:
@@ -451,7 +451,7 @@ def _value(condition: Condition, answer: Answer) -> float:
 
 
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
-    """The conditions that what lies in the range violates; ways round what is new are added."""
+    """Yield the conditions that the survey violates; choices for new regions are added to the ways."""
     wish, x = found.wish, found.x
     low, high = wish.span
     gone: list[Region] = []
@@ -465,13 +465,13 @@ def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
         group = JUMP if wish.no_jump and region.kind is Crossing.FOLD else STABLE
         if end is not None:
             gone.append(region)
-            place = Place(wish, Lost(end.kind), spot_of(wish, x, end.orbit))
+            place = Place(wish, Lost(end.kind), known_spot(wish, x, end.orbit))
             yield Beyond(group, place, high if side == _ABOVE else low, side)
         elif region.kind is Crossing.FOLD:
             yield Inside(group, Place(wish, region.across, region.worst), region.kind, 1.0)
     for lost in found.least:
         if not any(r.kind is lost.kind and r.low <= lost.spot.level <= r.high for r in gone):
-            place = Place(wish, Across.at_level(wish, lost.spot, lost.spot.level), lost.spot)
+            place = Place(wish, Across.level_plane(wish, lost.spot, lost.spot.level), lost.spot)
             yield Inside(STABLE, place, lost.kind, wish.radius)
     low, high = wish.without_resonance
     for spot in found.peaks:

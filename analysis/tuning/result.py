@@ -21,7 +21,7 @@ NO_EXCESS = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """What there is of a requirement with some parameters.
+    """State of a requirement with some parameters.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requirement:
-    """A requirement, with what there is of it before and after the change."""
+    """A requirement, with its state before and after the change."""
 
     name: str
     wished: str
@@ -50,12 +50,12 @@ class Requirement:
 
     @property
     def met(self) -> bool:
-        """Whether it is met after the change."""
+        """Whether the requirement is met after the change."""
         return self.after.excess == 0.0
 
 
 def wished(wish: Wish) -> dict[str, str]:
-    """The requirements of a wish and what each asks for, in words."""
+    """Return the requirements of a wish with a description of each."""
     found: dict[str, str] = {}
     if wish.no_resonance:
         found[RESONANCE] = f"none from {wish.say(*wish.without_resonance, joint=' to ')}"
@@ -68,14 +68,14 @@ def wished(wish: Wish) -> dict[str, str]:
 
 
 def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
-    """What there is of each requirement; ``several`` are places at which two stable motions were found."""
+    """Return the state of each requirement; ``several`` are levels with two stable motions."""
     wish, result = found.wish, {}
     if wish.no_resonance:
         peaks = [(spot.level, spot.level) for spot in found.peaks]
-        result[RESONANCE] = _of_levels(wish, peaks, "at {}", wish.without_resonance)
+        result[RESONANCE] = _interval_reading(wish, peaks, "at {}", wish.without_resonance)
     if wish.no_jump:
         jumps = [(region.low, region.high) for region in found.folds]
-        text = _of_levels(wish, jumps, "between {}", wish.span)
+        text = _interval_reading(wish, jumps, "between {}", wish.span)
         if not jumps and several:
             text = Reading(
                 text=f"two stable motions at {wish.say(*several)}",
@@ -101,7 +101,7 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
 
 
 def _stable_everywhere(found: Survey) -> Reading:
-    """Return the reading of the requirement that there is a stable motion everywhere in the range."""
+    """Return the state of the requirement that there is a stable motion everywhere in the range."""
     if not found.unstable:
         return Reading(text="everywhere")
     wish = found.wish
@@ -110,8 +110,10 @@ def _stable_everywhere(found: Survey) -> Reading:
     return Reading(text=text, excess=width / wish.size, missed=text)
 
 
-def _of_levels(wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]) -> Reading:
-    """Return the reading of what should not lie in a span, by its intervals."""
+def _interval_reading(
+    wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
+) -> Reading:
+    """Return the state of a requirement that excludes intervals of levels from a span."""
     if not intervals:
         return Reading(text="none")
     low, high = span
@@ -121,7 +123,7 @@ def _of_levels(wish: Wish, intervals: Sequence[tuple[float, float]], words: str,
 
 
 def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tuple[Requirement, ...]:
-    """Each requirement before and after the change."""
+    """Return each requirement with its state before and after the change."""
     first, last = readings(before), readings(after, several)
     return tuple(
         Requirement(name=name, wished=text, before=first[name], after=last[name])
@@ -131,7 +133,7 @@ def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tup
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
-    """What was computed anew with the changed parameters.
+    """Independent computations with the changed parameters.
 
     Attributes
     ----------
@@ -168,7 +170,7 @@ class Verification:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tuned(Shown):
-    """The least change after which a range of speeds is as it was wished; or, where none is, what comes nearest.
+    """The least change that meets a wish; if there is none, the nearest to it.
 
     Attributes
     ----------
@@ -198,29 +200,29 @@ class Tuned(Shown):
 
     @property
     def parameters(self) -> Parameters:
-        """After the change."""
+        """Parameters after the change."""
         return self.wish.operation(self.x, self.wish.span[0])[0]
 
     @property
     def values(self) -> FloatArray:
-        """Of what may be changed, after it; shape (k,)."""
+        """Changed values, in the order of ``wish.names``; shape (k,)."""
         return self.wish.present + self.x * self.wish.tolerance
 
     @property
     def met(self) -> bool:
-        """Whether all of the wish is met, as far as could be verified."""
+        """Whether all requirements are met, as far as could be verified."""
         return not self.missed
 
     @property
     def missed(self) -> tuple[str, ...]:
-        """What is not met and by how much, a sentence each, and what could not be verified."""
+        """Sentences about requirements that are missed, and about failures of the verification."""
         return (
             *(f"{r.name} cannot be met: {r.after.missed}" for r in self.requirements if not r.met),
             *self.verification.problems,
         )
 
     def tables(self) -> dict[str, Any]:
-        """Everything as nested tables, for a file; numbers in SI."""
+        """Return everything as nested tables, for a file; numbers in SI."""
         wish, v = self.wish, self.verification
         return {
             "met": self.met,

@@ -1,4 +1,4 @@
-"""What is wished of a mechanism over a range of speeds, and what may be changed for it."""
+"""Wishes: requirements on a range of speeds, and the parameters that may be changed to meet them."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
-    """A bound of what an output reaches over a turn, either way.
+    """Upper bound of the magnitude of an output over a turn.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ AMPLITUDE = "amplitude of "
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Wish:
-    """What is wished of a mechanism over a range of speeds, or of what else drives it.
+    """Requirements on a range of speeds, or of another drive quantity, and the parameters that may be changed.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class Wish:
             self.operation(x, self.span[0])
 
     def _required_over(self) -> str:
-        """What the range is of, where what is given of it fits together."""
+        """Return the name of the range's quantity after a check of the arguments about the range."""
         speed = speed_name(self.mechanism)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
             raise InputError("give the range: speeds of the crank, or over what else and between which values of it")
@@ -241,29 +241,29 @@ class Wish:
         low, high = self.between or (0.0, 0.0)
         return float(low), float(high)
 
-    def level_of(self, orbit: PeriodicOrbit) -> float:
-        """Where in the range a motion is."""
+    def level(self, orbit: PeriodicOrbit) -> float:
+        """Return the level of a motion in the range."""
         return value_of(orbit.parameters, orbit.drive, self.over)
 
     def say(self, *levels: float, joint: str = ", ") -> str:
-        """Values of what the range is of, with their unit; speeds in rpm."""
+        """Return values of the range's quantity as text with the unit; speeds in rpm."""
         unit = unit_of(self.mechanism, self.over)
         factor, unit = (RAD_S_PER_RPM, "rpm") if unit == "rad/s" else (1.0, unit)
         return f"{joint.join(f'{level / factor:.6g}' for level in levels)} {unit}"
 
     @property
     def mechanism(self) -> Mechanism:
-        """The mechanism whose parameters they are."""
+        """Mechanism of the parameters."""
         return mechanism_of(self.parameters)
 
     @property
     def judged(self) -> bool:
-        """Whether the motions' stability is part of the wish."""
+        """Whether the stability of all motions is part of the wish."""
         return self.no_unstable or self.least_margin > 0.0
 
     @property
     def radius(self) -> float:
-        """What the largest multiplier may be."""
+        """Bound of the largest multiplier."""
         return 1.0 - self.least_margin
 
     @property
@@ -274,18 +274,18 @@ class Wish:
 
     @property
     def size(self) -> float:
-        """Of the middle of the range, relative to which it is measured how far something reaches into it."""
+        """Middle of the range (SI), the reference of relative distances."""
         low, high = self.span
         return 0.5 * (abs(low) + abs(high))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What may be changed."""
+        """Names of the parameters that may be changed."""
         return tuple(change.name for change in self.change)
 
     @property
     def present(self) -> FloatArray:
-        """Its values now, shape (k,)."""
+        """Present values, shape (k,)."""
         assert self.drive is not None
         return np.array([value_of(self.parameters, self.drive, name) for name in self.names])
 
@@ -301,15 +301,15 @@ class Wish:
 
     @property
     def tolerance(self) -> FloatArray:
-        """What the changes are measured in, shape (k,)."""
+        """Tolerances of the changes, shape (k,)."""
         return np.array([change.tolerance for change in self.change])
 
     def scaled(self, values: FloatArray) -> FloatArray:
-        """Values as changes in their tolerances."""
+        """Return values as changes in their tolerances."""
         return (values - self.present) / self.tolerance
 
     def operation(self, x: FloatArray, level: float) -> Operation:
-        """Mechanism and drive with changes in their tolerances, at a place of the range."""
+        """Return mechanism and drive with changes in their tolerances, at a level of the range."""
         assert self.drive is not None
         values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
         return with_values(self.parameters, self.drive, {**dict(zip(self.names, values)), self.over: level})
@@ -326,7 +326,7 @@ def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
 
 
 def _changeable(mechanism: Mechanism, name: str) -> str:
-    """The FMI name of a parameter or of a number of the drive, by itself or by its field."""
+    """Return the FMI name of a parameter or drive quantity, given by that name or its field."""
     known = {field_name(n): n for n in variable_names(mechanism)}
     found = known.get(field_name(name))
     if found is None:
@@ -349,7 +349,7 @@ def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
 
 
 def _named(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
-    """What is said of each parameter, by FMI name, from nested tables or dotted names."""
+    """Return the entries about parameters by FMI name, from nested tables or dotted names."""
     parts = [name.split(".") for name in variable_names(mechanism)]
     groups = {".".join(part[:n]) for part in parts for n in range(1, len(part))}
     found: dict[str, Any] = {}
@@ -383,7 +383,7 @@ def _change(operation: Operation, name: str, value: Any) -> Change:
 
 
 def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
-    """A tolerance in SI: a share of the present value where it is in per cent."""
+    """Return a tolerance in SI; per cent are a share of the present value."""
     if isinstance(value, str) and value.rstrip().endswith("%"):
         found = quantity(value, "1", name) * abs(now)
         if now == 0.0:

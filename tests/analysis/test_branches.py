@@ -212,14 +212,6 @@ def test_without_damping_there_is_no_torus_at_prescribed_speed() -> None:
     assert set(branch.stability()) == {Stability.MARGINAL}
 
 
-def test_steps_may_be_small() -> None:
-    orbit = find_orbit(TABLE_3_1, speed=SPEED)
-    family = Family(parameters=TABLE_3_1, drive=orbit.drive)
-    branch = follow(family, orbit, SPEED, low=0.9 * SPEED, high=1.1 * SPEED, greatest=2e-3)
-    assert branch.reached
-    assert len(branch) > 200
-
-
 def test_a_branch_goes_down_to_the_least_value_there_may_be() -> None:
     orbit = find_orbit(replace(TABLE_3_1, slider_coulomb_friction=0.5), speed=SPEED)
     family = Family(parameters=orbit.parameters, drive=orbit.drive, vary="slider.coulomb_friction")

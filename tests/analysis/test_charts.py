@@ -170,19 +170,6 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
 
 
 @pytest.mark.usefixtures("coarse")
-def test_points_without_an_orbit_are_reported() -> None:
-    chart = stability_chart(
-        TABLE_3_1,
-        Drive(speed=SETS["table-3.1"].crank_speed),
-        ("slider.stiffness", "slider.damping"),
-        ((150.0, 400.0), (20.0, 40.0)),
-        points=3,
-    )
-    assert any("a motion is not found at" in problem and "slider.stiffness = " in problem for problem in chart.problems)
-    assert np.ma.getmaskarray(chart.grid.largest).any()
-
-
-@pytest.mark.usefixtures("coarse")
 def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> None:
     chart = stability_chart(
         TABLE_3_1,

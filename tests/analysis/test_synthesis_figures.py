@@ -17,8 +17,8 @@ import analysis.synthesis as syn
 from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
-from analysis.files.drawings import LAYERS
 from analysis.numerics.fourier import FourierSeries
+from analysis.synthesis.result.drawing import LAYERS
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 

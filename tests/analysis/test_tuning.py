@@ -32,7 +32,7 @@ from analysis.tuning import load_tuning_case
 from analysis.tuning.cases import tuning_case_from
 from analysis.tuning.optimisation import _conditions, _unwanted, _ways
 from analysis.tuning.result import STABLE, readings
-from analysis.tuning.survey import others, survey
+from analysis.tuning.survey import other_motions, survey
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS
 from linkwork.slider_crank import published as rahman
@@ -118,7 +118,7 @@ def test_derivatives_of_the_conditions_are_those_of_differences(of):
     asked = wish(**of)
     x, step = np.zeros(2), 2e-3
     found = survey(asked, x)
-    found = survey(asked, x, others(found)[0])
+    found = survey(asked, x, other_motions(found)[0])
     conditions = {
         (type(c).__name__, round(c.value(x), 6)): c for way in _ways(found) for c in _conditions(found, list(way))
     }
@@ -286,7 +286,7 @@ def test_nothing_is_met_where_the_motion_is_unstable():
     change = {"slider.stiffness": ["0.2 N/mm", "40 N/mm"]}
     asked = wish(parameters=soft, speeds=("150 rpm", "250 rpm"), change=change, no_resonance=True)
     found = survey(asked, np.zeros(1))
-    found = survey(asked, np.zeros(1), others(found)[0])
+    found = survey(asked, np.zeros(1), other_motions(found)[0])
     ((low, high),) = found.unstable
     assert (low / RPM, high / RPM) == (pytest.approx(184.4, abs=0.1), pytest.approx(237.3, abs=0.1))
     assert not found.peaks

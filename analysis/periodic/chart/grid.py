@@ -18,7 +18,8 @@ from linkwork.errors import InputError, Interrupted
 
 from ...files import load_array, save_array
 from ...mechanisms import Parameters
-from ...numerics.codegen import cache_root, fingerprint
+from ...numerics.cache import cache_root
+from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, interruptible, over_workers
 from ...run import shown
 from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, collocation_serves, operating_point

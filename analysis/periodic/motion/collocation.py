@@ -234,13 +234,7 @@ def correct_period(section, angles, y, w, desk):
         after = y[(e + 1) % m]
         for i in range(n):
             ends[e, i] -= after[i]
-        for j in range(n):
-            for i in range(n):
-                column[i] = 0.0
-                for k in range(n):
-                    column[i] += matrices[e, i, k] * monodromy[k, j]
-            for i in range(n):
-                monodromy[i, j] = column[i]
+        _chain(matrices[e], monodromy, column)
     # carry the gaps between the elements to the end of the period
     for i in range(n):
         shift[i] = 0.0
@@ -272,6 +266,19 @@ def correct_period(section, angles, y, w, desk):
                 return np.nan
         _carry(matrices[e], ends[e], shift, column)
     return size
+
+
+@inner
+def _chain(matrix, product, column):
+    """Multiply a product of matrices by the next one from the left, in place."""
+    n = product.shape[0]
+    for j in range(n):
+        for i in range(n):
+            column[i] = 0.0
+            for k in range(n):
+                column[i] += matrix[i, k] * product[k, j]
+        for i in range(n):
+            product[i, j] = column[i]
 
 
 @inner
@@ -367,6 +374,26 @@ def spread(section, angles, start, y, w, room):
                 evaluate(section.equations[PLAIN], angle, z, section.modes, section.drive, section.p, out)
                 copy(out[n // 2 :], w[e, s])
     return DONE
+
+
+@inner
+def solve_element(section, angle, h, unit, y, w, bench, into):
+    """Solve the slopes of an element from its beginning by Newton's method; return whether they were found."""
+    f = w.shape[1]
+    before = 0.0
+    for count in range(_CORRECTIONS):
+        if not condense(section, angle, h, unit, y, w, bench, into):
+            return False
+        size = 0.0
+        for row in range(into.moves.shape[0]):
+            w[row // f, row % f] += into.moves[row, 0]
+            size = max(size, abs(h * into.moves[row, 0]) / section.scale[f + row % f])
+        if not size <= (0.5 * before if count else _FAR):
+            return False
+        before = size
+        if size <= 100.0 * section.tolerance:
+            return True
+    return False
 
 
 class Neighbour(NamedTuple):
@@ -470,29 +497,10 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
                     ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
                 w[e, row // f, row % f] += ahead
             copy(start, y[e])
-            before = 0.0
-            for count in range(_CORRECTIONS):
-                if not condense(section, angles[e], h, unit, y[e], w[e], bench, Element(end, matrix, slope, moves[e])):
-                    return DIVERGED
-                size = 0.0
-                for row in range(moves.shape[1]):
-                    w[e, row // f, row % f] += moves[e, row, 0]
-                    size = max(size, abs(h * moves[e, row, 0]) / scale[f + row % f])
-                if not size <= (0.5 * before if count else _FAR):
-                    return DIVERGED
-                before = size
-                if size <= 100.0 * section.tolerance:
-                    break
-            else:
+            if not solve_element(section, angles[e], h, unit, y[e], w[e], bench, Element(end, matrix, slope, moves[e])):
                 return DIVERGED
             tails[e] = tail(h, scale, section.along, w[e], moves[e])
-            for j in range(n):
-                for i in range(n):
-                    column[i] = 0.0
-                    for k in range(n):
-                        column[i] += matrix[i, k] * whole[k, j]
-                for i in range(n):
-                    whole[i, j] = column[i]
+            _chain(matrix, whole, column)
             _carry(matrix, slope, along, column)
             copy(end, start)
         for i in range(n):

@@ -17,7 +17,6 @@ from linkwork.parameters import field_name
 
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ...numerics.sobol import sobol
 from ...run import InductionMotor, Inputs, driven, given, started, takes_published
 from ...units import Amount, in_si
 from .flow import Flow, crank_of, flow
@@ -356,7 +355,9 @@ def starts_of(
     flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
     half = flow.size // 2
     extent = extent_of(parameters, drive, guess)
-    sequence = sobol(flow.size, count, number)
+    from scipy.stats import qmc  # takes half a second
+
+    sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
     found = np.tile(guess, (count, 1))
     found[:, :half] = extent * amplitude * np.cos(phase)

@@ -238,7 +238,6 @@ def frequency_response(
     greatest_step : float
         Greatest step of the parameter, relative to the range. Narrow resonances need small ones.
     progress : bool
-        Show a progress bar.
 
     Returns
     -------
@@ -378,6 +377,39 @@ class _Search:
                 if self.stop():
                     return
 
+    def seek(self, value: float, turns: int) -> None:
+        """Find the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
+        parameters, drive = self.family.at(value)
+        start = None
+        if not drive.speed_drive:
+            # under a torque only a known motion gives a guess of the speed
+            simple = [b for b in self.branches if b.turns == 1]
+            points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
+            start = min(points, key=lambda point: float(point[0]))[1].start
+        limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
+        for orbit in orbits_of(parameters, drive, turns=turns, start=start).orbits:
+            if self.stop() or orbit.largest > limit or self._knows(orbit, value):
+                continue
+            branch = follow_both(
+                self.family,
+                orbit,
+                value,
+                low=self.low,
+                high=self.high,
+                greatest=self.greatest,
+                stop=lambda orbit: self.stop() or (turns > 1 and orbit.largest > limit),
+            )
+            self.branches.append(branch)
+            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
+            if not (branch.reached or strayed):
+                self.problems.append(ended(branch))
+
+    def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
+        """Return whether a branch passes through a motion, begun with any of its turns."""
+        own = [branch for branch in self.branches if branch.turns == orbit.turns]
+        starts = orbit.passages()
+        return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)
+
     def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
         self.branches.append(branch)
         left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
@@ -445,58 +477,18 @@ def with_isolas(
     if places < 1:
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
     require_turns(turns)
-    search = _Isolas(response, greatest_step)
+    branches, problems = list(response.branches), list(response.problems)
     with interruptible() as interrupted, shown(progress, float(places * turns), "seeking closed branches") as show:
         values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
+        search = _Search(
+            response.family, response.low, response.high, greatest_step, lambda: bool(interrupted), branches, problems
+        )
         for number, (value, period) in enumerate(product(values, range(1, turns + 1)), start=1):
-            search.seek(value, period, lambda: bool(interrupted))
+            search.seek(value, period)
             show(float(number))
             if interrupted:
                 break
-    result = replace(response, branches=tuple(search.branches), problems=tuple(search.problems))
+    result = replace(response, branches=tuple(branches), problems=tuple(problems))
     if interrupted:
         raise ResponseInterrupted(result)
     return result
-
-
-class _Isolas:
-    """The branches of a response, with those found at further values of the parameter."""
-
-    def __init__(self, response: Response, greatest: float) -> None:
-        self.response, self.greatest = response, greatest
-        self.branches, self.problems = list(response.branches), list(response.problems)
-
-    def seek(self, value: float, turns: int, stop: Callable[[], bool]) -> None:
-        """Find the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
-        family = self.response.family
-        parameters, drive = family.at(value)
-        start = None
-        if not drive.speed_drive:
-            # under a torque there is no guess of the speed but that of a known motion
-            simple = [b for b in self.branches if b.turns == 1]
-            points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
-            start = min(points, key=lambda point: float(point[0]))[1].start
-        limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
-        for orbit in orbits_of(parameters, drive, turns=turns, start=start).orbits:
-            if stop() or orbit.largest > limit or self._knows(orbit, value):
-                continue
-            branch = follow_both(
-                family,
-                orbit,
-                value,
-                low=self.response.low,
-                high=self.response.high,
-                greatest=self.greatest,
-                stop=lambda orbit: stop() or (turns > 1 and orbit.largest > limit),
-            )
-            self.branches.append(branch)
-            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
-            if not (branch.reached or strayed):
-                self.problems.append(ended(branch))
-
-    def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Return whether a branch passes through a motion, begun with any of its turns."""
-        width = self.response.high - self.response.low
-        starts = orbit.passages()
-        own = [branch for branch in self.branches if branch.turns == orbit.turns]
-        return any(passes(branch, value, start, width) for branch in own for start in starts)

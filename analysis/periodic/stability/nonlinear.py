@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from math import exp, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -88,10 +89,10 @@ class NormalForm:
     words: str
 
 
-class Forms:
+class Forms(NamedTuple):
     """The multilinear forms of a map about its fixed point at zero, by differences.
 
-    Parameters
+    Attributes
     ----------
     of : callable
         The map, (n,) to (n,).
@@ -99,9 +100,8 @@ class Forms:
         Its derivative at zero.
     """
 
-    def __init__(self, of: Callable[[FloatArray], FloatArray], matrix: FloatArray) -> None:
-        self.of = of
-        self.matrix = matrix
+    of: Callable[[FloatArray], FloatArray]
+    matrix: FloatArray
 
     def second(self, x: FloatArray, h: float) -> FloatArray:
         """Return B(x, x)."""

@@ -13,13 +13,30 @@ from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, ParameterError
 
-from ...files import Circle, Dimension, Drawing, Line, Polyline, Text
+from ...files import Circle, Dimension, Drawing, Layer, Line, Polyline, Text
 from ..linkage.linkage import FiveBar, Linkage, SliderCrank
 from ..linkage.pivot import format_ratio
 from ..task.task import UntimedPath
 from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
 
 FloatArray = NDArray[np.float64]
+
+#: Layers in the order in which they are drawn; their colours are seen on white and on black.
+LAYERS = {
+    "poses": Layer(colour=0x808080, width=0.13e-3),
+    "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
+    "guide": Layer(colour=0x808080, width=0.25e-3),
+    "crank": Layer(colour=0xC0392B, width=0.5e-3),
+    "coupler": Layer(colour=0x1F6FB4, width=0.5e-3),
+    "rocker": Layer(colour=0x2E8B57, width=0.5e-3),
+    "slider": Layer(colour=0x8E44AD, width=0.35e-3),
+    "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
+    "target": Layer(colour=0xD35400, width=0.25e-3),
+    "plate": Layer(colour=0x202020, width=0.5e-3, foreground=True),
+    "hole": Layer(colour=0xC0392B, width=0.35e-3),
+    "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
+    "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +243,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     ]
     return Drawing(
         title=scene.title,
+        layers=LAYERS,
         lines=tuple(lines),
         circles=tuple(circles),
         polylines=tuple(polylines),
@@ -313,6 +331,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
         top = float(places.imag.min()) - 2.6 * width
     return Drawing(
         title=title,
+        layers=LAYERS,
         circles=tuple(circles),
         polylines=tuple(polylines),
         dimensions=tuple(dimensions),

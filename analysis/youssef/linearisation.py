@@ -4,10 +4,10 @@ With zeta = u/l4, ' = d/d(theta2), masses relative to m45 = m4 + m5 and forces t
 
     (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F
 
-where lambda_k^2 = k/(m45 omega^2), lambda_c = mu/(m45 omega), and M, K, F have the period of the crank. They are
-the exact derivatives of the plant's own functions at u = u' = 0, so that any mechanism will do: coupler with mass, centres
-of mass anywhere, gravity, load, preloaded spring, inclined guide. The velocity terms bring M' zeta' with them. The thesis's own
-coefficients, which lack it, are variants.
+where lambda_k^2 = k/(m45 omega^2), lambda_c = mu/(m45 omega), and M, K, F have the period of the crank. They are exact
+derivatives of the plant's functions at u = u' = 0. The coupler may therefore have mass, the centres of mass may lie anywhere,
+and there may be gravity, a load, a preloaded spring and an inclined guide. The term M' zeta' follows from the velocity terms.
+The thesis's own coefficients, which lack it, are variants.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
 from ..run import constants, takes_published, traced
 from ..units import Amount, in_si
-from . import thesis
+from . import printed_coefficients
 from .hill import PeriodicEquation
 from .premises import require_no_contact_friction
-from .thesis import Form
+from .printed_coefficients import Form
 
-#: Part of the largest amplitude that the harmonics left out of the exact coefficients have at most.
+#: Largest amplitude of a neglected harmonic of the exact coefficients, relative to the largest harmonic.
 NEGLIGIBLE = 1e-13
-#: Samples of a turn from which the exact coefficients may be computed; doubled until the harmonics have died away.
+#: Numbers of samples a turn for the exact coefficients: doubled until the harmonics have died away.
 FEWEST_SAMPLES, MOST_SAMPLES = 64, 8192
 
 
 class Variant(StrEnum):
-    """Which coefficients M, K and F are used.
+    """Source of the coefficients M, K and F.
 
     Attributes
     ----------
@@ -53,11 +53,11 @@ class Variant(StrEnum):
     FIRST_ORDER, SECOND_ORDER
         Taylor polynomials in the crank's length (sigma2 = l2/l4), harmonics up to 1 and up to 2.
     PRINTED
-        Those of (4.21) as the thesis prints them; see `analysis.youssef.thesis`.
+        Coefficients of (4.21) as the thesis prints them; see `analysis.youssef.printed_coefficients`.
     FORTRAN
-        Those of the listings of appendices 2 and 4, which halve every term in the crank's length.
+        Coefficients of the listings in appendices 2 and 4, which halve every term in the crank's length.
     APPENDIX_3
-        Those of appendix 3: the same with a sine where a cosine belongs.
+        Coefficients of appendix 3: the same with a sine where a cosine belongs.
     """
 
     EXACT = "exact"
@@ -71,17 +71,19 @@ class Variant(StrEnum):
 #: Highest power of the crank's length in a variant's Taylor polynomial.
 _POWERS: Mapping[Variant, int] = MappingProxyType({Variant.FIRST_ORDER: 1, Variant.SECOND_ORDER: 2})
 #: Coefficients of the thesis.
-_THESIS: Mapping[Variant, Callable[[thesis.Linkage], thesis.Parts]] = MappingProxyType(
-    {
-        Variant.PRINTED: thesis.printed,
-        Variant.FORTRAN: thesis.listed,
-        Variant.APPENDIX_3: partial(thesis.listed, function=sin),
-    }
+_THESIS: Mapping[Variant, Callable[[printed_coefficients.Ratios], printed_coefficients.Coefficients]] = (
+    MappingProxyType(
+        {
+            Variant.PRINTED: printed_coefficients.printed,
+            Variant.FORTRAN: printed_coefficients.listed,
+            Variant.APPENDIX_3: partial(printed_coefficients.listed, function=sin),
+        }
+    )
 )
 
 
 class Load(NamedTuple):
-    """What acts on the mechanism from outside, constant: force at the coupler point P and on the slider (N)."""
+    """Constant external forces at the coupler point P and on the slider (N)."""
 
     x: float = 0.0
     y: float = 0.0
@@ -92,12 +94,12 @@ NO_LOAD = Load()
 
 
 class Balance(NamedTuple):
-    """Slider and crank equations at given motions of the slider, crank at constant speed; arrays of the motions' shape.
+    """Unbalanced slider force and crank torque at given motions of the slider; arrays of the motions' shape.
 
     Attributes
     ----------
     force : ndarray
-        m22 u'' + b2 - Q2 - F2 (N): zero in a motion that the mechanism makes of its own.
+        m22 u'' + b2 - Q2 - F2 (N): zero where the motion satisfies the slider's equation.
     by_acceleration, by_velocity, by_position : ndarray
         Its derivatives with respect to u'' (the effective mass m22, kg), u' (N.s/m) and u (N/m).
     torque : ndarray
@@ -113,10 +115,10 @@ class Balance(NamedTuple):
 
 @cache
 def _traced() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
-    """``balance`` and ``taylor``: the slider's equation with its derivatives, for arrays of angles and motions.
+    """Compile ``balance`` and ``taylor``, the slider's equation and its derivatives for arrays of angles and motions.
 
-    ``taylor`` gives M m45, K m45 and F m45 l4 in SI at u = u' = 0: their values, first and halved second derivatives
-    with respect to the crank's length, one after the other.
+    ``taylor`` gives M m45, K m45 and F m45 l4 in SI at u = u' = 0, then their first and their halved second derivatives with
+    respect to the crank's length.
     """
     casadi = symbolic.library()
     f = traced(FIVE_BAR)
@@ -154,7 +156,9 @@ def balance(
     p: Constants,
     load: Load = NO_LOAD,
 ) -> Balance:
-    """The plant's equations with exact derivatives at motions u, u', u'' (m, m/s, m/s2) and crank angles, arrays of a shape.
+    """Evaluate the plant's equations and their exact derivatives at crank angles (rad) and motions u, u', u'' of the slider.
+
+    The four arrays (rad, m, m/s, m/s2) broadcast to one shape. The crank turns at a constant ``speed`` (rad/s).
 
     Raises
     ------
@@ -171,7 +175,7 @@ def balance(
 
 
 def _require_assembly(angle: NDArray[np.float64], position: NDArray[np.float64], p: Constants) -> None:
-    """Raise where |sin(th4 - th3)| is not above `LIMIT_SINE`."""
+    """Raise AssemblyError where |sin(th4 - th3)| is not above `LIMIT_SINE`."""
     angle, position = angle.ravel(), position.ravel()
     dx = p.l1 + position * p.ca - p.l2 * np.cos(angle)
     dy = position * p.sa - p.l2 * np.sin(angle)
@@ -197,7 +201,7 @@ _ONE = FourierSeries.constant(1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderEquation:
-    """(M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F, eq (4.21) put right; dimensionless.
+    """The dimensionless equation (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F: eq (4.21) with M' zeta' restored.
 
     Attributes
     ----------
@@ -206,11 +210,11 @@ class SliderEquation:
     spring, damping : float
         lambda_k^2 and lambda_c.
     spring_factor, damping_factor : FourierSeries
-        What multiplies them: 1, but periodic in the thesis's equation.
+        Their factors: 1, but periodic in the thesis's equation.
     mass_rate : bool
         Whether M' zeta' is kept; the thesis's equation leaves it out.
     variant : Variant
-        Where the coefficients come from.
+        Source of the coefficients.
 
     Raises
     ------
@@ -233,13 +237,13 @@ class SliderEquation:
             raise InputError(f"lambda_k^2 = {self.spring} and lambda_c = {self.damping} must be finite")
 
     def homogeneous(self) -> PeriodicEquation:
-        """The equation without F and without its spring: lambda_k^2 is the stiffness that its regions are over."""
+        """Return the equation without F and without lambda_k^2, which is the stiffness axis of its unstable regions."""
         rate = self.mass.derivative() if self.mass_rate else FourierSeries.constant(0.0)
         b = rate + self.damping * self.damping_factor
         return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)
 
     def coefficients(self) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-        """a, b, c of a zeta'' + b zeta' + c zeta = F: M, M' + lambda_c, lambda_k^2 + K, with the factors."""
+        """Return a, b, c of a zeta'' + b zeta' + c zeta = F: M, M' + lambda_c and lambda_k^2 + K, with the factors."""
         whole = self.homogeneous().stiffened(self.spring)
         return whole.a, whole.b, whole.c
 
@@ -255,7 +259,7 @@ def slider_equation(
     form: Form = Form.STABILITY,
     load: Load = NO_LOAD,
 ) -> SliderEquation:
-    """The slider's equation linearised about u = 0 at a crank speed.
+    """Linearise the slider's equation about u = 0 at a crank speed.
 
     Parameters
     ----------
@@ -265,17 +269,17 @@ def slider_equation(
         Crank speed omega (rad/s), greater than zero.
     variant : Variant
     order : int, optional
-        Highest harmonic kept of the exact coefficients; without it all down to rounding.
+        Highest harmonic of the exact coefficients; by default all that exceed rounding errors.
     form : Form
-        What becomes of the thesis's own coefficients; the others have no forms.
+        Form of the thesis's own coefficients; ignored for the other variants.
     load : Load
 
     Raises
     ------
     InputError
-        If the speed is not positive and finite, there is friction that is not viscous, an order is asked for of a variant that
-        has its own, or the mechanism comes so near its limit of assembly that the harmonics do not die away; of the
-        thesis's own coefficients also if there is a load, or what `analysis.youssef.thesis` leaves out.
+        If the speed is not positive and finite; if friction is not viscous; if an order is given for a variant that fixes
+        it; or if the mechanism comes so near its limit of assembly that the harmonics do not die away. The thesis's own
+        coefficients also exclude loads and the parameters listed in `printed_coefficients.ratios`.
     AssemblyError
         If at u = 0 the links cannot be joined over the whole turn.
     """
@@ -290,7 +294,7 @@ def slider_equation(
     if variant in _THESIS:
         if load != NO_LOAD:
             raise InputError(f"{load}: the thesis's equation has no load")
-        parts = thesis.formed(_THESIS[variant](thesis.linkage(parameters)), form)
+        parts = printed_coefficients.convert(_THESIS[variant](printed_coefficients.ratios(parameters)), form)
         return SliderEquation(
             mass=parts.inertia,
             stiffness=parts.stiffness,
@@ -317,14 +321,14 @@ def slider_equation(
 
 
 def _without_spring(p: Constants, load: Load) -> tuple[Constants, Load]:
-    """The constants without spring and damper, and the load with the spring's preload."""
+    """Remove spring, damper and friction from the constants, and add the spring's preload to the load."""
     return p._replace(k=0.0, u0=0.0, mu=0.0, fc=0.0), load._replace(slider=load.slider + p.k * p.u0)
 
 
 def _exact(
     p: Constants, speed: float, load: Load, order: int | None
 ) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) from samples, as many as it takes."""
+    """Return m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) from samples, doubled until the harmonics die away."""
     bare, loaded = _without_spring(p, load)
     samples = FEWEST_SAMPLES if order is None else max(FEWEST_SAMPLES, 4 * order)
     while True:
@@ -349,15 +353,15 @@ def _exact(
 
 
 def _tail(series: FourierSeries) -> int:
-    """Order of the last harmonic that is more than rounding."""
+    """Return the order of the last harmonic that exceeds rounding errors."""
     size = np.abs(series.amplitudes)
     return int(np.flatnonzero(size > NEGLIGIBLE * size.max())[-1]) if size.max() > 0.0 else 0
 
 
 def _taylor(p: Constants, speed: float, load: Load, order: int) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """The same as Taylor polynomials in the crank's length; no harmonic is higher than their order."""
+    """Return the quantities of `_exact` as Taylor polynomials in the crank's length, with harmonics up to their order."""
     bare, loaded = _without_spring(p, load)
-    # the function expands about no crank at all
+    # the expansion is about a crank of zero length
     bare = bare._replace(l2=0.0)
     angle = np.linspace(0.0, 2.0 * pi, 8, endpoint=False)
     _require_assembly(angle, np.zeros(8), bare)

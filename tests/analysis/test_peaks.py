@@ -1,20 +1,12 @@
-"""Own short forms of two functions of SciPy, whose import takes longer than what they do, against these."""
+"""The own short form of SciPy's `find_peaks`, whose import takes longer than a response, against SciPy's."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from scipy.signal import find_peaks
-from scipy.stats import qmc
 
 from analysis.numerics.peaks import peaks
-from analysis.numerics.sobol import sobol
-
-
-@pytest.mark.parametrize("size", range(1, 12))
-def test_sobol_is_that_of_scipy(size: int) -> None:
-    for number in (0, 3):
-        assert sobol(size, 64, number).tolist() == qmc.Sobol(size, rng=number).random(64).tolist()
 
 
 @pytest.mark.parametrize("seed", range(20))

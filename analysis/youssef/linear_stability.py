@@ -1,4 +1,4 @@
-"""Stability of u = 0 by the linear equation, as the thesis has it; that of the true motion is in `analysis.periodic`."""
+"""Stability of u = 0 by the linear equation, as in the thesis; `analysis.periodic` has the stability of the true motion."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 from ..numerics.boundaries import Test
 from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, test_of, verdict
 from ..run import takes_published
-from .equation import Load, Variant, slider_equation
 from .hill import PeriodicEquation, monodromy
+from .linearisation import Load, Variant, slider_equation
 from .premises import require_five_bar
 
 
-def load_of(drive: Drive) -> Load:
-    """The constant forces of a drive of a five-bar."""
+def constant_load(drive: Drive) -> Load:
+    """Return the constant forces of a five-bar's drive."""
     x, y, slider = (drive.forces.get(name, 0.0) for name in ("load.fx", "load.fy", "slider.force"))
     return Load(x=x, y=y, slider=slider)
 
 
 @takes_published()
 def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
-    """The slider's equation about u = 0, which is the motion only where nothing drives it: the thesis's.
+    """Return the homogeneous linear equation of the slider about u = 0, whose stability the thesis investigates.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
     if drive.speed is None:
         raise InputError("the linear equation is at constant speed: the drive is by torque")
     require_five_bar(parameters, "the linear equation")
-    equation = slider_equation(parameters, drive.speed, variant=variant, load=load_of(drive))
+    equation = slider_equation(parameters, drive.speed, variant=variant, load=constant_load(drive))
     return equation.homogeneous().stiffened(equation.spring)
 
 
@@ -45,12 +45,12 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
 def linear_verdict(
     parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
 ) -> StabilityVerdict:
-    """The verdict on u = 0 by the linear equation; that on the true motion is `PeriodicOrbit.verdict`."""
+    """Judge the stability of u = 0 by the linear equation; `PeriodicOrbit.verdict` judges the true motion."""
     return verdict(multipliers(monodromy(linear_equation(parameters, drive, variant))), tolerance)
 
 
 def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
-    """Monodromy matrix of the linear equation about u = 0 over a plane; points are remembered."""
+    """Return a function for the monodromy matrix of the linear equation over a plane of parameters; it caches points."""
 
     @cache
     def matrix(x: float, y: float) -> NDArray[np.float64]:
@@ -60,7 +60,7 @@ def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> M
 
 
 def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """`test_of` of `linear_monodromy`."""
+    """Return the stability test of a multiplier of the linear equation over a plane; see `analysis.periodic.test_of`."""
     return test_of(linear_monodromy(operation, variant=variant), multiplier)
 
 
@@ -68,9 +68,9 @@ def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant
 def linear_motion(
     parameters: FiveBarParameters, drive: Drive, names: tuple[str, str]
 ) -> Mapping[str, Callable[[Plane], Monodromy]]:
-    """The linear equation as a motion beside the true one, for `stability_chart` over parameters of these names.
+    """Return the linear equation as a second motion for a `stability_chart` over parameters of these names.
 
-    Empty where there is none: under a torque, and with friction that is not viscous.
+    The mapping is empty where no linear equation exists: for a drive by torque and with friction that is not viscous.
     """
     friction = parameters != without_friction(parameters) or any("friction" in name for name in names)
     return {"linear equation": linear_monodromy} if drive.speed_drive and not friction else {}
