@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
-from analysis.numerics.fourier import FourierSeries
 from analysis.slider import SmoothnessInterrupted, greatest_derivative, motion, slider_motion, smoothness_curve
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import (
@@ -312,20 +311,6 @@ def test_the_links_keep_their_transmission_angle() -> None:
     assert found.best.error > moved(2).best.error
 
 
-def test_weights_draw_the_motion_to_their_targets() -> None:
-    """On a part of the turn that weighs a thousand times less than the rest the error is left."""
-    even = replace(WEIGHTED.task, weights=None)
-    inside = np.asarray(WEIGHTED.task.weights) > 1.0
-    heavy = moved(2).best.linkage
-    light = slider_motion(even, PRINTED, SliderUnknown(harmonics=2)).best.linkage
-
-    def within(linkage: Linkage) -> float:
-        return float(np.sum(evaluate(even, linkage).errors[inside] ** 2))
-
-    assert within(heavy) < 0.05 * within(light)
-    assert evaluate(even, light).error < evaluate(even, heavy).error
-
-
 # Links and motion together
 
 
@@ -454,15 +439,6 @@ def test_smoothness_as_a_weight_does_the_same() -> None:
 # Manners
 
 
-def test_the_same_on_any_number_of_cores() -> None:
-    one, two = (
-        slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), search=Search(starts=6, seed=3, n_jobs=n))
-        for n in (1, 2)
-    )
-    assert [s.error for s in one.solutions] == [s.error for s in two.solutions]
-    assert one.best.linkage.pivot.series.cos.tolist() == two.best.linkage.pivot.series.cos.tolist()
-
-
 def test_a_linkage_scaled_and_moved_gets_the_same_motion() -> None:
     task = TimedPath(points=PROBLEMS["ellipse-b"].linkage.path(turn(24)) * [1.02, 0.97])
     linkage = PROBLEMS["ellipse-b"].linkage
@@ -522,12 +498,3 @@ def test_bad_input_is_named() -> None:
 def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
     with pytest.raises(InputError, match="assembly -1 is asked of a linkage that is assembled"):
         slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), constraints=(Assembly(branch=-1),))
-
-
-def test_the_motion_of_the_plant_is_the_linkages_at_the_turned_angle() -> None:
-    """u over the plant's crank angle th2 = phi + th20 is u over the rotation phi."""
-    series = FourierSeries(np.array([0.01, 0.02, -0.003]), np.array([0.0, 0.005, 0.007]))
-    for phase in (0.0, 0.7, -2.1):
-        linkage = replace(PRINTED, crank_phase=phase, pivot=SliderMotion(series=series))
-        phi = np.linspace(0.0, 2.0 * pi, 17)
-        assert motion.motion_of_plant(linkage)(phi + phase) == pytest.approx(series(phi), abs=1e-15)

@@ -1,9 +1,9 @@
 """The problems of the thesis's chapter VI (linkages in appendix 5), converted from cm and degrees to SI.
 
-`PROBLEMS` maps a name to a `PublishedProblem`. The thesis bounds nothing but the lengths of one problem, and its unlimited
-problems are ill-posed: the error goes to zero as the links grow. So each is stated here with no link longer than the longest
-of the printed linkage, and with a least transmission angle of 40 degrees; of a rocker function, whose angle is what the target
-makes it, with a crank that turns fully.
+`PROBLEMS` maps a name to a `PublishedProblem`. The thesis bounds only the lengths of one problem. Its other problems are
+ill-posed: the error tends to zero as the links grow. Each is therefore stated here with no link longer than the longest
+of the printed linkage, and with a least transmission angle of 40 degrees, or, for rocker functions, whose target fixes
+this angle, with a fully turning crank.
 
 >>> from analysis.synthesis import evaluate
 >>> problem = PROBLEMS["ellipse-a"]
@@ -32,15 +32,15 @@ CM2_PER_M2 = CM_PER_METRE**2
 DEG2_PER_RAD2 = degrees(1.0) ** 2
 #: Weight of the weighted rocker function from 60 to 260 degrees; the thesis divides its error by it.
 WEIGHT = 1000.0
-#: Crank angles at which timed paths and the rocker function are compared, and the weighted one: N is printed of the paths only.
+#: Numbers of crank angles for timed paths and the rocker function, and for the weighted one. N is printed for the paths only.
 N, WEIGHTED_N = 72, 24
-#: Points of an ellipse and of a coupler curve between which an area is taken.
+#: Points of an ellipse and of a coupler curve for the area between them.
 AREA_N = 360
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PublishedProblem:
-    """A problem of synthesis with the linkage that is printed for it.
+    """Problem of synthesis with the printed linkage.
 
     Attributes
     ----------
@@ -48,19 +48,19 @@ class PublishedProblem:
     bounds : mapping
         As `synthesize` takes them.
     constraints : tuple
-        As `synthesize` takes them; ours but for the bounds.
+        As `synthesize` takes them; ours, except for the bounds.
     printed : Linkage
-        To the digits as they stand in print.
+        With the printed digits.
     mended : Linkage, optional
-        With its misprints mended, where it has any.
+        With its misprints mended, if it has any.
     error : float or None
-        Printed for it, in ``unit``.
+        Printed error, in ``unit``.
     goal : float
-        Error that is to be reached, in ``unit``.
+        Error to be reached, in ``unit``.
     unit : str
-        Of the error.
+        Unit of the error.
     per_si : float
-        Of this unit in m2 or rad2.
+        Number of this unit in one m2 or rad2.
     source : str
     """
 
@@ -77,27 +77,28 @@ class PublishedProblem:
 
     @property
     def linkage(self) -> Linkage:
-        """The printed linkage as it must be read."""
+        """The printed linkage with its misprints mended."""
         return self.mended or self.printed
 
     def convert(self, error: float) -> float:
-        """An error from SI to the unit of print."""
+        """Convert an error from SI to the unit of print."""
         return self.per_si * error
 
 
 def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
-    """The target ellipse about (20, 15) cm with the semi-axis along x given and 5 cm along y, shape (n, 2) in m."""
+    """Return the target ellipse about (20, 15) cm, with a given semi-axis along x and 5 cm along y, shape (n, 2) in m."""
     phi = turn(n)
     return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
 
 
 def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> RockerFunction:
-    """th4* = 70 + 100 |sin(th/2)| degrees at n crank angles; weighted, `WEIGHT` from 60 to 260 degrees, both ends included.
+    """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
 
-    The thesis prints 60 < omega t < 260; its 35.0 is approached, at N = 24, only with 60 included.
+    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but its 35.0 is only approached,
+    at N = 24, with 60 included.
     """
     phi = turn(n)
-    # in whole numbers, so that the ends of the window are met
+    # in whole numbers, so that the ends of the window are exact
     within = np.array([60 * n <= 360 * k <= 260 * n for k in range(n)])
     return RockerFunction(
         angle=np.radians(70.0 + 100.0 * np.abs(np.sin(0.5 * phi))),
@@ -123,12 +124,12 @@ PACKAGING_POINTS_CM = (
 PACKAGING_OFFSET_CM = (51.0, 350.0)
 #: Least travel on the straight part, and its greatest flatness.
 PACKAGING_TRAVEL, PACKAGING_FLATNESS = 144.0 / CM_PER_METRE, 2.5 / CM_PER_METRE
-#: Crank rotation within which it is run through.
+#: Crank rotation of the straight part.
 PACKAGING_ROTATION = radians(120.0)
 
 
 def packaging_path() -> TargetPath:
-    """The ten points joined up."""
+    """Return the closed polygon of the ten points."""
     return TargetPath(points=(np.array(PACKAGING_POINTS_CM) + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
 
 
@@ -149,7 +150,7 @@ def _linkage(
     angles_deg: tuple[float, float, float],
     branch: int = 1,
 ) -> Linkage:
-    """X0, Y0; l1 ... l4; r; a1, th20, a2."""
+    """Build a linkage from X0, Y0; l1 ... l4; r; a1, th20, a2."""
     l1, l2, l3, l4 = links_cm
     a1, th20, a2 = angles_deg
     return Linkage(
@@ -179,7 +180,7 @@ _PACKAGING = _linkage((94.53, -48.55), (137.54, 36.05, 134.05, 40.06), 435.15, (
 
 
 def _capped(linkage: Linkage) -> tuple[Constraint, ...]:
-    """The usual constraints, and no link longer than this linkage's longest."""
+    """Return the usual constraints, with no link longer than the longest of this linkage."""
     return (LargestLink(length=linkage.largest_link), *USUAL)
 
 
