@@ -115,7 +115,7 @@ def simplest_mechanism(
     ----------
     task : Task
     tolerance : float
-        Bound of the quality function (m2, rad2), or of the worst error (m, rad; of a motion, angular errors count by its length).
+        Bound of the quality function (m2, rad2), or of the worst error (m, rad; angular errors of a motion times its length).
     criterion : "error" or "worst"
         The criterion; ``"worst"`` is also minimised, whatever the task's objective.
     bounds, constraints
