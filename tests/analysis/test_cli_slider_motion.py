@@ -151,7 +151,7 @@ def test_the_motion_over_the_plants_crank_angle() -> None:
     assert motion_of_plant(moved)(phi + BASE.crank_phase) == pytest.approx(MOTION.series(phi), abs=1e-15)
     assert motion_of_plant(BASE)(phi) == pytest.approx(np.zeros(17))
     with pytest.raises(InputError, match="second crank"):
-        motion_of_plant(replace(BASE, pivot=SecondCrank(length=0.01)))
+        motion_of_plant(BASE.with_pivot(SecondCrank(length=0.01)))
 
 
 def test_a_spring_takes_part_of_the_force(linkwork, tmp_path) -> None:
@@ -216,7 +216,7 @@ def test_the_strategy_stops_where_it_is_good_enough_and_says_why(linkwork, tmp_p
 
 
 def test_a_second_crank_has_no_forces(linkwork, tmp_path) -> None:
-    points = replace(BASE, pivot=SecondCrank(length=0.03, ratio=2, phase=-0.8)).path(turn(24)).tolist()
+    points = BASE.with_pivot(SecondCrank(length=0.03, ratio=2, phase=-0.8)).path(turn(24)).tolist()
     strategy = {"tolerance": "0.01 mm", "harmonics": 1, "ratios": [2], "starts": 4}
     case = tables(strategy=strategy, slider={}, drive={"speed": "60 rpm"})
     case["task"]["points"] = points

@@ -94,7 +94,7 @@ def test_a_slider_where_a_four_bar_is_not_enough() -> None:
 def test_gears_where_a_slider_is_not_enough() -> None:
     """The path of a five-bar with gears 2:1, the second crank's stroke wider than the slider's."""
     gear = SecondCrank(length=0.03, ratio=2, phase=-0.8)
-    found = strategy(replace(BASE, pivot=gear), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE, 0.01))
+    found = strategy(BASE.with_pivot(gear), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE, 0.01))
     assert [step.mechanism for step in found.steps] == [
         "four-bar",
         "four-bar with a moved slider, 1 harmonic",
@@ -112,7 +112,7 @@ def test_gears_where_a_slider_is_not_enough() -> None:
 def test_a_second_crank_that_turns_by_itself_is_the_last_resort() -> None:
     psi = FourierSeries(np.array([0.0, 0.5]), np.array([0.0, -0.4]))
     arm = SecondCrank(length=0.03, ratio=2, phase=0.9, series=psi)
-    found = strategy(replace(BASE, pivot=arm), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE))
+    found = strategy(BASE.with_pivot(arm), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE))
     assert [step.mechanism for step in found.steps][-2:] == [
         "five-bar, second crank geared 2:1",
         "five-bar, second crank turned independently, 1 harmonic",

@@ -533,7 +533,7 @@ class TestRefusals:
 
     def test_a_second_crank(self) -> None:
         with pytest.raises(ParameterError, match="pivot"):
-            variational_motion(replace(WEIGHTED_ROCKER, pivot=SecondCrank(length=0.1)), [0.0], [1.0])
+            variational_motion(WEIGHTED_ROCKER.with_pivot(SecondCrank(length=0.1)), [0.0], [1.0])
 
     def test_too_many_harmonics(self) -> None:
         motion = variational_motion(WEIGHTED_ROCKER, TURN_24, rocker_target(TURN_24))
