@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
-from typing import Any, Literal
+from typing import Any
 
 from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
@@ -13,9 +13,6 @@ from linkwork.mechanism import PARTS, Channel, Mechanism
 from linkwork.parameters import Rules, fmi_name
 from linkwork.slider_crank.parameters import SliderCrankParameters as SliderCrankParameters
 from linkwork.variables import ROLES, UNITS, status_variables
-
-#: Kinds of linkages that a synthesis searches; not each is a mechanism that can be run.
-Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]
 
 STATUS_NAMES = tuple(v.name for v in status_variables())
 

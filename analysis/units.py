@@ -6,22 +6,22 @@ import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from inspect import signature
-from math import inf, isfinite, pi
+from math import inf, isfinite
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 from linkwork.errors import ParameterError
+from linkwork.units import CM_PER_METRE as CM_PER_METRE
+from linkwork.units import INCH as INCH
+from linkwork.units import RAD_S_PER_RPM as RAD_S_PER_RPM
 
-#: A number in SI, or a text with its unit such as "420 rpm", of which `in_si` makes a float; also an array or a list of them.
+#: A number in SI, or a text with its unit such as "420 rpm", which `in_si` converts to a float; also an array or list of them.
 Amount = Any
-#: Unit of an argument, or of the entries of a mapping by their names, or a function that returns these.
+#: Unit of an argument, units of a mapping's entries by name, or a function that returns these.
 Units = str | Mapping[str, str] | Callable[[], Mapping[str, str]]
 
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 
-RAD_S_PER_RPM = pi / 30.0
-CM_PER_METRE = 1e2
-INCH = 0.0254
 #: Units of length (m).
 LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})
 
@@ -37,7 +37,7 @@ _PINT = {
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A number in SI as a text that `quantity` reads back, every digit kept."""
+    """Write a number in SI as a text that `quantity` reads back exactly."""
     return f"{float(value)!r} {_PINT.get(unit, unit)}"
 
 
@@ -49,7 +49,7 @@ def _registry() -> Any:
 
 
 def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> float:
-    """A number in SI from a number or a text with a unit.
+    """Convert a number or a text with a unit to a number in SI.
 
     Parameters
     ----------
@@ -58,15 +58,15 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     unit : str
         SI unit of the contract, such as ``N.s/m``.
     name : str
-        What it is, for the error.
+        Name of the quantity, for the error.
     bare : str, optional
-        Unit of numbers that come without one, such as ``mm``; by default SI.
+        Unit of numbers without a unit, such as ``mm``; by default SI.
 
     Raises
     ------
     ParameterError
         If it is neither, the unit is missing or has another dimension, or the number is not finite. Hertz is refused for
-        a speed: a cycle is not a radian.
+        an angular speed, as a cycle is not a radian.
     """
     spelled = _PINT.get(unit, unit)
     wanted = f"be a number in {unit}" if unit == "1" else f"be a number in {unit}, or a text with a unit of that kind"
@@ -75,7 +75,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     if isinstance(value, str):
         if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):
             raise ParameterError(name, value, "be in rad/s or rpm: in Hz it would be ambiguous by a factor of 2 pi")
-        number = _converted(value, unit, spelled, name, wanted)
+        number = _convert(value, unit, spelled, name, wanted)
     else:
         try:
             number = float(value)
@@ -89,15 +89,15 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
 
 
 def si(value: Any, unit: Units, name: str) -> Any:
-    """A value with its texts made numbers in SI, also those in lists, tuples and mappings; what is no text stays as it is.
+    """Convert the texts in a value to numbers in SI, also inside lists, tuples and mappings; other values stay.
 
     Parameters
     ----------
     value : object
     unit : str, mapping or function
-        See `Units`. Entries of a mapping that have no unit stay as they are, for what reads them to refuse.
+        See `Units`. Entries of a mapping whose names have no unit stay, for the caller to refuse.
     name : str
-        What it is, for the error.
+        Name of the value, for the error.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def si(value: Any, unit: Units, name: str) -> Any:
 
 
 def in_si(**units: Units) -> Callable[[_Callable], _Callable]:
-    """Let arguments of a function, or fields of a dataclass, be texts with a unit: it gets them in SI, see `si`.
+    """Return a decorator that converts arguments of a function, or fields of a dataclass, to SI; see `si`.
 
     >>> @in_si(speed="rad/s")
     ... def turns(speed: Amount, time: float) -> float:
@@ -131,7 +131,7 @@ def in_si(**units: Units) -> Callable[[_Callable], _Callable]:
             made.__init__ = decorate(made.__init__)  # type: ignore[misc]
             return made
         names = list(signature(made).parameters)
-        # those of **options go by their names alone
+        # arguments in **options have no place
         places = {names.index(name): name for name in units if name in names}
 
         @wraps(made)
@@ -151,19 +151,19 @@ def in_si(**units: Units) -> Callable[[_Callable], _Callable]:
     return decorate
 
 
-#: A quantity in text: a number with a decimal point, then a product of units, each with one small exponent at most. Nothing
-#: else reaches pint, which would take "1,5 mm" for 15 mm, "1 500 mm" for 500 mm, and compute 9**9**9.
+#: A quantity as text: a number with a decimal point, then a product of units, each with at most one small exponent. No other
+#: text reaches pint, which would read "1,5 mm" as 15 mm and "1 500 mm" as 500 mm, and compute 9**9**9.
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"
 _FACTOR = r"(?:[^\W\d_]+|[°%])(?:\s*(?:\*\*|\^)\s*-?[0-9]|[²³]|-?[0-9])?"
 _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·.]\s*|\s+){_FACTOR})*"
 _GRAMMAR = re.compile(rf"\s*({_NUMBER})\s*({_PRODUCT}(?:\s*/\s*\({_PRODUCT}\))?)?\s*")
-#: Longest text that is looked at.
+#: Longest text that is read.
 _LONGEST = 100
-_PLAIN = "it is read as a number with a decimal point, without spaces or separators in it, and a unit"
+_PLAIN = "write a number with a decimal point, without spaces or separators in it, and a unit"
 
 
-def _converted(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
-    """A text with a unit in SI, by pint."""
+def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
+    """Convert a text with a unit to SI by pint."""
     match = _GRAMMAR.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."

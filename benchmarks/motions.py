@@ -16,13 +16,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from analysis.mechanisms import mechanism_of
 from analysis.periodic import Drive, OrbitError, natural_frequency, orbit_of, orbits_of, scale_of
-from analysis.periodic.motion.discretisation import section_of
+from analysis.periodic.motion.discretisation import operating_point
 from analysis.periodic.motion.drive import starts_of
 from analysis.periodic.motion.flow import PLAIN
-from analysis.periodic.motion.kernels import period
-from analysis.periodic.motion.search import passages
+from analysis.periodic.motion.kernels import segments
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import LinkworkError
 from linkwork.five_bar.published import SETS
@@ -54,32 +52,32 @@ def drawn(random: np.random.Generator):
 
 def ends_of(parameters, drive):
     """Where runs come to rest: the turns after which they repeat themselves, and y there."""
-    flow, guess = drive.flow(mechanism_of(parameters)), np.zeros(2)
-    scale = scale_of(parameters, drive, guess)
-    section = section_of(parameters, drive, guess, PLAIN, tolerance=1e-8)
+    point, guess = operating_point(parameters, drive), np.zeros(2)
+    scale, turn = point.scale(guess), np.array([0.0, point.flow.period])
+    section = point.section(guess, PLAIN, tolerance=1e-8)
     for start in (guess, *starts_of(parameters, drive, guess, STARTS, 5)):
-        z, last, carry = start.copy(), np.full((MOST + 1, 2), np.inf), np.array([0.1, 0.0])
+        z, last = start[None].copy(), np.full((MOST + 1, 2), np.inf)
         for _ in range(TURNS):
-            if period(section, flow.period, z, carry) != 0:
+            if segments(section, turn, z.copy(), z) != 0:
                 break
             last = np.vstack([z, last[:-1]])
         else:
             away = np.abs((last[1:] - last[0]) / scale).max(axis=1)
             if (away < SETTLED).any():
-                yield int(np.argmax(away < SETTLED)) + 1, z
+                yield int(np.argmax(away < SETTLED)) + 1, z[0]
 
 
 def compare(parameters, drive) -> tuple[Counter, int]:
     """Runs by the turns of the motion they end in, and how many of these motions the finder has not."""
     scale, seen, missed = scale_of(parameters, drive, np.zeros(2)), Counter(), 0
     known = {turns: orbits_of(parameters, drive, turns=turns).orbits for turns in range(1, MOST + 1)}
-    starts = {turns: np.array([p for o in found for p in passages(o)]) for turns, found in known.items()}
+    starts = {turns: np.array([p for o in found for p in o.passages()]) for turns, found in known.items()}
     for turns, end in ends_of(parameters, drive):
         try:
             orbit = orbit_of(parameters, drive, turns=turns, start=end, settle=False)
         except OrbitError:
             continue
-        passed = np.abs((passages(orbit) - orbit.start) / scale).max(axis=1)
+        passed = np.abs((orbit.passages() - orbit.start) / scale).max(axis=1)
         least = next((n for n in range(1, turns) if passed[n] < SAME), turns)
         seen[least] += 1
         near = len(starts[least]) and np.abs((starts[least] - orbit.start) / scale).max(axis=1).min() < SAME

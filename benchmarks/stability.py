@@ -24,9 +24,10 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 
 from analysis.periodic import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive, Plane, grid, plane
+from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 POINTS = 200
 #: Rows of the sample, and how many points of each.

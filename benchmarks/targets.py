@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.studies.youssef.problems import PACKAGING_POINTS_CM, PROBLEMS
 from analysis.synthesis import FullTurn, LargestLink, RockerFunction, TargetPath, Task, TimedPath, UntimedPath, turn
-from analysis.synthesis.constraints import USUAL, Constraint
-from analysis.synthesis.published import PACKAGING_POINTS_CM, PROBLEMS
-from analysis.synthesis.targets import along, ring
+from analysis.synthesis.task.constraint import USUAL, Constraint
+from analysis.synthesis.task.target import along, ring
 
 FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]

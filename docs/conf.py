@@ -56,13 +56,13 @@ LINKS = (
 
 
 def relink(text: list[str]) -> None:
-    """Let the links of a page that is read lead to the site's pages."""
+    """Redirect the links of a source page to the pages of the site."""
     for pattern, replacement in LINKS:
         text[0] = re.sub(pattern, replacement, text[0])
 
 
 def write_formula(translator: Any, node: Any) -> None:
-    """MathML: every browser draws it, without a script."""
+    """Write a formula as MathML, which every browser draws without a script."""
     from docutils import nodes
 
     display = "inline" if isinstance(node, nodes.math) else "block"
@@ -71,7 +71,10 @@ def write_formula(translator: Any, node: Any) -> None:
 
 
 def list_commands(app: Any, name: str, text: list[str]) -> None:
-    """Put every command with its options on their page; the groups import theirs only when they are called."""
+    """Put every command with its options on the page of commands.
+
+    Groups of commands import their members only when called, so that Sphinx cannot list them by itself.
+    """
     if name != "reference/commands":
         return
     for command, (module, _) in COMMANDS.items():
@@ -80,14 +83,14 @@ def list_commands(app: Any, name: str, text: list[str]) -> None:
 
 
 def open_in_the_studio(app: Any, name: str, text: list[str]) -> None:
-    """Put links to what a page is about under its heading."""
+    """Put links that open a page's mechanisms in the studio under its heading."""
     heading, line, rest = text[0].partition("\n")
     if "/" not in name and (found := openings.links(name, text[0])):
         text[0] = f"{heading}{line}\n{found}\n{rest}"
 
 
 def setup(app: Any) -> None:
-    """Connect what this file adds to Sphinx."""
+    """Connect the functions of this file to Sphinx."""
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))
     app.connect("source-read", lambda app, name, text: relink(text))
     app.connect("source-read", list_commands)

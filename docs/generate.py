@@ -1,11 +1,12 @@
-"""Write what the documentation repeats from the code, and draw its pictures.
+"""Write the tables that the documentation repeats from the code, and draw its pictures.
 
 python docs/generate.py             fills the tables between the markers of docs/*.md
-python docs/generate.py --check     writes nothing, and fails where a table is out of date
+python docs/generate.py --check     writes nothing, and fails if a table is out of date
 python docs/generate.py --figures   fills the pages of the theses too, and draws the pictures (about an hour)
 python docs/generate.py --figures 3 R   fills only chapter III of Youssef's thesis, and Rahman's
 
-A table stands between the lines ``<!-- TABLE OF: begin -->`` and ``<!-- TABLE OF: end -->``; `TABLES` has them by name.
+A table stands between the lines ``<!-- TABLE SUBJECT: begin -->`` and ``<!-- TABLE SUBJECT: end -->``. `TABLES` has the
+function of each TABLE.
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ def _range(variable: Variable) -> str:
 
 
 def _markdown(headings: str, rows: Iterator[tuple[str, ...]]) -> str:
-    """A table whose headings are given with their bars."""
+    """Return a table; the headings come with their bars."""
     return "\n".join([headings, re.sub(r"[^|]+", " --- ", headings), *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def symbols(of: str, page: str) -> str:
-    """The FMI variables of a mechanism with their symbols in the thesis and their identifiers in Python."""
+    """Return the FMI variables of a mechanism with their symbols in the thesis and their identifiers in Python."""
     mechanism = MECHANISMS[of]
 
     def identifier(variable: Variable) -> str:
@@ -77,7 +78,7 @@ def symbols(of: str, page: str) -> str:
 
 
 def figures(of: str, page: str) -> str:
-    """The studies of one of `CHAPTERS`, computed, with their verdicts."""
+    """Compute the studies of one of `CHAPTERS` and return them with their verdicts."""
     from analysis.studies import ENTRIES, is_figure
     from analysis.studies.page import figures
 
@@ -88,14 +89,14 @@ def figures(of: str, page: str) -> str:
 
 
 def count(of: str, page: str) -> str:
-    """How many of the verdicts on the page hold."""
+    """Return a sentence with the number of verdicts on the page that hold."""
     from analysis.studies.page import count
 
     return count(page)
 
 
 def probe(of: str, page: str) -> str:
-    """What `linkwork probe` checks, or the forbidden calls that it makes."""
+    """Return the checks of `linkwork probe`, or its forbidden calls."""
     from analysis.probe import QUESTIONABLE, WRONG
     from analysis.probe.checks import CHECKS
     from analysis.probe.faults import ACCEPT, FAULTS
@@ -119,22 +120,22 @@ def probe(of: str, page: str) -> str:
 
 
 def race(of: str, page: str) -> str:
-    """A table of the searches' results that docs/race.csv has."""
+    """Return a table of the searches' results in docs/race.csv."""
     from benchmarks.race import markdown, read
 
     return markdown(read(HERE / "race.csv"), of)
 
 
 def crossing(of: str, page: str) -> str:
-    """The table of docs/crossing.csv."""
+    """Return the table of docs/crossing.csv."""
     from benchmarks.crossing import markdown, read
 
     return markdown(read(HERE / "crossing.csv"))
 
 
-#: The parts of the pages of the theses: chapters of Youssef's, Rahman's, and the studies of ours.
+#: The parts of the pages of the theses: chapters of Youssef's, Rahman's figures, and our own studies.
 CHAPTERS = (*"345678", "R", "ours")
-#: What fills a table, from what it is of and the text of its page; `figures` takes long.
+#: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
     "crossing": crossing,
@@ -142,13 +143,13 @@ TABLES: dict[str, Callable[[str, str], str]] = {
 
 
 def filled(page: str, *, chapters: Container[str] = ()) -> str:
-    """The text of a page with its tables brought up to date; the figures only of the ``chapters``, since they take long."""
+    """Return the text of a page with its tables brought up to date; figures only of ``chapters``, since they take long."""
 
     def fill(match: re.Match[str]) -> str:
         table, of = match.groups()
         return f"<!-- {table} {of}: begin -->\n{TABLES[table](of, page)}\n<!-- {table} {of}: end -->"
 
-    # first the figures, which the count is of
+    # first the figures, whose verdicts are counted
     page = MARKED.sub(lambda match: fill(match) if match[1] == "figures" and match[2] in chapters else match[0], page)
     return MARKED.sub(lambda match: match[0] if match[1] == "figures" else fill(match), page)
 
@@ -158,12 +159,13 @@ Picture = tuple[str, "Figure", int]
 
 
 def study_pictures() -> Iterator[Picture]:
-    """The still of README.md, and the pictures of rig-2.md and coexisting-motions.md, some of which are figures of the thesis."""
+    """Draw the still of README.md, and the pictures of rig-2.md and coexisting-motions.md."""
     from analysis import figures as draw
     from analysis.periodic import frequency_response
     from analysis.studies import load
+    from analysis.units import RAD_S_PER_RPM
     from analysis.youssef import approximations
-    from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+    from linkwork.five_bar.published import SETS
 
     for name, number in (
         ("linkage", "linkage"),
@@ -183,7 +185,7 @@ def study_pictures() -> Iterator[Picture]:
 
 
 def hand_drawn_pictures() -> Iterator[Picture]:
-    """The pictures of docs/hand-drawn-to-fmu.md."""
+    """Draw the pictures of docs/hand-drawn-to-fmu.md."""
     import numpy as np
 
     from analysis import figures as draw
@@ -220,7 +222,7 @@ def hand_drawn_pictures() -> Iterator[Picture]:
 
 
 def closed_form_pictures() -> Iterator[Picture]:
-    """The pictures of docs/closed-form.md, from the examples."""
+    """Draw the pictures of docs/closed-form.md, from the examples."""
     from analysis.figures import plot
     from analysis.synthesis import guidance, load_synthesis_case
 
@@ -230,14 +232,14 @@ def closed_form_pictures() -> Iterator[Picture]:
 
 
 def race_pictures() -> Iterator[Picture]:
-    """The picture of docs/synthesis-race.md."""
+    """Draw the picture of docs/synthesis-race.md."""
     from benchmarks.race import picture, read
 
     yield "race", picture(read(HERE / "race.csv")), 100
 
 
 def slider_crank_pictures() -> Iterator[Picture]:
-    """The pictures of docs/slider-crank.md."""
+    """Draw the pictures of docs/slider-crank.md."""
     from dataclasses import replace
     from math import radians
 
@@ -245,7 +247,8 @@ def slider_crank_pictures() -> Iterator[Picture]:
 
     from analysis.figures import plot_mechanism, plot_range, plot_tolerances
     from analysis.slider_crank import Tolerance, force_turn, monte_carlo
-    from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
+    from analysis.units import INCH
+    from linkwork.slider_crank.published import CRANK_SPEED, SETS, parameters
 
     case = SETS["rahman-a4-10-s1-3.5"]
     shift = case.initial.shift_position

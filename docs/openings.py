@@ -1,7 +1,7 @@
-"""What of the documentation opens in the studio: published sets, examples that are run, and what was found for the others.
+"""Mechanisms of the documentation that open in the studio: published sets, examples, and results of the example tasks.
 
-python docs/openings.py              finds the answers to the examples that are tasks anew, for openings.json (minutes)
-python docs/openings.py ellipse ...  those of these examples alone
+python docs/openings.py              solves all examples that are tasks, for openings.json (minutes)
+python docs/openings.py ellipse ...  solves these examples only
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from analysis.studio import address_of, state_of
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent / "examples"
-#: The first answer to each example that is a task, as a state of the page.
+#: The first result of each example task, as a state of the page.
 ANSWERS = HERE / "openings.json"
-#: Asks a search for mechanisms of the FMUs alone.
+#: Options that restrict a search to mechanisms of the FMUs.
 OF_THE_FMUS = ("--set", 'search.kinds=["four-bar", "slider-crank"]')
-#: Published sets that pages are about; examples are on the pages that name them.
+#: Published sets by page; examples appear on the pages that name them.
 SETS = {
     "fmu": ("table-3.1", "rahman-a4-10-s1-3.5"),
     "nomenclature": ("table-3.1", "rahman-a4-10-s1-3.5"),
@@ -37,20 +37,20 @@ SETS = {
     "slider-crank": ("rahman-ideal", "rahman-a4-10-s1-3.5", "rahman-a4-20-s1-3.5"),
     "youssef": ("table-3.1", "appendix-1", "rig-1-spring-a", "rig-1-spring-b", "rig-2-spring-c", "rig-2-spring-d"),
 }
-#: What changes over time or angle in examples that are run, and what it is where they open: the page has constant inputs. Of a
-#: torsion bar the mean of its torque (N.m).
+#: Constant inputs that replace those that vary over time or angle in an example, since the page has constant inputs. A torsion
+#: bar is replaced by its mean torque (N.m).
 CONSTANT = {
     "run-up": {"force": 0.0},
     "slider-crank": {"axial.speed": 0.0, "load": 0.0},
     "torsion-bar": {"drive.torque": 5.0},
 }
-#: The page that has them all.
+#: The page that lists all of them.
 ALL = "studio"
 
 
 @cache
 def states() -> dict[str, dict[str, Any]]:
-    """All that opens, by the name of a published set or of an example."""
+    """Return all states that open, by the name of a published set or of an example."""
     found = {name: state_of(case_from({"published": name}, folder=EXAMPLES, title=name)) for name in PUBLISHED}
     found |= json.loads(ANSWERS.read_text(encoding="utf-8"))
     for path in filter(is_run, sorted(EXAMPLES.glob("*.toml"))):
@@ -62,12 +62,12 @@ def states() -> dict[str, dict[str, Any]]:
 
 
 def is_run(path: Path) -> bool:
-    """Whether an example is a case of `linkwork run`, and no task."""
+    """Return whether an example is a case of `linkwork run` and not a task."""
     return not re.search(r"^\[(task|tune)\]", path.read_text(encoding="utf-8"), re.MULTILINE)
 
 
 def named(page: str, text: str) -> list[str]:
-    """What a page has: the sets that it is about and the examples that it names, in its order."""
+    """Return the sets of a page and the examples that it names, in its order."""
     if page == ALL:
         return list(states())
     examples = dict.fromkeys(re.findall(r"examples/([\w-]+)\.toml", text))
@@ -75,7 +75,7 @@ def named(page: str, text: str) -> list[str]:
 
 
 def links(page: str, text: str) -> str:
-    """A line of HTML with all that opens, or none."""
+    """Return a line of HTML with links to all states of a page, or an empty text."""
     known = states()
     parts = [
         f'<a href="{escape(address_of(known[name], "page.html"))}" title="{escape(known[name]["title"])}">{name}</a>'
@@ -85,7 +85,7 @@ def links(page: str, text: str) -> str:
 
 
 def _answer(path: Path, folder: Path) -> dict[str, Any]:
-    """The first answer to a task that is a mechanism of the FMUs; where a slider is moved, with the slider let go."""
+    """Solve a task and return its first result that is a mechanism of the FMUs; a moved slider is released."""
     text = path.read_text(encoding="utf-8")
     command = "tune" if "[tune]" in text else "slider-motion" if "[tracking]" in text else "synthesize"
     words = [sys.executable, "-m", "analysis.cli", command, str(path), "--out", str(folder)]
@@ -103,7 +103,7 @@ def _cases(folder: Path) -> list[Path]:
 
 
 def main(names: list[str]) -> None:
-    """Find answers anew."""
+    """Solve the tasks and write openings.json."""
     found = json.loads(ANSWERS.read_text(encoding="utf-8")) if names else {}
     for path in sorted(EXAMPLES.glob("*.toml")):
         if not is_run(path) and path.stem in (names or [path.stem]):

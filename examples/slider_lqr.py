@@ -35,8 +35,9 @@ from analysis.linear import (
     predict_loop,
     settled_motion,
 )
+from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 
 RIG_2 = SETS["rig-2-spring-c"].parameters
 PERIOD = 1e-3

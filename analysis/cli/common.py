@@ -17,6 +17,7 @@ from rich.text import Text
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
+from ..libraries import MissingLibraryError, require
 from .codes import CHECK_FAILED as CHECK_FAILED
 from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
@@ -138,12 +139,10 @@ def _join(context: click.Context, parameter: click.Parameter, address: str | Non
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Inside, work goes over the workers of a Dask cluster."""
+    _check_libraries("distributed")
     import joblib
+    from distributed import Client
 
-    try:
-        from distributed import Client
-    except ImportError:
-        raise click.BadParameter("Dask is not installed: python -m pip install 'linkwork[dask]'") from None
     try:
         client: Any = Client(address, timeout=_PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
@@ -188,14 +187,17 @@ def set_option(example: str) -> Callable[..., Any]:
     )
 
 
+def _check_libraries(*names: str) -> None:
+    """Check that libraries are installed, as a callback of an option must."""
+    try:
+        require(*names)
+    except MissingLibraryError as error:
+        raise click.BadParameter(str(error)) from None
+
+
 def _require_plotly(context: click.Context, parameter: click.Parameter, value: bool) -> bool:
     if value:
-        from ..figures import PlotlyMissingError, require_plotly
-
-        try:
-            require_plotly()
-        except PlotlyMissingError as error:
-            raise click.BadParameter(str(error)) from None
+        _check_libraries("plotly")
     return value
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from ..libraries import MissingLibraryError
 from .common import console, handled, print_error, say
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -65,7 +66,7 @@ def build(
             made = f", {' '.join(for_platforms)}" if for_platforms else ""
             say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
     if not kinds and set(kinds_here()) != set(KINDS):
-        print_error("note: no native FMUs, which Zig compiles: it comes with pip install 'linkwork[native]'")
+        print_error(f"note: no native FMUs, which Zig compiles: {MissingLibraryError('ziglang')}")
 
 
 @click.command()

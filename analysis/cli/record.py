@@ -44,7 +44,7 @@ def decrement(
     """
     from .. import figures
     from ..files import read_columns, save_figure, write_csv
-    from ..linear import LEAST_SWING, fit_decay
+    from ..numerics.decay import LEAST_SWING, fit_decay
 
     units = (("time_unit", "s", "--time-unit"), ("unit", "m", "--unit"))
     second, metre = (quantity(f"1 {options[name]}", si, option) for name, si, option in units)

@@ -367,7 +367,7 @@ def info(what: str | None) -> None:
     """
     from ..files import read_tables
     from ..mechanisms import MECHANISMS
-    from ..numerics.codegen import cache_root
+    from ..numerics.cache import cache_root
     from ..run import load_case, load_parameters
 
     if what is None:

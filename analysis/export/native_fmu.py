@@ -5,7 +5,6 @@ Model exchange and co-simulation in one archive, FMI 2.0 or 3.0. The sources tra
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import platform as machine
 import struct
@@ -20,8 +19,9 @@ from typing import NamedTuple
 from linkwork.mechanism import Mechanism
 
 from ..files import unknown_name
+from ..libraries import require
 from ..mechanisms import check
-from ..numerics.codegen import code_folder
+from ..numerics.cache import code_folder
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals
@@ -56,7 +56,7 @@ OPTIONS = (
     "-ffunction-sections", "-Wl,--gc-sections", "-s",
 )  # fmt: skip
 
-_SHELL = ("face.h", "model.h", "plant.h", "plant.c", "instance.h", "instance.c", "saved.c")
+_SHELL = ("face.h", "model.h", "plant.h", "step.h", "plant.c", "instance.h", "instance.c", "saved.c")
 _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
@@ -166,10 +166,11 @@ def compile_library(
     Raises
     ------
     BuildError
-        With what the compiler printed, if it failed, or if it is not installed.
+        With what the compiler printed, if it failed.
+    MissingLibraryError
+        If Zig is not installed.
     """
-    if importlib.util.find_spec("ziglang") is None:
-        raise BuildError("native FMUs are compiled by Zig, which is not installed: pip install 'linkwork[native]'")
+    require("ziglang")
     cache = code_folder("zig")
     known = cache / f"{target}.known"
     if not known.is_file():

@@ -14,8 +14,6 @@ from .dispatch import picture as picture
 from .dispatch import plot as plot
 from .guidance import plot_guidance as plot_guidance
 from .guidance import plot_guidance_map as plot_guidance_map
-from .html import PlotlyMissingError as PlotlyMissingError
-from .html import require_plotly as require_plotly
 from .html import to_html as to_html
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage

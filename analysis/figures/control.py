@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-import control
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import ArrayLike, NDArray
 
+from ..libraries import lazy
 from ..linear import Design, LinearModel
 from .dispatch import plot
 from .style import BOLD, COLOURS, LINE, LINES, REFERENCE, finish, legend_above, styled, write_title
+
+if TYPE_CHECKING:
+    import control
+else:
+    control = lazy("control")
 
 FloatArray: TypeAlias = NDArray[np.float64]
 

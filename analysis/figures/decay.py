@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..linear import Decay
+from ..numerics.decay import Decay
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 from .style import COLOURS, Figure

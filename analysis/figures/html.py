@@ -9,7 +9,6 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from functools import singledispatch
 from html import escape
-from importlib.util import find_spec
 from math import ceil, isfinite, log10
 from typing import Any
 
@@ -17,8 +16,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
-from linkwork.errors import LinkworkError
-
+from ..libraries import require
 from .charts import HeatMap, colours_of, keys_of
 from .curves import Curve, Panel, Picture, shades_by_label
 from .dispatch import picture
@@ -42,19 +40,6 @@ _PAGE = """<!DOCTYPE html>
 """
 
 
-class PlotlyMissingError(LinkworkError, ImportError):
-    """Pages with values under the pointer need Plotly, which is not installed."""
-
-    def __init__(self) -> None:
-        super().__init__("Plotly is not installed: python -m pip install 'linkwork[html]'")
-
-
-def require_plotly() -> None:
-    """Raise `PlotlyMissingError` unless `to_html` can write pages."""
-    if find_spec("plotly") is None:
-        raise PlotlyMissingError
-
-
 def to_html(result: Any, *details: Any, **options: Any) -> str:
     """The picture of a result as a page of HTML with values under the pointer.
 
@@ -72,12 +57,12 @@ def to_html(result: Any, *details: Any, **options: Any) -> str:
 
     Raises
     ------
-    PlotlyMissingError
+    MissingLibraryError
         If Plotly is not installed.
     DrawingError
         If the picture of this type has no description, or there is none.
     """
-    require_plotly()
+    require("plotly")
     from plotly.offline import get_plotlyjs
 
     described = result if isinstance(result, Picture) else picture(result, *details, **options)

@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from shapely import LineString, distance
 from shapely import points as make_points
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ..periodic import (
     FORCE,
     TOLERANCE,
@@ -29,6 +27,7 @@ from ..periodic import (
     fold_jumps,
     ranges_to_avoid,
 )
+from ..units import CM_PER_METRE, RAD_S_PER_RPM
 from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
 from .style import COLOURS, LINE, THIN

@@ -28,11 +28,11 @@ from linkwork.errors import InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 
 from ..run import Trajectory
 from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
+from ..units import INCH
 from .animation import check_frames, gif
 from .dispatch import animate, draw_mechanism, last_samples, plot
 from .solids import ball, box, paint, tube

@@ -2,6 +2,7 @@ from .curves import read_points as read_points
 from .drawings import Circle as Circle
 from .drawings import Dimension as Dimension
 from .drawings import Drawing as Drawing
+from .drawings import Layer as Layer
 from .drawings import Line as Line
 from .drawings import Polyline as Polyline
 from .drawings import Text as Text

@@ -1,13 +1,13 @@
-"""A linkage and its curves drawn to scale, as plain lines, circles, polylines and texts on named layers, for CAD.
+"""Drawings to scale of plain lines, circles, polylines, dimensions and texts on named layers, written as DXF or SVG.
 
-A `Drawing` is in m with y upwards and knows no mechanics; it may have dimensions. `to_dxf` and `to_svg` write it in a unit of
-length; the same drawing gives the same text, byte for byte.
+A `Drawing` is in m with y upwards and knows no mechanics. `to_dxf` and `to_svg` write it in a unit of length; the same drawing
+gives the same text, byte for byte.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from io import StringIO
 from math import atan2, cos, degrees, hypot, isfinite, radians, sin
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, ParameterError
 
+from ..libraries import require
 from ..units import LENGTHS
 from .outputs import output, write_text
 from .paths import ending_of
@@ -27,12 +28,22 @@ from .reader import unknown_name
 
 Point = tuple[float, float]
 
+#: Units of length, by their code in the DXF variable $INSUNITS.
+UNITS = {"mm": 4, "cm": 5, "m": 6, "in": 1}
+#: Units of length that SVG has.
+SVG_UNITS = ("mm", "cm", "in")
+_NO_GUID = "{00000000-0000-0000-0000-000000000000}"
+#: AutoCAD's colour that contrasts with the background.
+_FOREGROUND = 7
+#: Margin of an SVG around the drawing, as a share of its larger extent.
+MARGIN = 0.05
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
-    """How what is on a layer looks: its colour as 0xRRGGBB and the width of its lines (m).
+    """Look of a layer: colour as 0xRRGGBB, and width of its lines (m).
 
-    Where the reader is to see it at any rate it is in the ``foreground``: in DXF black on white and white on black.
+    A layer in the ``foreground`` contrasts with any background: in DXF it is black on white and white on black.
     """
 
     colour: int
@@ -40,147 +51,105 @@ class Layer:
     foreground: bool = False
 
 
-#: The layers there are, drawn in this order; their colours are seen on white and on black.
-LAYERS = {
-    "poses": Layer(colour=0x808080, width=0.13e-3),
-    "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
-    "guide": Layer(colour=0x808080, width=0.25e-3),
-    "crank": Layer(colour=0xC0392B, width=0.5e-3),
-    "coupler": Layer(colour=0x1F6FB4, width=0.5e-3),
-    "rocker": Layer(colour=0x2E8B57, width=0.5e-3),
-    "slider": Layer(colour=0x8E44AD, width=0.35e-3),
-    "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
-    "target": Layer(colour=0xD35400, width=0.25e-3),
-    "plate": Layer(colour=0x202020, width=0.5e-3, foreground=True),
-    "hole": Layer(colour=0xC0392B, width=0.35e-3),
-    "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
-    "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
-}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Shape:
+    layer: str
 
-_ORDER = list(LAYERS)
+    def _require(self, holds: bool, requirement: str) -> None:
+        if not holds:
+            raise InputError(f"{self!r} on layer {self.layer}: {requirement}")
 
-#: Units of length, by their code in the DXF variable $INSUNITS.
-UNITS = {"mm": 4, "cm": 5, "m": 6, "in": 1}
-#: Those that SVG has.
-SVG_UNITS = ("mm", "cm", "in")
-_NO_GUID = "{00000000-0000-0000-0000-000000000000}"
-#: AutoCAD's colour that is the opposite of the background.
-_FOREGROUND = 7
-#: Margin of an SVG around the drawing, as a share of its larger extent.
-MARGIN = 0.05
-
-
-def _check(layer: str, *numbers: float) -> None:
-    if layer not in LAYERS:
-        raise unknown_name(layer, LAYERS, f"layer {layer!r}")
-    if not all(isfinite(number) for number in numbers):
-        raise InputError(f"on layer {layer}: {numbers} must be finite numbers")
+    def _check(self, *numbers: float, positive: float = 1.0) -> None:
+        """Check that numbers are finite, and one of them above zero."""
+        self._require(all(map(isfinite, (*numbers, positive))), "all numbers must be finite")
+        self._require(positive > 0.0, f"its size is {positive!r} m: it must be greater than zero")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class Line(_Shape):
     """A straight line between two points (m)."""
 
-    layer: str
     start: Point
     end: Point
 
     def __post_init__(self) -> None:
-        _check(self.layer, *self.start, *self.end)
+        self._check(*self.start, *self.end)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
+class Circle(_Shape):
     """A circle about a point (m), such as a pin."""
 
-    layer: str
     centre: Point
     radius: float
 
     def __post_init__(self) -> None:
-        _check(self.layer, *self.centre, self.radius)
-        if self.radius <= 0.0:
-            raise InputError(
-                f"on layer {self.layer}: a circle's radius is {self.radius!r} m: it must be greater than zero"
-            )
+        self._check(*self.centre, positive=self.radius)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Polyline:
-    """Points joined by straight lines, shape (n, 2) in m; the last one to the first if closed.
+class Polyline(_Shape):
+    """Points joined by straight lines or arcs, shape (n, 2) in m; if closed, the last is joined to the first.
 
-    Where ``bulges`` are given, one a point, the way from it to the next is an arc: the tangent of a quarter of its angle,
-    above zero counter-clockwise, as in DXF; at most 1, a half circle.
+    ``bulges``, one for each point, make the segment to the next point an arc, as in DXF: the tangent of a quarter of its
+    angle, positive counter-clockwise, at most 1, which is a half circle.
     """
 
-    layer: str
     points: NDArray[np.float64]
     closed: bool = False
     bulges: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
-            raise InputError(
-                f"on layer {self.layer}: a polyline of shape {points.shape}: it must be (n, 2), n at least 2"
-            )
-        _check(self.layer)
-        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if len(bad):
-            raise InputError(
-                f"on layer {self.layer}: point {bad[0]} of a polyline is {points[bad[0]]}: it must be finite"
-            )
-        if self.bulges and (len(self.bulges) != len(points) or not all(abs(b) <= 1.0 for b in self.bulges)):
-            raise InputError(
-                f"on layer {self.layer}: bulges {self.bulges} of a polyline of {len(points)} points: one a point, from -1 to 1"
-            )
-        points.setflags(write=False)
         object.__setattr__(self, "points", points)
+        self._require(
+            points.ndim == 2 and points.shape[1:] == (2,) and len(points) > 1, "its shape must be (n, 2), n > 1"
+        )
+        self._check(*points.ravel())
+        fits = len(self.bulges) in (0, len(points)) and all(abs(bulge) <= 1.0 for bulge in self.bulges)
+        self._require(fits, f"{len(points)} points need as many bulges, from -1 to 1")
+        points.setflags(write=False)
 
     @property
-    def around(self) -> NDArray[np.float64]:
-        """Points between which all of it lies, shape (n, 2): of an arc, its ends and the corners of a box about it."""
-        ways = np.roll(self.points, -1, axis=0) - self.points
-        bulges = np.array(self.bulges or np.zeros(len(ways)))[:, None]
-        # the height of an arc over its chord
-        out = 0.5 * bulges * np.column_stack([ways[:, 1], -ways[:, 0]])
-        return np.vstack([self.points, self.points + out, self.points + ways + out])
+    def hull(self) -> NDArray[np.float64]:
+        """Points whose convex hull contains the polyline, shape (m, 2): its points, and corners of boxes about its arcs."""
+        chords = np.roll(self.points, -1, axis=0) - self.points
+        bulges = np.array(self.bulges or np.zeros(len(chords)))[:, None]
+        # from the chord to the top of its arc
+        heights = 0.5 * bulges * np.column_stack([chords[:, 1], -chords[:, 0]])
+        return np.vstack([self.points, self.points + heights, self.points + chords + heights])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Text:
+class Text(_Shape):
     """A line of text that starts at a point (m), in letters of a height (m)."""
 
-    layer: str
     position: Point
     height: float
     text: str
 
     def __post_init__(self) -> None:
-        _check(self.layer, *self.position, self.height)
-        if self.height <= 0.0:
-            raise InputError(f"a text's height is {self.height!r} m: it must be greater than zero")
-        if not self.text or not self.text.isprintable():
-            raise InputError(f"a text is {self.text!r}: it must be one line of printable characters")
+        self._check(*self.position, positive=self.height)
+        self._require(bool(self.text) and self.text.isprintable(), "it must be one line of printable characters")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Dimension:
-    """The distance between two points (m), written over a line beside them; ``offset`` to the left of the way (m)."""
+class Dimension(_Shape):
+    """The distance between two points (m), written over a line at a distance ``offset`` (m) to their left."""
 
-    layer: str
     start: Point
     end: Point
     offset: float
     height: float
 
     def __post_init__(self) -> None:
-        _check(self.layer, *self.start, *self.end, self.offset, self.height)
-        if self.start == self.end or self.height <= 0.0:
-            raise InputError(
-                f"a dimension from {self.start} to {self.end} m in letters of {self.height} m: "
-                "it must have a length and a height"
-            )
+        self._check(*self.start, *self.end, self.offset, positive=self.height)
+        self._require(self.start != self.end, "its points must be apart")
+
+    @property
+    def length(self) -> float:
+        """Distance between the points (m)."""
+        return hypot(*np.subtract(self.end, self.start))
 
     @property
     def line(self) -> tuple[Point, Point]:
@@ -192,7 +161,7 @@ class Dimension:
 
     @property
     def readable(self) -> Dimension:
-        """The same, from left to right or upwards: its number is read from below or from the right."""
+        """The same dimension with its points from left to right, or upwards: read from below or from the right."""
         (x1, y1), (x2, y2) = self.start, self.end
         slight = 1e-9 * abs(y2 - y1)
         forward = x2 - x1 > slight or (abs(x2 - x1) <= slight and y2 > y1)
@@ -201,22 +170,27 @@ class Dimension:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
-    """What is drawn, in m with y upwards.
+    """Shapes on layers, in m with y upwards.
 
     Attributes
     ----------
     title : str
         One line.
-    lines, circles, polylines, dimensions, texts
-        In any order; they are drawn by layer.
+    layers : mapping of str to Layer
+        Layers by name, in the order in which they are drawn.
+    lines, circles, polylines, dimensions, texts : tuple
+        Shapes in any order; they are drawn by layer.
 
     Raises
     ------
     InputError
-        If nothing is drawn, all of it at one point, or the title is not one printable line.
+        If there is no shape, all shapes are at one point, or the title is not one printable line.
+    UnknownNameError
+        If there is no layer of a shape's name.
     """
 
     title: str
+    layers: Mapping[str, Layer]
     lines: tuple[Line, ...] = ()
     circles: tuple[Circle, ...] = ()
     polylines: tuple[Polyline, ...] = ()
@@ -228,17 +202,20 @@ class Drawing:
             raise InputError(f"the title is {self.title!r}: it must be one line of printable characters")
         if not (self.lines or self.circles or self.polylines):
             raise InputError("nothing is drawn: there must be a line, a circle or a polyline")
+        for shape in (*self.lines, *self.circles, *self.polylines, *self.dimensions, *self.texts):
+            if shape.layer not in self.layers:
+                raise unknown_name(shape.layer, self.layers, f"layer {shape.layer!r}")
         low, high = self.extents
         if low == high:
             raise InputError(f"all that is drawn is at one point, {low} m")
 
     @property
     def extents(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner of all but the letters, whose starting points count (m)."""
+        """Lower left and upper right corner (m) of all shapes; of texts only the start counts."""
         points = np.vstack(
             [np.array([p for line in self.lines for p in (line.start, line.end)]).reshape(-1, 2)]
             + [np.array(c.centre) + side * c.radius for c in self.circles for side in (-1.0, 1.0)]
-            + [p.around for p in self.polylines]
+            + [p.hull for p in self.polylines]
             + [np.array(d.line) for d in self.dimensions]
             + [np.array([t.position for t in self.texts]).reshape(-1, 2)]
         )
@@ -246,45 +223,49 @@ class Drawing:
         return (left, bottom), (right, top)
 
 
-def _metres(unit: str, known: Iterable[str]) -> float:
+def _unit_length(unit: str, known: Iterable[str]) -> float:
+    """Return the length of a unit (m)."""
     names = tuple(known)
     if unit not in names:
         raise ParameterError("unit", unit, f"be one of {', '.join(names)}")
     return LENGTHS[unit]
 
 
-def _number(dimension: Dimension, metre: float) -> str:
-    """The distance in a unit, to its hundredths at the finest."""
-    return f"{round(hypot(*np.subtract(dimension.end, dimension.start)) / metre, 2):g}"
+def _label(dimension: Dimension, metre: float) -> str:
+    """Write a distance in a unit, rounded to hundredths of it."""
+    return f"{round(dimension.length / metre, 2):g}"
 
 
 def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
-    """The drawing as DXF (AutoCAD 2010, UTF-8).
+    """Write a drawing as DXF (AutoCAD 2010, UTF-8).
 
     Parameters
     ----------
     drawing : Drawing
     unit : str
-        One of `UNITS`; it is named in the header ($INSUNITS).
+        One of `UNITS`; the header names it ($INSUNITS).
 
     Returns
     -------
     str
-        Without a date: the header's times and identifiers are set to the constants 0.
+        Without a date: times and identifiers in the header are 0.
 
     Raises
     ------
     ParameterError
         If the unit is not known.
+    MissingLibraryError
+        If ezdxf is not installed.
     """
+    require("ezdxf")
     from ezdxf.filemanagement import new
     from ezdxf.version import __version__
 
-    metre = _metres(unit, UNITS)
+    metre = _unit_length(unit, UNITS)
     document = new("R2010", setup=["styles", "dimstyles"])
     document.units = UNITS[unit]
     document.header["$MEASUREMENT"] = 0 if unit == "in" else 1
-    for name, layer in LAYERS.items():
+    for name, layer in drawing.layers.items():
         entry = document.layers.add(name, lineweight=round(layer.width * 1e5))
         if layer.foreground:
             entry.color = _FOREGROUND
@@ -295,8 +276,9 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     def at(point: Point) -> Point:
         return point[0] / metre, point[1] / metre
 
+    order = list(drawing.layers)
     shapes: list[Line | Circle | Polyline] = [*drawing.lines, *drawing.circles, *drawing.polylines]
-    for shape in sorted(shapes, key=lambda one: _ORDER.index(one.layer)):
+    for shape in sorted(shapes, key=lambda one: order.index(one.layer)):
         own = {"layer": shape.layer}
         if isinstance(shape, Line):
             space.add_line(at(shape.start), at(shape.end), dxfattribs=own)
@@ -306,43 +288,38 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
             bulges = shape.bulges or [0.0] * len(shape.points)
             points = [(x, y, bulge) for (x, y), bulge in zip((shape.points / metre).tolist(), bulges)]
             space.add_lwpolyline(points, format="xyb", close=shape.closed, dxfattribs=own)
-    for dimension in drawing.dimensions:
-        _measure(space, dimension.readable, metre)
+    for dimension in (given.readable for given in drawing.dimensions):
+        height = dimension.height / metre
+        sizes = {"dimtxt": 1.0, "dimasz": 1.0, "dimexo": 0.5, "dimexe": 0.5, "dimgap": 0.3}
+        space.add_aligned_dim(
+            at(dimension.start),
+            at(dimension.end),
+            dimension.offset / metre,
+            text=_label(dimension, metre),
+            override={name: share * height for name, share in sizes.items()} | {"dimtad": 1, "dimblk": ""},
+            dxfattribs={"layer": dimension.layer},
+        ).render()
     for text in drawing.texts:
-        space.add_text(
-            text.text,
-            height=text.height / metre,
-            dxfattribs={"layer": text.layer, "insert": at(text.position)},
-        )
+        place = {"layer": text.layer, "insert": at(text.position)}
+        space.add_text(text.text, height=text.height / metre, dxfattribs=place)
     (left, bottom), (right, top) = (at(corner) for corner in drawing.extents)
     space.reset_extents((left, bottom, 0.0), (right, top, 0.0))
     document.header.custom_vars.append("Title", drawing.title)
     height = 1.1 * max(top - bottom, 0.5 * (right - left))
     document.set_modelspace_vport(height, center=(0.5 * (left + right), 0.5 * (bottom + top)))
+    # ezdxf lists the classes in the order of a set, which differs between processes
+    document.classes.add_required_classes(document.dxfversion)
+    document.classes.classes = dict(sorted(document.classes.classes.items()))
     stream = StringIO()
     document.write(stream)
-    # ezdxf dates each file, and leaves that out by a global option only
+    # ezdxf dates each file; only a global option would prevent that
     dxf = re.sub(r"(\$TDU?(?:CREATE|UPDATE)\n *40\n)[^\n]*", r"\g<1>0.0", stream.getvalue())
     dxf = re.sub(r"(\$(?:FINGERPRINT|VERSION)GUID\n *2\n)[^\n]*", rf"\g<1>{_NO_GUID}", dxf)
     return re.sub(rf"(?<=\n{re.escape(__version__)} @ )[^\n]*", "0", dxf)
 
 
-def _measure(space: Any, dimension: Dimension, metre: float) -> None:
-    """A dimension of a DXF, in a unit."""
-    height = dimension.height / metre
-    ends = [(x / metre, y / metre) for x, y in (dimension.start, dimension.end)]
-    look = {"dimtxt": height, "dimasz": height, "dimexo": 0.5 * height, "dimexe": 0.5 * height, "dimgap": 0.3 * height}
-    space.add_aligned_dim(
-        *ends,
-        dimension.offset / metre,
-        text=_number(dimension, metre),
-        override=look | {"dimtad": 1, "dimblk": ""},
-        dxfattribs={"layer": dimension.layer},
-    ).render()
-
-
 def to_svg(drawing: Drawing, unit: str = "mm") -> str:
-    """The drawing as SVG of real size: ``width`` and ``height`` in the unit, and one user unit one of it.
+    """Write a drawing as SVG of real size: ``width`` and ``height`` in the unit, which is also the user unit.
 
     Parameters
     ----------
@@ -353,19 +330,16 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     Returns
     -------
     str
-        A group for each layer that has something on it, its name as ``id``. SVG's y points down: a point (x, y) is at
-        (x, -y), the origin kept, so that `analysis.files.read_points` reads back the same points.
+        A group for each layer with shapes, its name as ``id``. SVG's y points down: a point (x, y) is at (x, -y), so that
+        `analysis.files.read_points` reads back the same points.
 
     Raises
     ------
     ParameterError
         If the unit is not one of SVG's.
     """
-    metre = _metres(unit, SVG_UNITS)
-
-    def number(metres: float) -> str:
-        return format(metres / metre + 0.0, ".15g")
-
+    svg = _Svg(drawing, _unit_length(unit, SVG_UNITS))
+    number = svg.number
     (left, bottom), (right, top) = drawing.extents
     margin = MARGIN * max(right - left, top - bottom)
     x, y = left - margin, -top - margin
@@ -379,96 +353,105 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     )
     if drawing.title:
         ElementTree.SubElement(root, "title").text = drawing.title
-    groups: dict[str, ElementTree.Element] = {}
-    for name, layer in LAYERS.items():
-        groups[name] = ElementTree.Element(
-            "g",
-            id=name,
-            fill="none",
-            stroke=f"#{layer.colour:06x}",
-            attrib={"stroke-width": number(layer.width), "stroke-linejoin": "round", "stroke-linecap": "round"},
-        )
-
-    def put(layer: str, tag: str, **attributes: Any) -> ElementTree.Element:
-        return ElementTree.SubElement(
-            groups[layer], tag, {k: v if isinstance(v, str) else number(v) for k, v in attributes.items()}
-        )
-
     for line in drawing.lines:
-        (x1, y1), (x2, y2) = line.start, line.end
-        put(line.layer, "line", x1=x1, y1=-y1, x2=x2, y2=-y2)
+        svg.add_line(line.layer, line.start, line.end)
     for circle in drawing.circles:
-        put(circle.layer, "circle", cx=circle.centre[0], cy=-circle.centre[1], r=circle.radius)
+        svg.add(circle.layer, "circle", cx=circle.centre[0], cy=-circle.centre[1], r=circle.radius)
     for polyline in drawing.polylines:
-        put(polyline.layer, "path", d=_path(polyline, number))
+        svg.add(polyline.layer, "path", d=svg.path(polyline))
     for dimension in drawing.dimensions:
-        ends = dimension.line
-        for (x1, y1), (x2, y2) in (ends, *zip((dimension.start, dimension.end), ends)):
-            put(dimension.layer, "line", x1=x1, y1=-y1, x2=x2, y2=-y2)
-        for here, there in (ends, ends[::-1]):
-            put(dimension.layer, "path", d=_arrow(here, there, dimension.height, number))
-        _write(put, dimension, metre, number)
+        svg.add_dimension(dimension)
     for text in drawing.texts:
-        element = put(text.layer, "text", x=text.position[0], y=-text.position[1], **{"font-size": text.height})
-        _letter(element, text.layer, text.text)
-    root.extend(group for group in groups.values() if len(group))
+        svg.add_text(text.layer, text.text, text.position, text.height)
+    root.extend(group for group in svg.groups.values() if len(group))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _path(polyline: Polyline, number: Callable[[float], str]) -> str:
-    """The data of an SVG path along a polyline; its y points down, so that a left turn stays one."""
-    points = polyline.points.tolist()
-    bulges = polyline.bulges or [0.0] * len(points)
-    parts = [f"M {number(points[0][0])},{number(-points[0][1])}"]
-    following = [*points[1:], *(points[:1] if polyline.closed and polyline.bulges else [])]
-    for (x1, y1), bulge, (x2, y2) in zip(points, bulges, following):
-        if bulge:
-            radius = number(hypot(x2 - x1, y2 - y1) * (1.0 + bulge * bulge) / (4.0 * abs(bulge)))
-            parts.append(f"A {radius} {radius} 0 0 {0 if bulge > 0.0 else 1} {number(x2)},{number(-y2)}")
-        else:
-            parts.append(f"L {number(x2)},{number(-y2)}")
-    return " ".join(parts) + (" Z" if polyline.closed else "")
+class _Svg:
+    """Elements of an SVG, in one group for each layer."""
 
+    def __init__(self, drawing: Drawing, metre: float) -> None:
+        self.metre = metre
+        self.layers = drawing.layers
+        look = {"stroke-linejoin": "round", "stroke-linecap": "round"}
+        self.groups = {
+            name: ElementTree.Element(
+                "g",
+                id=name,
+                fill="none",
+                stroke=f"#{layer.colour:06x}",
+                attrib={"stroke-width": self.number(layer.width), **look},
+            )
+            for name, layer in drawing.layers.items()
+        }
 
-def _arrow(tip: Point, towards: Point, height: float, number: Callable[[float], str]) -> str:
-    """The data of an SVG path: the two barbs of an arrow with its tip at the end of a line."""
-    way = np.subtract(towards, tip)
-    along = height * way / hypot(*way)
-    barbs = [tip + along + side * np.array([-along[1], along[0]]) for side in (0.2, -0.2)]
-    (ax, ay), (bx, by) = barbs
-    return f"M {number(ax)},{number(-ay)} L {number(tip[0])},{number(-tip[1])} L {number(bx)},{number(-by)}"
+    def number(self, metres: float) -> str:
+        """Write a length in the unit."""
+        return format(metres / self.metre + 0.0, ".15g")
 
+    def point(self, x: float, y: float) -> str:
+        """Write a point, with y downwards."""
+        return f"{self.number(x)},{self.number(-y)}"
 
-def _write(put: Callable[..., Any], dimension: Dimension, metre: float, number: Callable[[float], str]) -> None:
-    """The number of a dimension over the middle of its line, readable from below or from the right."""
-    (x1, y1), (x2, y2) = dimension.readable.line
-    turned = round(degrees(atan2(y2 - y1, x2 - x1)), 9)
-    up = 0.3 * dimension.height
-    x = 0.5 * (x1 + x2) - up * sin(radians(turned))
-    y = 0.5 * (y1 + y2) + up * cos(radians(turned))
-    text = put(dimension.layer, "text", x=x, y=-y, **{"font-size": dimension.height, "text-anchor": "middle"})
-    text.set("transform", f"rotate({-turned + 0.0:.6g} {number(x)} {number(-y)})")
-    _letter(text, dimension.layer, _number(dimension, metre))
+    def add(self, layer: str, tag: str, **attributes: Any) -> ElementTree.Element:
+        """Add an element; attributes that are numbers are lengths (m)."""
+        texts = {name: value if isinstance(value, str) else self.number(value) for name, value in attributes.items()}
+        return ElementTree.SubElement(self.groups[layer], tag, texts)
 
+    def add_line(self, layer: str, start: Point, end: Point) -> None:
+        """Add a straight line."""
+        self.add(layer, "line", x1=start[0], y1=-start[1], x2=end[0], y2=-end[1])
 
-def _letter(element: ElementTree.Element, layer: str, text: str) -> None:
-    """Letters in the colour of a layer, filled."""
-    element.set("font-family", "sans-serif")
-    element.set("fill", f"#{LAYERS[layer].colour:06x}")
-    element.set("stroke", "none")
-    element.text = text
+    def path(self, polyline: Polyline) -> str:
+        """Return the data of a path along a polyline."""
+        points = polyline.points.tolist()
+        bulges = polyline.bulges or [0.0] * len(points)
+        parts = [f"M {self.point(*points[0])}"]
+        following = [*points[1:], *(points[:1] if polyline.closed and polyline.bulges else [])]
+        for (x1, y1), bulge, (x2, y2) in zip(points, bulges, following):
+            if bulge:
+                radius = self.number(hypot(x2 - x1, y2 - y1) * (1.0 + bulge * bulge) / (4.0 * abs(bulge)))
+                parts.append(f"A {radius} {radius} 0 0 {0 if bulge > 0.0 else 1} {self.point(x2, y2)}")
+            else:
+                parts.append(f"L {self.point(x2, y2)}")
+        return " ".join(parts) + (" Z" if polyline.closed else "")
+
+    def add_text(self, layer: str, text: str, place: Point, height: float, **attributes: Any) -> ElementTree.Element:
+        """Add a text, its letters filled with the colour of the layer."""
+        element = self.add(layer, "text", x=place[0], y=-place[1], **{"font-size": height}, **attributes)
+        element.attrib |= {"font-family": "sans-serif", "fill": f"#{self.layers[layer].colour:06x}", "stroke": "none"}
+        element.text = text
+        return element
+
+    def add_dimension(self, dimension: Dimension) -> None:
+        """Add the lines of a dimension, its arrows, and its number, which is read from below or from the right."""
+        layer, height, ends = dimension.layer, dimension.height, dimension.line
+        for start, end in (ends, *zip((dimension.start, dimension.end), ends)):
+            self.add_line(layer, start, end)
+        for tip, other in (ends, ends[::-1]):
+            way = np.subtract(other, tip)
+            along = height * way / hypot(*way)
+            left, right = (tip + along + side * np.array([-along[1], along[0]]) for side in (0.2, -0.2))
+            self.add(layer, "path", d=f"M {self.point(*left)} L {self.point(*tip)} L {self.point(*right)}")
+        (x1, y1), (x2, y2) = dimension.readable.line
+        turned = round(degrees(atan2(y2 - y1, x2 - x1)), 9)
+        x = 0.5 * (x1 + x2) - 0.3 * height * sin(radians(turned))
+        y = 0.5 * (y1 + y2) + 0.3 * height * cos(radians(turned))
+        text = _label(dimension, self.metre)
+        element = self.add_text(layer, text, (x, y), height, **{"text-anchor": "middle"})
+        element.set("transform", f"rotate({-turned + 0.0:.6g} {self.number(x)} {self.number(-y)})")
 
 
 def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Path:
-    """Write a drawing as DXF or SVG, as the path's ending says.
+    """Write a drawing as DXF or SVG, according to the path's ending.
 
     Raises
     ------
     InputError
         If the ending is another.
     ParameterError
-        If the unit is not one that the format has.
+        If the format does not have the unit.
     """
     path = Path(path)
     text = to_dxf(drawing, unit) if ending_of(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
@@ -476,13 +459,13 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
 
 
 def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
-    """Write a Matplotlib figure, as the format that the path's ending names."""
+    """Write a Matplotlib figure in the format of the path's ending, PNG without one."""
     with output(path) as (part, path):
         kind = path.suffix[1:] or "png"
         try:
             figure.savefig(part, dpi=dpi, format=kind)
         except ValueError:
-            # a title from a file may look like mathematics without being any: dollars then stand for themselves
+            # a title from a file may look like a formula without being one: show its dollars as dollars
             texts = figure.findobj(lambda artist: hasattr(artist, "set_parse_math") and "$" in artist.get_text())
             if not texts:
                 raise

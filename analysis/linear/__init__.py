@@ -1,4 +1,4 @@
-"""Linear models of the plant, and control of the slider designed on them.
+"""Linear models of a mechanism, and control of a coordinate designed on them.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

@@ -1,6 +1,3 @@
-from .decay import LEAST_SWING as LEAST_SWING
-from .decay import Decay as Decay
-from .decay import fit_decay as fit_decay
 from .design import Design as Design
 from .design import DesignError as DesignError
 from .design import check_period as check_period
@@ -18,10 +15,10 @@ from .loop import SampledController as SampledController
 from .loop import check_limit as check_limit
 from .loop import control_loop as control_loop
 from .loop import largest_difference as largest_difference
-from .loop import limited as limited
 from .loop import peak as peak
 from .loop import predict_loop as predict_loop
 from .loop import rms as rms
+from .loop import saturate as saturate
 from .model import LinearModel as LinearModel
 from .model import LinearModelError as LinearModelError
 from .model import linear_outputs as linear_outputs

@@ -1,4 +1,4 @@
-"""Control of a coordinate by the force (or torque) on it, designed on a linear model.
+"""Controllers of one coordinate by the force (or torque) on it, designed on a linear model.
 
 Every design is one law of the deviations x from an operating point x0 with the force F0, at a reference r of the coordinate u
 whose own operating point is x0 + x_s (r - u0), F0 + F_s (r - u0) on the linear model:
@@ -13,39 +13,45 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, pi
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
+from ..libraries import lazy
 from ..run import Function
 from ..units import Amount, in_si
-from .model import FloatArray, LinearModel, LinearModelError, by_magnitude, signal_name
+from .model import FloatArray, LinearModel, LinearModelError, signal_name, sorted_by_magnitude
+
+if TYPE_CHECKING:
+    import control
+else:
+    control = lazy("control")
 
 
 class DesignError(LinkworkError):
-    """A controller cannot be designed as asked."""
+    """A controller cannot be designed for these requirements."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
-    """A control law for a force, with what the linear model says of it. Units are those of a force and a position.
+    """A control law for a force, with poles and margins on the linear model, in units of a force and a position.
 
     Attributes
     ----------
     method : str
         LQR, PID or PI.
     model : LinearModel
-        On which it was designed.
+        The linear model of the design.
     channel : str
         FMI name of the force.
     freedom : int
-        Number of the freedom that it drives, and controls.
+        Number of the driven and controlled freedom.
     gains : ndarray, shape (2 n,)
-        k: of the model's state (q, q'), in N per unit of each.
+        Gains k of the model's state (q, q'), in N per unit of each.
     integral_gain : float
         k_i (N/(m.s)); zero if there is no integral action.
     target, target_slope : ndarray, shape (2 n,)
@@ -53,7 +59,7 @@ class Design:
     force, force_slope : float
         F0 (N), and F_s (N/m).
     poles : ndarray
-        Of the closed loop (1/s), by magnitude.
+        Poles of the closed loop (1/s), by magnitude.
     gain_margin : float
         Factor on the force up to which the loop stays stable, infinite if there is none.
     phase_margin : float
@@ -82,30 +88,30 @@ class Design:
 
     @property
     def coordinate(self) -> str:
-        """FMI name of the coordinate that it controls."""
+        """FMI name of the controlled coordinate."""
         return self.model.mechanism.freedoms[self.freedom].coordinate
 
     @property
     def plant(self) -> _Plant:
-        """What the force does."""
+        """Matrices of the linear model as seen from the force."""
         return _Plant(self.model, self.channel)
 
     @property
     def loop(self) -> control.StateSpace:
-        """The open loop, from the force to what the controller takes from it."""
+        """Return the open loop, from the force to the feedback signal."""
         return self.plant.loop(self.gains, self.integral_gain)
 
     def closed(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
-        """The closed loop, from a force that disturbs the coordinate to outputs by their FMI names, by default itself."""
+        """Return the closed loop, from a disturbing force to outputs by FMI name, by default the controlled coordinate."""
         chosen = (self.coordinate,) if outputs is None else outputs
-        a, b, row = self.plant.fed_back(self.gains, self.integral_gain)
+        a, b, row = self.plant.feedback_matrices(self.gains, self.integral_gain)
         whole = self.model.to_state_space(chosen, (self.channel,))
         c = np.hstack([whole.C, np.zeros((len(chosen), a.shape[0] - whole.nstates))]) - whole.D @ row
         names = {"inputs": [signal_name(self.channel)], "outputs": [signal_name(name) for name in chosen]}
         return control.ss(a - b @ row, b, c, whole.D, **names)
 
     def sampled_poles(self, period: float) -> NDArray[np.complex128]:
-        """Poles (in z) of the linear model under the law sampled every ``period`` s and held: inside the unit circle or not."""
+        """Compute the poles (in z) of the linear model under the law sampled every ``period`` s and held."""
         check_period(period)
         a, b = self.plant.a, self.plant.b
         held = control.sample_system(control.ss(a, b, np.eye(len(a)), np.zeros((len(a), 1))), period, method="zoh")
@@ -117,10 +123,10 @@ class Design:
         closed[n, n] = 1.0
         # without integral action nothing depends on the integral
         kept = closed if self.integral_gain else closed[:n, :n]
-        return by_magnitude(np.linalg.eigvals(kept))
+        return sorted_by_magnitude(np.linalg.eigvals(kept))
 
     def continuous(self, reference: float) -> Function:
-        """The law without sampling, as the force among `analysis.run.Inputs`.
+        """Return the law without sampling, as the force among `analysis.run.Inputs`.
 
         Raises
         ------
@@ -129,7 +135,7 @@ class Design:
         """
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
-        gains = tuple(self.on_plant(self.gains).tolist())
+        gains = tuple(self.plant_values(self.gains).tolist())
         step = reference - float(self.target[self.plant.place])
         bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
 
@@ -141,15 +147,15 @@ class Design:
 
         return Function(force)
 
-    def on_plant(self, values: FloatArray) -> FloatArray:
-        """Values by the model's state as values by all coordinates and all rates, zero where the model has no such state."""
+    def plant_values(self, values: FloatArray) -> FloatArray:
+        """Return values by the model's state as values by all coordinates and rates, zero for states it lacks."""
         whole = np.zeros(2 * len(self.model.mechanism.freedoms))
         whole[self.model.places] = values
         return whole
 
 
 class _Plant:
-    """What a force does on a linear model: A, its column of B, and the place of the coordinate that it drives."""
+    """A linear model as seen from a force: A, the force's column of B, and the index of the driven coordinate."""
 
     def __init__(self, model: LinearModel, channel: str | None) -> None:
         try:
@@ -161,26 +167,26 @@ class _Plant:
         self.place = model.layout.free.index(self.freedom)
 
     def integrating(self) -> tuple[FloatArray, FloatArray]:
-        """A and B with the integral of the coordinate as the last state."""
+        """Return A and B with the integral of the coordinate as the last state."""
         n = len(self.a)
         whole = np.zeros((n + 1, n + 1))
         whole[:n, :n] = self.a
         whole[n, self.place] = 1.0
         return whole, np.vstack([self.b, [[0.0]]])
 
-    def fed_back(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """A, B and the row of the gains, with the integral as the last state where it has a gain."""
+    def feedback_matrices(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return A, B and the row of the gains, with the integral as the last state if it has a gain."""
         if integral_gain:
             return *self.integrating(), np.append(gains, integral_gain)[None, :]
         return self.a, self.b, gains[None, :]
 
     def loop(self, gains: FloatArray, integral_gain: float) -> control.StateSpace:
-        a, b, row = self.fed_back(gains, integral_gain)
+        a, b, row = self.feedback_matrices(gains, integral_gain)
         return control.ss(a, b, row, 0.0, inputs=[signal_name(self.channel)], outputs=["feedback"])
 
 
 def _design(method: str, model: LinearModel, channel: str | None, gains: FloatArray, integral_gain: float) -> Design:
-    """The design of these gains, once it is seen to be stable."""
+    """Build the design with these gains after a check of its stability."""
     plant, freedoms = _Plant(model, channel), model.mechanism.freedoms
     for n in model.layout.free:
         if freedoms[n].period and model.state[len(freedoms) + n] != 0.0:
@@ -191,7 +197,7 @@ def _design(method: str, model: LinearModel, channel: str | None, gains: FloatAr
     if not (np.all(np.isfinite(gains)) and isfinite(integral_gain)):
         raise DesignError(f"{method}: the gains {gains} and {integral_gain} are not finite")
     loop = plant.loop(gains, integral_gain)
-    poles = by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
+    poles = sorted_by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
     if poles.real.max() >= -1e-9 * np.abs(poles).max():
         raise DesignError(
             f"{method}: the closed loop is not stable, its poles are {np.array2string(poles, precision=4)} 1/s"
@@ -238,21 +244,21 @@ def design_lqr(
     integral: float = 0.0,
     channel: str | None = None,
 ) -> Design:
-    """State feedback that minimises the integral of x' Q x + r F^2 (+ integral * (integral of u)^2) on the linear model.
+    """Design state feedback that minimises the integral of x' Q x + r F^2 (+ integral * (integral of u)^2).
 
     Parameters
     ----------
     model : LinearModel
         Of an equilibrium, or the mean one of a periodic motion.
     q : mapping or array_like
-        Weights by name of the state, those left out zero; or the diagonal of Q, or Q. Of a deviation of 1 mm that may
-        cost as much as a force of 1 N it is 1e6 r.
+        Weights by name of the state, zero if left out; or the diagonal of Q, or Q. A weight of 1e6 r of a position lets a
+        deviation of 1 mm cost as much as a force of 1 N.
     r : float
         Weight of the force.
     integral : float
         Weight of the integral of the coordinate (1/s2); above zero the law has integral action.
     channel : str, optional
-        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
@@ -292,7 +298,7 @@ def design_lqr(
     plant = _Plant(model, channel)
     if integral:
         weights = np.block([[weights, np.zeros((n, 1))], [np.zeros((1, n)), np.array([[integral]])]])
-    a, b, _ = plant.fed_back(np.zeros(n), integral)
+    a, b, _ = plant.feedback_matrices(np.zeros(n), integral)
     try:
         gains = np.asarray(control.lqr(a, b, weights, [[r]])[0])[0]
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
@@ -309,18 +315,18 @@ def design_pid(
     damping: float = 0.7,
     channel: str | None = None,
 ) -> Design:
-    """PID with the derivative on the measured velocity, by the three poles of the closed loop.
+    """Design a PID, its derivative part on the measured velocity, by the three poles of the closed loop.
 
     Parameters
     ----------
     model : LinearModel
-        Of one free freedom, such as a five-bar's in speed drive.
+        A model with one free freedom, such as a five-bar in speed drive.
     poles : sequence of 3 complex, optional
         1/s, real or in conjugate pairs, left of the imaginary axis.
     bandwidth, damping : float
         Instead of poles (rad/s): they are -bandwidth times 1 and damping +- i sqrt(1 - damping^2).
     channel : str, optional
-        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
@@ -365,10 +371,9 @@ def design_pid(
 def design_pi(
     model: LinearModel, *, bandwidth: Amount, phase_margin: Amount = pi / 3.0, channel: str | None = None
 ) -> Design:
-    """PI whose loop has the gain 1 at ``bandwidth``, and there at least the phase margin.
+    """Design a PI controller with crossover at ``bandwidth`` and at least a given phase margin.
 
-    Where the coordinate itself lags so little that an integral alone leaves more than the margin, there is no proportional
-    part.
+    If an integral alone leaves more than the phase margin, there is no proportional part.
 
     Parameters
     ----------
@@ -378,13 +383,12 @@ def design_pi(
     phase_margin : float
         rad.
     channel : str, optional
-        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
     DesignError
-        If a PI cannot: it has no phase lead to give, and so none where a sprung mass needs it, near its resonance and
-        above.
+        If no PI meets the requirements: a PI has no phase lead, which a sprung mass needs near its resonance and above.
 
     Examples
     --------
@@ -427,7 +431,7 @@ def _check_positive(name: str, value: float, unit: str) -> None:
 
 
 def check_period(period: float) -> None:
-    """Make sure that a sampling period (s) is usable.
+    """Make sure that a sampling period (s) is finite and above zero.
 
     Raises
     ------

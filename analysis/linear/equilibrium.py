@@ -1,4 +1,4 @@
-"""Operating points at rest: equilibria of a mechanism, free or with some of its freedoms held.
+"""Equilibria of a mechanism, free or with some of its freedoms held.
 
 They are found by Newton's method on the generalised forces at rest, M a, with exact derivatives by CasADi
 (`analysis.run.expressions`).
@@ -26,9 +26,9 @@ from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
 from ..run import Inputs, expressions, given, takes_published
 from ..units import Amount, in_si
-from .model import FloatArray, Layout, Modes, channels_along, layout
+from .model import FloatArray, Layout, Modes, layout, sampled_channels
 
-#: Points of the search for equilibria along a freedom that comes round again, over a turn, and along another, over its reach.
+#: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of another.
 GRID = (48, 81)
 #: Largest imbalance of an equilibrium, relative to the forces that balance.
 BALANCE = 1e-12
@@ -36,16 +36,16 @@ MOST_ITERATIONS = 60
 
 
 class EquilibriumError(LinkworkError):
-    """There is no equilibrium, or none was found from where the search began."""
+    """No equilibrium was found."""
 
 
 @cache
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
-    """Two functions of coordinates, channels and constants.
+    """Return two CasADi functions of coordinates, channels and constants: statics alone, and with derivatives.
 
-    Of both the first result is the generalised forces at rest on the freedoms that are free; the others are the clearance,
-    and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels. Nothing that a
-    mechanism's switch is for acts at rest: friction.
+    The first result of both is the generalised forces at rest on the free freedoms. The first function also returns the
+    clearance; the second the negative derivatives of the forces by these freedoms, and the generalised forces of unit forces of
+    the channels. Friction, the purpose of a mechanism's switch, does not act at rest.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
@@ -78,11 +78,11 @@ class Equilibrium:
     coordinates : ndarray
         Of all freedoms.
     inputs : Inputs
-        What acts on it; a freedom that is held has the commanded rate 0.
+        Acting inputs; a held freedom has the commanded rate 0.
     holding : dict
-        Generalised force (N.m or N) that holds each freedom which is held, by its coordinate.
+        Generalised force (N.m or N) that holds each held freedom, by its coordinate.
     stiffness : ndarray
-        Less the derivative of the generalised forces with respect to the freedoms that are free or held.
+        Negative derivative of the generalised forces by the free and held freedoms.
     residual : float
         Largest imbalance, relative to the forces that balance.
     iterations : int
@@ -105,26 +105,26 @@ class Equilibrium:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
             raise unknown_name(name, mechanism.output_names, f"output {name!r}")
-        modes, channels = channels_along(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
+        modes, channels = sampled_channels(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
         applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
         outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)
         return float(outputs[mechanism.output_names.index(name)])
 
     @property
     def state(self) -> tuple[float, ...]:
-        """The state of the plant there."""
+        """State of the plant in this configuration."""
         return mechanism_of(self.parameters).state(self.initial)
 
     @property
     def initial(self) -> InitialState:
-        """The start of a run there."""
+        """Start of a run in this configuration."""
         mechanism = mechanism_of(self.parameters)
         names = [freedom.initial[0] for freedom in mechanism.freedoms]
         return mechanism.initial(**dict(zip(names, self.coordinates.tolist())))
 
     @property
     def stable(self) -> bool:
-        """Whether it is a minimum of the potential energy of springs, gravity and constant forces in the free freedoms."""
+        """Whether the potential energy of springs, gravity and constant forces has a minimum in the free freedoms."""
         balance = _Balance.of(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
@@ -145,18 +145,18 @@ class Equilibrium:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
-    """The equations of rest: forces over the freedoms that are free, made comparable by the mechanism's own scales.
+    """Equations of rest: generalised forces on the free freedoms, scaled by the mechanism's own scales.
 
     Attributes
     ----------
     modes : tuple of int
-        In which what is held is free, under no force: the forces then are those that hold it.
+        Modes in which held freedoms are free, under no force: their unbalanced forces are the holding forces.
     its : Layout
-        What is moved in those modes: free or held.
+        Layout in these modes: the free and the held freedoms.
     free : list of int
-        Which of those are free.
+        Places of the free freedoms among them.
     scale : ndarray
-        Of the coordinates of those.
+        Scales of their coordinates.
     """
 
     parameters: Parameters
@@ -175,7 +175,7 @@ class _Balance:
         if not inputs.held_exactly:
             raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
         still = np.zeros((1, mechanism.size))
-        modes, channels = channels_along(mechanism, inputs, np.zeros(1), still)
+        modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), still)
         forces = {channel.argument for channel in mechanism.channels if channel.kind == "force"}
         held = layout(mechanism, modes).commanded
         loose = list(modes)
@@ -197,7 +197,7 @@ class _Balance:
         return np.array([*self.parameters.constants(), 0.0])
 
     def imbalance(self, coordinates: FloatArray) -> FloatArray:
-        """Norms of the forces over the free freedoms at coordinates, shape (freedoms, n); infinite beyond the limit."""
+        """Return norms of the forces on the free freedoms at coordinates (freedoms, n), infinite beyond the limit."""
         n = coordinates.shape[1]
         columns = (np.tile(value[:, None], n) for value in (self.channels, self.constants))
         forces, clearance = map(np.asarray, _statics(self.mechanism, self.modes)[0].map(n)(coordinates, *columns))
@@ -206,7 +206,7 @@ class _Balance:
         return np.where(joined, norms, np.inf)
 
     def solve(self, guess: FloatArray) -> Equilibrium:
-        """Newton's method with halved steps where the imbalance would grow.
+        """Find an equilibrium by Newton's method, with halved steps where the imbalance would grow.
 
         Raises EquilibriumError if it does not converge.
         """
@@ -236,8 +236,8 @@ class _Balance:
         )
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
-        """Magnitude of the generalised forces that have to balance (N.m)."""
-        # what comes round again has no displacement that a spring would feel
+        """Return the magnitude of the generalised forces that have to balance (N.m)."""
+        # a cyclic freedom has no displacement that loads a spring
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
         return float(elastic + self.scale @ np.abs(of_inputs) @ np.abs(self.channels[list(self.its.forces)]))
@@ -263,7 +263,7 @@ class _Balance:
         return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
-        """Points of a grid over all configurations where the imbalance is less than at their neighbours."""
+        """Return the points of a grid over all configurations with less imbalance than their neighbours."""
         lengths = [
             abs(getattr(self.parameters, field.name))
             for field in fields(self.parameters)
@@ -283,17 +283,17 @@ class _Balance:
         return list(columns[:, (np.isfinite(values) & (values <= least)).ravel()].T)
 
 
-def _held(
+def _balance_with_held(
     parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
 ) -> tuple[_Balance, FloatArray]:
-    """The equations of rest, and coordinates that are zero but for those of freedoms that are held."""
+    """Return the equations of rest, and coordinates with the values of held freedoms and zero elsewhere."""
     mechanism = mechanism_of(parameters)
     inputs, _ = given(mechanism, inputs, None)
     coordinates = np.zeros(len(mechanism.freedoms))
     commands = {mechanism.freedoms[c.freedom].coordinate: c for c in mechanism.channels if c.kind == "command"}
     for name, value in (held or {}).items():
         if name not in commands:
-            raise InputError(f"{name} cannot be held: what can is {', '.join(commands) or 'nothing'}")
+            raise InputError(f"{name} cannot be held; these can: {', '.join(commands) or 'none'}")
         if not isfinite(value):
             raise InputError(f"{name} is {value}: it must be a finite number")
         inputs = inputs.replace(**{commands[name].argument: 0.0})
@@ -306,7 +306,7 @@ def _held(
 def find_equilibria(
     parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """All equilibria that a search from a grid over the configurations finds, the one of least potential energy first.
+    """Find equilibria from a grid over all configurations, sorted by potential energy.
 
     Parameters
     ----------
@@ -315,20 +315,19 @@ def find_equilibria(
     inputs : Inputs, optional
         Constant forces; by default none. A freedom whose rate is commanded, which must be 0, is held.
     held : mapping, optional
-        Coordinates (rad, m) of freedoms that are held, such as ``{"crank.angle": "30 deg"}``; of one that is held by the inputs
-        alone it is 0.
+        Coordinates (rad, m) of held freedoms, such as ``{"crank.angle": "30 deg"}``; 0 for a freedom held by the inputs alone.
 
     Returns
     -------
     tuple of Equilibrium
-        Angles of freedoms that come round again in (-pi, pi]. Where the equilibria are not isolated, some of them.
+        Angles of cyclic freedoms in (-pi, pi]. Where the equilibria are not isolated, some of them.
 
     Raises
     ------
     InputError
         If a force is not constant, a freedom that is held moves or is driven by a force, or nothing is free.
     """
-    balance, coordinates = _held(parameters, inputs, held)
+    balance, coordinates = _balance_with_held(parameters, inputs, held)
     found: list[Equilibrium] = []
     for start in balance.starts(coordinates):
         try:
@@ -356,15 +355,15 @@ def find_equilibrium(
     held: Mapping[str, Amount] | None = None,
     guess: ArrayLike | None = None,
 ) -> Equilibrium:
-    """An equilibrium of a mechanism at rest: hanging freely, or with some of its freedoms held.
+    """Find an equilibrium of a mechanism, hanging freely or with some of its freedoms held.
 
     Parameters
     ----------
     parameters, inputs, held
         As for `find_equilibria`.
     guess : array_like, optional
-        All coordinates (rad, m) from where to search; of a freedom that is held its own is not used. By default the stable
-        equilibrium of least potential energy is taken, or, where there is none, the lowest of all.
+        All coordinates (rad, m) to start from; those of held freedoms are not used. By default the stable equilibrium of least
+        potential energy is returned, or the lowest of all if none is stable.
 
     Raises
     ------
@@ -373,7 +372,7 @@ def find_equilibrium(
     AssemblyError
         If the links cannot be joined at the guess.
     EquilibriumError
-        If there is no equilibrium, or none is found from the guess; says what is left, and where.
+        If there is no equilibrium, or none is found from the guess; the message has the imbalance and the place.
 
     Examples
     --------
@@ -383,7 +382,7 @@ def find_equilibrium(
     '5.557 mm'
     """
     if guess is not None:
-        balance, coordinates = _held(parameters, inputs, held)
+        balance, coordinates = _balance_with_held(parameters, inputs, held)
         start = np.array(guess, dtype=float)
         if start.shape != coordinates.shape or not np.all(np.isfinite(start)):
             raise InputError(f"a guess {guess}: it must be {len(coordinates)} finite numbers")

@@ -1,4 +1,4 @@
-"""Loops of a controller around the nonlinear plant, or around its linear model.
+"""Simulation of a sampled controller around the nonlinear plant or its linear model.
 
 `control_loop` runs a law sampled and held over the steps of the plant or of its FMU, as a controller beside it does;
 `predict_loop` runs the same controller on the linear model.
@@ -46,13 +46,13 @@ FINE_STEP = 0.03
 AT_REST = 1e-6
 
 
-def limited(force: float, limit: float) -> float:
-    """A force within a limit either way."""
+def saturate(force: float, limit: float) -> float:
+    """Return a force clipped to a limit either way."""
     return min(max(force, -limit), limit)
 
 
 def check_limit(limit: float) -> None:
-    """Make sure that a limit of a force (N) is usable.
+    """Make sure that a limit of a force (N) is above zero.
 
     Raises
     ------
@@ -64,17 +64,17 @@ def check_limit(limit: float) -> None:
 
 
 def rms(values: FloatArray) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def peak(values: FloatArray) -> float:
-    """Largest magnitude."""
+    """Return the largest magnitude."""
     return float(np.abs(values).max())
 
 
 class SampledController:
-    """A design as a controller runs it: measures, computes the force, which then holds for a period.
+    """A design run with a sampling period: it measures, computes the force, and holds it for a period.
 
     Parameters
     ----------
@@ -94,21 +94,21 @@ class SampledController:
         self.integral = 0.0
         self.channel = design.channel
         self._place = design.freedom
-        self._gains: list[float] = design.on_plant(design.gains).tolist()
-        self._target: list[float] = design.on_plant(design.target).tolist()
-        self._slope: list[float] = design.on_plant(design.target_slope).tolist()
+        self._gains: list[float] = design.plant_values(design.gains).tolist()
+        self._target: list[float] = design.plant_values(design.target).tolist()
+        self._slope: list[float] = design.plant_values(design.target_slope).tolist()
 
     def reset(self) -> None:
-        """Forget the integral."""
+        """Set the integral to zero."""
         self.integral = 0.0
 
     @property
     def method(self) -> str:
-        """How it was designed."""
+        """Name of the design method."""
         return self.design.method
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """The force for the next period, from all coordinates and all rates and the reference of the coordinate."""
+        """Return the force for the next period from coordinates, rates and the coordinate's reference."""
         step = reference - self._target[self._place]
         wanted = self.holding_force(reference)
         for gain, value, target, slope in zip(self._gains, measured, self._target, self._slope):
@@ -116,11 +116,11 @@ class SampledController:
         return self._limited(wanted, measured[self._place] - reference)
 
     def holding_force(self, reference: float) -> float:
-        """The force that holds the coordinate at a reference on the linear model."""
+        """Return the force that holds the coordinate at a reference on the linear model."""
         return self.design.force + self.design.force_slope * (reference - self._target[self._place])
 
     def follow(self, feedforward: float, position_error: float, velocity_error: float) -> float:
-        """The force for the next period along a moving reference, from the errors of coordinate and rate against it.
+        """Return the force for the next period along a moving reference, from the errors of coordinate and rate.
 
         ``feedforward`` takes the place of the holding force; no gain acts on other freedoms.
         """
@@ -128,31 +128,31 @@ class SampledController:
         return self._limited(feedforward - k_u * position_error - k_v * velocity_error, position_error)
 
     def _limited(self, wanted: float, error: float) -> float:
-        """The force wanted, integral added, within the limit; the integral goes on by the error."""
+        """Add the integral part, clip the force to the limit, and advance the integral by the error."""
         d = self.design
         wanted -= d.integral_gain * self.integral
         # a force beyond the limit is not asked for still louder
         if abs(wanted) <= self.limit or wanted * d.integral_gain * error > 0.0:
             self.integral += self.period * error
-        return limited(wanted, self.limit)
+        return saturate(wanted, self.limit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopMetrics:
-    """What a closed loop achieved.
+    """Settling, overshoot, tracking error and force of a closed loop.
 
     Attributes
     ----------
     settling_time : float or None
-        From the start to when the coordinate stays within the band about the reference (s); None if it does not.
+        Time from the start until the coordinate stays within the band about the reference (s); None if it does not.
     overshoot : float
-        How far it goes past the reference, as a share of the way to it.
+        Greatest excursion beyond the reference, as a share of the way to it.
     peak_force : float
         Largest force either way (N).
     rms_error, peak_error : float
-        Against the reference over the window at the end (m).
+        Deviation from the reference over the window at the end (m).
     rms_force : float
-        Over that window (N).
+        Force over that window (N).
     """
 
     settling_time: float | None
@@ -165,7 +165,7 @@ class LoopMetrics:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoopResult:
-    """A run of a closed loop, at the times at which the controller sampled.
+    """A run of a closed loop at the controller's sampling times.
 
     Attributes
     ----------
@@ -196,11 +196,11 @@ class LoopResult:
 
     @property
     def position(self) -> FloatArray:
-        """The coordinate that is controlled (m), shape (n,)."""
+        """Controlled coordinate (m), shape (n,)."""
         return self.states[:, : self.states.shape[1] // 2][:, self.freedom]
 
     def end(self, window: float) -> NDArray[np.bool_]:
-        """Which samples are in the window (s) at the end.
+        """Return a mask of the samples in the window (s) at the end.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class LoopResult:
         return np.asarray(self.time > self.time[-1] - window * (1.0 - 1e-9))
 
     def metrics(self, *, band: float, start: float = 0.0, window: float | None = None) -> LoopMetrics:
-        """Settling, overshoot, force and tracking error.
+        """Compute settling time, overshoot, force and tracking error.
 
         Parameters
         ----------
@@ -258,7 +258,7 @@ class LoopResult:
 
 
 class Controller(Protocol):
-    """What closes a loop every ``period`` s, by the force ``channel``."""
+    """A controller that is sampled every ``period`` s and acts by the force ``channel``."""
 
     @property
     def period(self) -> float: ...
@@ -275,7 +275,7 @@ class Controller(Protocol):
 
 
 class _Plant(Protocol):
-    """What a loop is closed around."""
+    """Plant of a closed loop: nonlinear, FMU or linear."""
 
     def measure(self) -> Sequence[float]: ...
 
@@ -287,7 +287,7 @@ class _Plant(Protocol):
 def _run_loop(
     plant: _Plant, controller: Controller, reference: Reference, times: FloatArray, freedom: int
 ) -> LoopResult:
-    """Measure, compute, hold, step; the controller starts afresh."""
+    """Run a closed loop from a reset controller: measure, compute, hold, step."""
     controller.reset()
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
@@ -317,7 +317,7 @@ def _run_loop(
 
 
 class _Driven:
-    """The nonlinear plant, in this process or as its FMU: what acts on it besides the controller is sampled and held."""
+    """The nonlinear plant, in this process or as its FMU; all other inputs are sampled and held with the controller."""
 
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
         self.mechanism, self.channel = mechanism, channel
@@ -327,13 +327,13 @@ class _Driven:
         self.rows: list[Sequence[float]] = []
 
     def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
-        """All inputs by their FMI names, the controller's at 0."""
+        """Return all inputs by FMI name, the controller's at 0."""
         x = np.array([*measured, 0.0, 0.0])
         return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._laws, ahead=ahead).tolist()))
 
 
 class _InProcess(_Driven):
-    """The plant in this process."""
+    """The nonlinear plant in this process."""
 
     plant: Plant
 
@@ -354,7 +354,7 @@ class _InProcess(_Driven):
 
 
 class _Fmu(_Driven):
-    """The plant's FMU."""
+    """The nonlinear plant as its FMU."""
 
     run: FmuRun
 
@@ -372,7 +372,7 @@ class _Fmu(_Driven):
 
 
 def _channel(mechanism: Mechanism, name: str) -> Channel:
-    """The force of the controller among the channels."""
+    """Return the channel of the controller's force."""
     for channel in mechanism.channels:
         if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
             return channel
@@ -401,10 +401,10 @@ def control_loop(
     controller : Controller
         Such as a `SampledController`; starts with its integral at zero.
     reference : float or function of time
-        Of the coordinate that is controlled, such as the slider position (m).
+        Reference of the controlled coordinate, such as the slider position (m).
     inputs : Inputs, optional
-        All else that acts, such as the speed of the crank (0 of one that is held), sampled and held with the controller. By
-        default nothing does.
+        All other inputs, such as the speed of the crank (0 if it is held), sampled and held with the controller; none by
+        default.
     initial
         State at the start.
     stop_time : float
@@ -423,7 +423,7 @@ def control_loop(
     Raises
     ------
     InputError
-        If something given is not usable, or the inputs have the controller's own force.
+        If an argument is not usable, or the inputs contain the controller's force.
     AssemblyError
         If the links cannot be joined at the start.
     """
@@ -463,7 +463,7 @@ def control_loop(
 
 
 class _Linear:
-    """Deviations of a linear model from the motion that it is about."""
+    """Deviations of a linear model from its equilibrium or periodic motion."""
 
     def __init__(
         self,
@@ -536,7 +536,7 @@ def predict_loop(
     deviation: ArrayLike | None = None,
     averaged: bool = False,
 ) -> LoopResult:
-    """The same loop around the linear model: what the design foretells of `control_loop`.
+    """Close a controller around the linear model, to predict `control_loop`.
 
     Parameters
     ----------
@@ -545,16 +545,16 @@ def predict_loop(
     controller, reference, stop_time
         As for `control_loop`.
     inputs : Inputs, optional
-        Of which the forces act; what is commanded goes as in the motion. By default all acts as in the motion.
+        Forces that act; commanded freedoms move as in the motion. By default all forces are those of the motion.
     deviation : array_like, shape (2 n,), optional
-        Of the model's state from its operating point at the start.
+        Deviation of the model's state from its operating point at the start.
     averaged : bool
         Take the time-averaged model of a periodic motion instead of the time-periodic one.
 
     Raises
     ------
     InputError
-        If something given is not usable, or the model is about a single state that is no equilibrium.
+        If an argument is not usable, or the model is about a single state that is no equilibrium.
     """
     n = model.A.shape[-1]
     start = np.zeros(n) if deviation is None else np.array(deviation, dtype=float)
@@ -571,7 +571,7 @@ def predict_loop(
 
 
 def _check_rest(model: LinearModel) -> None:
-    """Make sure that nothing moves or starts to move where the model is."""
+    """Make sure that the model is about an equilibrium."""
     mechanism, n = model.mechanism, len(model.mechanism.freedoms)
     scale = np.array(mechanism.error_scale(model.parameters, (0.0,) * mechanism.size))[:n]
     free, size = list(model.layout.free), len(model.layout.free)
@@ -585,7 +585,7 @@ def _check_rest(model: LinearModel) -> None:
 
 
 def largest_difference(first: LoopResult, second: LoopResult) -> float:
-    """Largest difference of the coordinate that is controlled between two runs of as many samples (m)."""
+    """Return the largest difference of the controlled coordinate between two runs of the same length (m)."""
     if first.time.shape != second.time.shape:
         raise InputError(f"runs of {len(first.time)} and {len(second.time)} samples: there must be as many in both")
     return float(np.abs(first.position - second.position).max())

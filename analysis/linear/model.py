@@ -15,9 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,9 +24,15 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..files import unknown_name
+from ..libraries import lazy
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
 from ..run import Inputs, encode, expressions, given, sample, takes_published
+
+if TYPE_CHECKING:
+    import control
+else:
+    control = lazy("control")
 
 FloatArray = NDArray[np.float64]
 #: Values of a mechanism's modes, in its order.
@@ -38,17 +43,17 @@ SAME_RATE = 1e-6
 
 
 class LinearModelError(LinkworkError):
-    """A linear model is asked for what it cannot give."""
+    """A linear model cannot give the result."""
 
 
 def signal_name(name: str) -> str:
-    """Name of an FMI variable as a signal of python-control, which keeps the dot for itself: ``slider_position``."""
+    """Return the name of an FMI variable as a python-control signal, with underscores for dots: ``slider_position``."""
     return name.replace(".", "_")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """What is free, what is commanded and what acts on a mechanism in given modes.
+    """Free and commanded freedoms and acting forces of a mechanism in given modes.
 
     Attributes
     ----------
@@ -72,7 +77,7 @@ class Layout:
 
 @cache
 def layout(mechanism: Mechanism, modes: Modes) -> Layout:
-    """What is free, what is commanded and what acts."""
+    """Return free and commanded freedoms and acting forces in given modes."""
     names = {mode.name: mode.arguments[value] for mode, value in zip(mechanism.modes, modes)}
 
     def acts(number: int) -> bool:
@@ -111,7 +116,7 @@ def _channel_of(mechanism: Mechanism, freedom: int, kind: str) -> str:
 
 @cache
 def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
-    """Outputs that a linear model does not have, and what they are."""
+    """Return the outputs that a linear model does not have, with the reason."""
     casadi, traces = symbolic.library(), expressions(mechanism)
     x, _, _, p = traces.symbols
     of_the_run = casadi.vertcat(x[2 * len(mechanism.freedoms) :], p[-1])
@@ -126,13 +131,13 @@ def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
 
 @cache
 def linear_outputs(mechanism: Mechanism) -> tuple[str, ...]:
-    """Outputs of a linear model, in the order of the FMI contract."""
+    """Return the outputs of a linear model, in the order of the FMI contract."""
     return tuple(name for name in mechanism.output_names if name not in missing_outputs(mechanism))
 
 
 @cache
 def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
-    """State, channels, constants -> outputs, accelerations, M, C, K, F and the outputs' derivatives by state and inputs."""
+    """Return a CasADi function of state, channels and constants: outputs, accelerations, M, C, K, F, output derivatives."""
     casadi, traces, its = symbolic.library(), expressions(mechanism, switched), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
     n = len(mechanism.freedoms)
@@ -168,7 +173,7 @@ def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Matrices:
-    """The arrays of a linear model, or those of many stacked along the first axis.
+    """Arrays of a linear model, or of many models stacked along the first axis.
 
     n is the number of freedoms that are free: of a five-bar 2 in torque drive, with q = (crank angle, slider position), and
     1 in speed drive, with q = (slider position); m is the number of inputs, l that of outputs, f of all freedoms. All are
@@ -191,7 +196,7 @@ class Matrices:
     outputs : ndarray, shape (..., l)
         The outputs at the operating point.
     acceleration : ndarray, shape (..., f)
-        Of all freedoms there.
+        Accelerations of all freedoms at the operating point.
     """
 
     parameters: Parameters
@@ -207,17 +212,17 @@ class Matrices:
 
     @property
     def mechanism(self) -> Mechanism:
-        """The mechanism."""
+        """Mechanism of the parameters."""
         return mechanism_of(self.parameters)
 
     @property
     def layout(self) -> Layout:
-        """What is free, what is commanded and what acts."""
+        """Free and commanded freedoms and acting forces."""
         return layout(self.mechanism, self.modes)
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """FMI names of the inputs. The coordinate of a commanded freedom is one of them: its motion acts in three parts."""
+        """FMI names of the inputs; a commanded freedom has three: acceleration, speed and coordinate."""
         return self.layout.input_names
 
     @property
@@ -232,7 +237,7 @@ class Matrices:
 
     @property
     def places(self) -> list[int]:
-        """Places of (q, q') in the state of the plant."""
+        """Indices of (q, q') in the state of the plant."""
         free, n = self.layout.free, len(self.mechanism.freedoms)
         return [*free, *(n + k for k in free)]
 
@@ -254,7 +259,7 @@ class Matrices:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearModel(Matrices):
-    """A mechanism about one state, or the mean of that along a periodic motion; see `Matrices`.
+    """A mechanism about one state, or the mean model along a periodic motion; see `Matrices`.
 
     Attributes
     ----------
@@ -269,27 +274,27 @@ class LinearModel(Matrices):
 
     @property
     def inputs(self) -> Inputs:
-        """What acts there, as constants; of commands the rate of change is not among them."""
+        """Inputs at the operating point, as constants; without the rates of change of commands."""
         return constant_inputs(self.mechanism, self.modes, self.channels)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of A (1/s), by magnitude."""
-        return by_magnitude(np.linalg.eigvals(self.A))
+        return sorted_by_magnitude(np.linalg.eigvals(self.A))
 
     @property
     def natural_frequencies(self) -> FloatArray:
-        """Undamped natural frequencies (rad/s): square roots of the positive eigenvalues of M^-1 K, rising."""
+        """Undamped natural frequencies (rad/s), rising: square roots of the positive eigenvalues of M^-1 K."""
         squares = np.linalg.eigvals(np.linalg.solve(self.M, self.K))
         return np.sort(np.sqrt(squares.real[(squares.real > 0.0) & (squares.imag == 0.0)]))
 
     def force_channel(self, name: str | None = None) -> tuple[str, int]:
-        """A force that drives a free freedom: its name, and the number of the freedom.
+        """Return a force that drives a free freedom: its name, and the number of the freedom.
 
         Parameters
         ----------
         name : str, optional
-            By default that on the last of the free freedoms: of a five-bar ``slider.force``.
+            By default the force on the last free freedom: of a five-bar ``slider.force``.
 
         Raises
         ------
@@ -302,12 +307,12 @@ class LinearModel(Matrices):
             if name in (None, channel.name):
                 return channel.name, channel.freedom
         known = ", ".join(channel.name for channel in channels) or "none"
-        raise LinearModelError(f"no force {name or ''} drives a freedom of this model; those that do: {known}")
+        raise LinearModelError(f"no force {name or ''} drives a freedom of this model; these do: {known}")
 
     def to_state_space(
         self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None
     ) -> control.StateSpace:
-        """The model for python-control.
+        """Convert the model to a state space of python-control.
 
         Parameters
         ----------
@@ -344,8 +349,8 @@ class LinearModel(Matrices):
         )
 
 
-def by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
-    """Complex numbers in the order of their magnitudes, those of a pair by their imaginary parts."""
+def sorted_by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
+    """Return complex numbers sorted by magnitude, conjugate pairs by their imaginary parts."""
     whole = np.asarray(values, dtype=complex)
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
 
@@ -357,17 +362,17 @@ def _index(name: str, names: tuple[str, ...]) -> int:
 
 
 def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> Inputs:
-    """Inputs that are the constants ``channels``, in the given modes."""
+    """Return inputs with the constants ``channels`` in the given modes."""
     values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
     forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
     acting = {name: values[name] for name in forces if values[name] != 0.0}
-    # what chooses a mode and is no channel is a flag, such as groove
+    # an argument that chooses a mode and is no channel is a flag, such as groove
     chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
     return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
 
 def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
-    """The arrays of `Matrices` at states, shape (s, size), under channels, shape (s, channels), along the first axis.
+    """Return the arrays of `Matrices` at states (s, size) under channels (s, channels), stacked along the first axis.
 
     Raises InputError if a state or a channel is not finite, or nothing is free; AssemblyError if the links cannot be joined at
     a state.
@@ -403,8 +408,8 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
     }
 
 
-def whole_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
-    """States with or without the work at their end, shape (n, 2 f) or (n, 2 f + 2), as those with it."""
+def full_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
+    """Return states (n, 2 f) or (n, 2 f + 2) as full states, with zero work if they have none."""
     array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
     if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
         raise InputError(
@@ -414,12 +419,12 @@ def whole_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
     return np.hstack([array, np.zeros((len(array), mechanism.size - array.shape[1]))])
 
 
-def channels_along(
+def sampled_channels(
     mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
 ) -> tuple[Modes, FloatArray]:
-    """Modes and channels, shape (s, channels), under inputs at times and states.
+    """Return modes and channels (s, channels) for inputs at times and states.
 
-    Raises InputError if the inputs are another mechanism's or not finite, or command a rate that is not that of the states.
+    Raises InputError if the inputs belong to another mechanism, are not finite, or command a rate unlike that of the states.
     """
     inputs, _ = given(mechanism, inputs, None)
     encoded = encode(inputs, mechanism)
@@ -440,17 +445,17 @@ def channels_along(
 
 @takes_published()
 def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = None) -> LinearModel:
-    """The linear model at a state of a mechanism.
+    """Linearise a mechanism at a state.
 
     Parameters
     ----------
     parameters
         Of the mechanism; or a published set or its name.
     state : array_like
-        All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need be no
-        equilibrium: the deviations are then those from the motion through it, and the model holds at that instant.
+        All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need not be an
+        equilibrium: the deviations are then from the motion through it, and the model holds at that instant.
     inputs : Inputs, optional
-        In force there at time 0, such as `Equilibrium.inputs`; they choose what is free. By default nothing acts.
+        Inputs at time 0, such as `Equilibrium.inputs`; they decide which freedoms are free. None by default.
 
     Raises
     ------
@@ -468,10 +473,10 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     (1, 1)
     """
     mechanism = mechanism_of(parameters)
-    states = whole_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
+    states = full_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
         raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_along")
-    modes, channels = channels_along(mechanism, inputs, np.zeros(1), states)
+    modes, channels = sampled_channels(mechanism, inputs, np.zeros(1), states)
     arrays = evaluate(parameters, modes, states, channels)
     return LinearModel(
         parameters=parameters,

@@ -24,10 +24,10 @@ from .model import (
     LinearModelError,
     Matrices,
     Modes,
-    channels_along,
     evaluate,
+    full_states,
     layout,
-    whole_states,
+    sampled_channels,
 )
 
 #: Least samples of a period that carry its harmonics.
@@ -37,7 +37,7 @@ MOST_ITERATIONS = 60
 
 
 class Turn(Protocol):
-    """One period of a motion at equal steps of the angle that comes round, its end left out, such as `periodic.Turn`."""
+    """One period of a motion at equal steps of the crank angle, without its end, such as `periodic.Turn`."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -68,7 +68,7 @@ class Orbit(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PeriodicModel(Matrices):
-    """A mechanism about a periodic motion: linear models at s evenly spaced times of a period; see `Matrices`.
+    """Linear models of a mechanism at s evenly spaced times of a periodic motion; see `Matrices`.
 
     Attributes
     ----------
@@ -111,25 +111,25 @@ class PeriodicModel(Matrices):
         return self.period * np.arange(len(self)) / len(self)
 
     def mean(self) -> LinearModel:
-        """The time-averaged model: M, C, K, F, H and D are each the mean over the period.
+        """Return the time-averaged model: the means of M, C, K, F, H and D over the period.
 
-        It foretells slow deviations of a motion whose M and K vary little; `monodromy` says what the motion does in truth.
+        It predicts slow deviations of a motion whose M and K vary little; `monodromy` is exact.
         """
         return self._model(lambda values: np.asarray(values.mean(axis=0)))
 
     def interpolated(self, values: FloatArray) -> Callable[[float], FloatArray]:
-        """The trigonometric polynomial through values at the samples, shape (s, ...), as a function of time."""
+        """Return the trigonometric polynomial through values at the samples (s, ...), as a function of time."""
         return trigonometric(values, self.period)
 
     def motion(self) -> Callable[[float], FloatArray]:
-        """The motion itself as a function of time: all coordinates, then all rates."""
+        """Return the motion as a function of time: all coordinates, then all rates."""
         n = len(self.mechanism.freedoms)
         rates = np.append(self._secular(), np.zeros(n))
         periodic = self.interpolated(self.states[:, : 2 * n] - self.times[:, None] * rates)
         return lambda t: periodic(t) + t * rates
 
     def _secular(self) -> FloatArray:
-        """Mean rates of the freedoms that come round: whole turns in the period; of the others zero."""
+        """Return the mean rates of cyclic freedoms, whole turns in the period; zero for the others."""
         freedoms = self.mechanism.freedoms
         way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
         return (
@@ -137,14 +137,14 @@ class PeriodicModel(Matrices):
         )
 
     def check(self) -> None:
-        """Make sure that the rates of the free freedoms are the derivatives of the samples taken as periodic.
+        """Make sure that the rates of the free freedoms are the derivatives of the periodic samples.
 
-        Of a wrong period, an end sampled twice or an unsettled motion they are not.
+        They are not if the period is wrong, the end is sampled twice or the motion has not settled.
 
         Raises
         ------
         InputError
-            With the freedom of which they are not.
+            If they are not, with the freedom.
         """
         mechanism, n, secular = self.mechanism, len(self), self._secular()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -162,7 +162,7 @@ class PeriodicModel(Matrices):
                 )
 
     def monodromy(self, tolerance: float = 1e-10) -> FloatArray:
-        """What a period makes of the deviations (q, q'), shape (2 n, 2 n): Phi' = A(t) Phi from the unit matrix.
+        """Integrate Phi' = A(t) Phi from the unit matrix over a period; shape (2 n, 2 n).
 
         A(t) is the trigonometric polynomial through its samples, integrated with SciPy. The eigenvalues are Floquet's
         multipliers; in torque drive one of them is 1 along a motion of the free plant.
@@ -198,7 +198,7 @@ def linearise_along(
     period: Amount = None,
     samples: int = 128,
 ) -> PeriodicModel:
-    """Linear models along a periodic motion.
+    """Linearise a mechanism along a periodic motion.
 
     Parameters
     ----------
@@ -208,18 +208,17 @@ def linearise_along(
         States at evenly spaced times of one period, the end of it left out: all coordinates, then all rates; or an object
         such as `analysis.periodic.PeriodicOrbit`.
     inputs : Inputs, optional
-        In force along the motion of an array, which begins at time 0; by default nothing acts. A torque or force that follows
-        the state by a law of its own, a motor's or a controller's, enters with its value: the slope of the law is none of
-        the plant's.
+        Inputs along the motion of an array, which begins at time 0; none by default. A torque or force by a law of the state,
+        such as a motor's or a controller's, enters with its value: the model does not include the derivative of that law.
     period : float, optional
-        s. By default that of the orbit, and of an array at a constant prescribed speed one turn.
+        Period (s); by default the period of the orbit, or one turn for an array at a constant prescribed speed.
     samples : int
-        Samples of an orbit; of an array there are as many as it has.
+        Number of samples of an orbit; an array has its own.
 
     Raises
     ------
     InputError
-        If inputs or period are given for an orbit; if the samples are fewer than `LEAST_SAMPLES`, not finite, or not those
+        If inputs or period are given for an orbit; if the samples are fewer than `LEAST_SAMPLES`, not finite, or not samples
         of a periodic motion evenly spaced in time.
     AssemblyError
         If the links cannot be joined at one of them.
@@ -227,29 +226,29 @@ def linearise_along(
     mechanism = mechanism_of(parameters)
     if isinstance(motion, Orbit):
         if inputs is not None or period is not None:
-            raise InputError("inputs and period are those of the orbit: they cannot be given besides")
+            raise InputError("an orbit has its own inputs and period: they cannot be given beside it")
         turn = motion.turn(samples)
-        states, channels = _in_time(mechanism, turn)
+        states, channels = _resample(mechanism, turn)
         modes, period = turn.modes, turn.period
     else:
-        states = whole_states(mechanism, motion)
+        states = full_states(mechanism, motion)
         inputs, _ = given(mechanism, inputs, None)
         if period is None:
-            period = _one_turn(mechanism, tuple(inputs.modes(mechanism).values()), states)
+            period = _turn_time(mechanism, tuple(inputs.modes(mechanism).values()), states)
     if len(states) < LEAST_SAMPLES:
         raise InputError(f"{len(states)} samples of a period: at least {LEAST_SAMPLES} are needed")
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"period is {period} s: it must be a finite number greater than zero")
     if not isinstance(motion, Orbit):
-        modes, channels = channels_along(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
+        modes, channels = sampled_channels(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
     arrays = evaluate(parameters, modes, states, channels)
     model = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
     model.check()
     return model
 
 
-def _one_turn(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
-    """Time of a turn of the freedom that is commanded to come round at a constant speed."""
+def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
+    """Return the time of a turn of the freedom with a constant commanded speed."""
     for n in layout(mechanism, modes).commanded:
         rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
         if mechanism.freedoms[n].period and speed != 0.0 and np.ptp(rate) <= 1e-9 * abs(speed):
@@ -257,8 +256,8 @@ def _one_turn(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
     raise InputError("the period must be given: it follows from the states at a constant prescribed speed alone")
 
 
-def _in_time(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
-    """States and channels of a turn at equal steps of time instead of the angle that comes round."""
+def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
+    """Resample a turn from equal steps of the crank angle to equal steps of time: states and channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     crank = next(k for k, freedom in enumerate(mechanism.freedoms) if freedom.period)
     angle = turn.states[:, crank] - turn.states[0, crank]
@@ -279,7 +278,7 @@ def _in_time(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
                 break
         found[k] = values(x)
         found[k, crank] = turn.states[0, crank] + x
-    return whole_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
+    return full_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
 @takes_published(inputs=driven, initial=started)
@@ -291,16 +290,16 @@ def settled_motion(
     samples: int = 128,
     turns: int = 200,
 ) -> FloatArray:
-    """The motion that a mechanism settles to at a constant speed, by running on until it repeats itself.
+    """Run a mechanism at constant speed until its motion repeats, and return the last turn.
 
     Parameters
     ----------
     parameters
         Of the mechanism.
     inputs : Inputs
-        With the speed of a freedom that comes round, such as ``Inputs(speed=40.0)``; all else constant, too.
+        Constant inputs with the speed of a cyclic freedom, such as ``Inputs(speed=40.0)``.
     initial : optional
-        Start of the run; by default all is zero, and the others at rest.
+        Start of the run; by default at zero and at rest but for the commanded speed.
     samples : int
         States of the last turn, evenly spaced, its end left out.
     turns : int
@@ -325,7 +324,7 @@ def settled_motion(
     crank = next((k for k in its.commanded if mechanism.freedoms[k].period), None)
     if crank is None or not inputs.held_exactly:
         raise InputError(
-            f"{inputs}: a motion settles at a constant speed of a freedom that comes round, all else constant"
+            f"{inputs}: a motion settles at a constant speed of a cyclic freedom, with all other inputs constant"
         )
     channel, speed = speeds[crank]
     if not speed:
@@ -343,7 +342,7 @@ def settled_motion(
     if run.status:
         raise LinearModelError(f"there is no steady motion at {speed:g} {channel.name}: {run.message}")
     names = [f.coordinate for f in mechanism.freedoms] + [f.rate for f in mechanism.freedoms]
-    before, after = np.split(whole_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
+    before, after = np.split(full_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
     scale = np.array(mechanism.error_scale(parameters, tuple(after[0].tolist())))[:n]
     gap = np.abs(after[:, :n] - before[:, :n]).max(axis=0) / scale
     worst = max(its.free, key=lambda k: gap[k])

@@ -1,14 +1,15 @@
-"""Boundaries in a chart: curves along which a smooth function of two parameters is zero, found and traced.
+"""Boundaries in a chart: the curves on which a smooth function of two parameters is zero.
 
 It knows no mechanics. `scan` finds the roots along a line, close pairs too; `trace` follows a boundary from a point near it;
-`chart` finds and follows all that cross its lines.
+`chart` finds and follows all boundaries that cross its lines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isfinite
+from itertools import pairwise
+from math import isfinite, isnan
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-from .continuation import ContinuationError, Curve, End, Evaluation, Follower, Reason, Settings
+from .continuation import ContinuationError, End, Evaluation, Follower, Reason, Settings
 
 #: A smooth function of a point of a chart, negative in a region of instability.
 Test = Callable[[float, float], float]
@@ -25,7 +26,7 @@ Test = Callable[[float, float], float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gap:
-    """A point at which a test function has no value, and why."""
+    """A point at which a test function has no value, and the reason."""
 
     point: tuple[float, float]
     message: str
@@ -33,16 +34,16 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Line:
-    """What a test function does along a line.
+    """Roots and signs of a test function along a line.
 
     Attributes
     ----------
     roots : ndarray, shape (n,)
-        Where it is zero, increasing.
+        Its zeros, increasing.
     intervals : tuple of (float, float)
-        Where it is negative; an interval may end at an end of the line or at a gap.
+        The intervals on which it is negative; they may end at an end of the line or at a gap.
     gaps : tuple of (float, str)
-        Samples at which it has no value, and why.
+        Samples at which it has no value, and the reason.
     """
 
     roots: NDArray[np.float64]
@@ -53,15 +54,15 @@ class Line:
 def scan(
     function: Callable[[float], float], low: float, high: float, *, samples: int = 200, tolerance: float = 1e-12
 ) -> Line:
-    """Find the roots of a function on an interval, the close pairs on both sides of a narrow region too.
+    """Find the roots of a function on an interval, including close pairs on both sides of a narrow region.
 
-    Where the samples pass an extremum towards zero, the extremum itself is sought: two boundaries closer together than the
-    samples are not missed, as long as the function is monotonic on the way to them.
+    If the samples pass an extremum towards zero, the extremum itself is sought: two boundaries closer together than the samples
+    are not missed, as long as the function is monotonic on the way to them.
 
     Parameters
     ----------
     function : callable
-        Of one float; where it raises a `LinkworkError` there is a gap.
+        Of one float; a `LinkworkError` makes a gap.
     low, high : float
     samples : int
         At least 3.
@@ -73,79 +74,78 @@ def scan(
     InputError
         If the interval or the number of samples is not usable.
     """
-    points = _samples(low, high, samples)
-    values, gaps = np.full(samples, np.nan), []
-    for i, point in enumerate(points.tolist()):
+    points, values, gaps = _sampled(function, _samples(low, high, samples))
+    roots: list[float] = []
+    intervals: list[tuple[float, float]] = []
+    begun = points[0] if values[0] < 0.0 else None
+
+    def end(place: float) -> None:
+        nonlocal begun
+        if begun is not None:
+            intervals.append((begun, place))
+        begun = None
+
+    for (here, value), (there, following) in pairwise(zip(points, values)):
+        if isnan(following):
+            end(here)
+        elif isnan(value):
+            begun = there if following < 0.0 else None
+        elif (value < 0.0) != (following < 0.0):
+            # a function value of zero counts as positive: the same root is not found from both sides
+            try:
+                root = there
+                if following != 0.0:
+                    root = float(scipy.optimize.brentq(function, here, there, xtol=tolerance * (high - low)))
+            except LinkworkError as error:
+                gaps.append((there, f"just before: {error}"))
+                # the boundary is somewhere between the samples, and so is the end of the interval
+                end(here)
+                root = there
+            else:
+                roots.append(root)
+                end(root)
+            begun = root if following < 0.0 else None
+    end(points[-1])
+    return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
+
+
+def _sampled(
+    function: Callable[[float], float], samples: NDArray[np.float64]
+) -> tuple[list[float], list[float], list[tuple[float, str]]]:
+    """Return places, values, NaN at gaps, and gaps of a function at samples and at extrema of another sign between them."""
+    values, gaps = np.full(len(samples), np.nan), []
+    for i, place in enumerate(samples.tolist()):
         try:
-            values[i] = function(point)
+            values[i] = function(place)
         except LinkworkError as error:
-            gaps.append((point, str(error)))
-    places, results = list(points), list(values)
-    for i in range(samples):
-        first, last = max(i - 1, 0), min(i + 1, samples - 1)
+            gaps.append((place, str(error)))
+    found = list(zip(samples.tolist(), values.tolist()))
+    for i in range(len(samples)):
+        first, last = max(i - 1, 0), min(i + 1, len(samples) - 1)
         around, sign = values[first : last + 1], np.sign(values[i])
         if np.isfinite(around).all() and (np.sign(around) == sign).all() and first + np.argmin(sign * around) == i:
             try:
-                found = scipy.optimize.minimize_scalar(
+                extremum = scipy.optimize.minimize_scalar(
                     lambda x, sign=sign: sign * function(x),
-                    bounds=(points[first], points[last]),
+                    bounds=(samples[first], samples[last]),
                     method="bounded",
-                    options={"xatol": 1e-9 * (high - low)},
+                    options={"xatol": 1e-9 * (samples[-1] - samples[0])},
                 )
             except LinkworkError as error:
-                gaps.append((float(points[i]), f"between the samples: {error}"))
+                gaps.append((float(samples[i]), f"between the samples: {error}"))
                 continue
-            if found.fun < 0.0:
-                places.append(float(found.x))
-                results.append(sign * float(found.fun))
-    order = np.argsort(places, kind="stable")
-    points, values = np.array(places)[order], np.array(results)[order]
-    roots = []
-    intervals: list[tuple[float, float]] = []
-    begun = float(points[0]) if values[0] < 0.0 else None
-    for i in range(1, len(points)):
-        left, right = values[i - 1], values[i]
-        here = float(points[i])
-        if np.isnan(left) or np.isnan(right):
-            if begun is not None and np.isnan(right):
-                intervals.append((begun, float(points[i - 1])))
-                begun = None
-            elif right < 0.0:
-                begun = here
-            continue
-        if (left < 0.0) == (right < 0.0):
-            continue
-        # a function value of zero counts as positive: the same root is not found from both sides
-        try:
-            root = (
-                here
-                if right == 0.0
-                else float(scipy.optimize.brentq(function, points[i - 1], here, xtol=tolerance * (high - low)))
-            )
-        except LinkworkError as error:
-            gaps.append((here, f"just before: {error}"))
-            # the boundary is somewhere between the samples, and so is the end of the interval
-            if begun is not None:
-                intervals.append((begun, float(points[i - 1])))
-            begun = here if right < 0.0 else None
-            continue
-        roots.append(root)
-        if right < 0.0:
-            begun = root
-        elif begun is not None:
-            intervals.append((begun, root))
-            begun = None
-    if begun is not None:
-        intervals.append((begun, float(points[-1])))
-    return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
+            if extremum.fun < 0.0:
+                found.append((float(extremum.x), float(sign * extremum.fun)))
+    found.sort(key=lambda pair: pair[0])
+    return [place for place, _ in found], [value for _, value in found], gaps
 
 
 def lowest(
     function: Callable[[float], float], low: float, high: float, *, samples: int = 40, tolerance: float = 1e-9
 ) -> tuple[float, float]:
-    """Place and value of the least value of a smooth function on an interval.
+    """Find place and value of the minimum of a smooth function on an interval.
 
-    The place to within a tolerance relative to the length of the interval; the value is good to its square.
+    The place is exact to a tolerance relative to the length of the interval, the value to its square.
 
     Raises
     ------
@@ -224,7 +224,7 @@ class Boundary:
         return self.ends[0].reason is Reason.CLOSED
 
     def crossings(self, axis: int, value: float, box: Box) -> NDArray[np.float64]:
-        """Where it crosses x = value (axis 0) or y = value (axis 1): values of the other, by cubic interpolation."""
+        """Return where it crosses x = value (axis 0) or y = value (axis 1): values of the other, by cubic interpolation."""
         scaled = (self.points - box.corner) / box.size
         level = (value - box.corner[axis]) / box.size[axis]
         found = []
@@ -241,34 +241,29 @@ class Boundary:
                     - u * u * (1.0 - u) * t
                 )
 
-            u = (
-                0.0
-                if p[axis] == level
-                else 1.0
-                if q[axis] == level
-                else scipy.optimize.brentq(lambda u: curve(u)[axis] - level, 0, 1)
-            )
+            # the ends may be zero: brentq takes them as they are
+            u = scipy.optimize.brentq(lambda u: curve(u)[axis] - level, 0.0, 1.0)
             found.append(curve(u)[1 - axis] * box.size[1 - axis] + box.corner[1 - axis])
         return np.array(found)
 
 
 #: Step (of the box scaled to 1 by 1) for differences of the test function.
 _DIFFERENCE = 1e-4
-#: Shortest step of a trace, as far as which sharp turns are followed.
+#: Shortest step of a trace in sharp turns.
 _SHORTEST = 1e-6
-#: Largest turn of the tangent in a step (rad), and that up to which the step grows.
+#: Largest turn of the tangent in a step (rad), and the turn up to which the step grows.
 _TURN, _STRAIGHT = 0.35, 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class _Zero:
-    """A test function as the one equation of a curve: the unknown is x, the parameter y."""
+    """A test function as the one equation of a curve; the unknown is x, the parameter y."""
 
     test: Test
     box: Box
 
     def residual(self, x: NDArray[np.float64], y: float) -> NDArray[np.float64]:
-        """The test function, shape (1,), in the unit of x as the scaling expects it."""
+        """Return the test function, shape (1,), scaled by the size of x."""
         place = float(x[0]), y
         value = self.test(*place)
         if not isfinite(value):
@@ -276,7 +271,7 @@ class _Zero:
         return np.array([value * self.box.size[0]])
 
     def evaluate(self, x: NDArray[np.float64], y: float) -> Evaluation:
-        """With its slope, by differences of second order that stay inside the box; the data are the distance from zero."""
+        """Return it with its slope, by second-order differences inside the box; the data are the distance from zero."""
         place, low, high = np.array([x[0], y]), self.box.corner, self.box.corner + self.box.size
         here, slope = float(self.residual(x, y)[0]), np.empty(2)
         for axis, size in enumerate(self.box.size):
@@ -299,10 +294,10 @@ class _Zero:
 
 
 def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02, most: int = 5000) -> Boundary:
-    """Follow the boundary through a point, both ways; see `analysis.numerics.continuation`.
+    """Follow the boundary through a point in both directions; see `analysis.numerics.continuation`.
 
-    A step is taken again at half its length if the tangent turns by more than 20 degrees, or if the other side of a narrow
-    region is met: its direction is opposite.
+    A step is halved if the tangent turns by more than 20 degrees, or if it meets the other side of a narrow region, which
+    has the opposite direction.
 
     Parameters
     ----------
@@ -358,20 +353,13 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
         raise InputError(f"no boundary within {step:g} of the box of the seed {seed}")
     if start.orientation < 0.0:
         start = start.turned()
-    forth = follower.follow(start)
-    back = forth if forth.closed else follower.follow(start.turned())
-    way = [*forth.points] if forth.closed else [*(point.turned() for point in back.points[:0:-1]), *forth.points]
+    way, *curves = follower.follow_both(start)
     return Boundary(
         points=np.array([[point.y[0], point.parameter] for point in way]),
         tangents=np.array([point.tangent for point in way]),
         residual=max(point.data for point in way),
-        ends=(_end(back), _end(forth)),
+        ends=(curves[0].plane_end(curves[0].message), curves[1].plane_end(curves[1].message)),
     )
-
-
-def _end(curve: Curve) -> End:
-    last = curve.points[-1]
-    return End(reason=curve.end, point=(float(last.y[0]), last.parameter), message=curve.message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -405,7 +393,6 @@ def chart(
     lines: tuple[int, int] = (2, 5),
     samples: int = 200,
     step: float = 0.02,
-    seeds: Iterable[tuple[float, float]] = (),
 ) -> Chart:
     """Find and trace the boundaries in a box.
 
@@ -421,18 +408,16 @@ def chart(
         See `scan`.
     step : float
         See `trace`.
-    seeds : iterable of (float, float)
-        Points near further boundaries.
 
     Raises
     ------
     InputError
-        If no line and no seed is given, or one line of a kind, which has no place.
+        If there are no lines, or one line of a kind, which has no place.
     """
-    if 1 in lines or min(lines) < 0 or (lines == (0, 0) and not seeds):
-        raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind or seed")
+    if 1 in lines or min(lines) < 0 or lines == (0, 0):
+        raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind")
     gaps: list[Gap] = []
-    candidates: list[tuple[int | None, tuple[float, float]]] = [(None, seed) for seed in seeds]
+    candidates: list[tuple[int, tuple[float, float]]] = []
     for side, count in enumerate(lines):
         for value in np.linspace(*(box.x, box.y)[side], count).tolist():
 
@@ -444,19 +429,17 @@ def chart(
             gaps += [Gap(point=point(place), message=message) for place, message in line.gaps]
     found: list[Boundary] = []
     for axis, seed in candidates:
-        if axis is not None and any(_on(boundary, axis, seed, box) for boundary in found):
+        if any(_on(boundary, axis, seed, box) for boundary in found):
             continue
         try:
             found.append(trace(test, seed, box, step=step))
         except LinkworkError as error:
-            if axis is None:
-                raise
             # the sign changes where the function jumps, too
             gaps.append(Gap(point=seed, message=f"no boundary leads through: {error}"))
     return Chart(box=box, test=test, boundaries=tuple(found), gaps=tuple(gaps))
 
 
 def _on(boundary: Boundary, axis: int, seed: tuple[float, float], box: Box) -> bool:
-    """Whether a root of a line has been passed by a boundary, to within the interpolation between its points."""
+    """Return whether a boundary passes through a root of a line, to within the interpolation between its points."""
     others = boundary.crossings(axis, seed[axis], box)
     return len(others) > 0 and float(np.abs(others - seed[1 - axis]).min()) < 1e-5 * box.size[1 - axis]

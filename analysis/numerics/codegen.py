@@ -1,13 +1,13 @@
-"""Functions traced with CasADi as machine code in this process, and Numba kernels that call them by address.
+"""Machine code of functions traced with CasADi, and Numba kernels that call them by address.
 
-A ``casadi.Function`` of symbols is a list of elementary instructions. They are written out as LLVM's and compiled in some
-hundredths of a second; the machine code is kept on disk by a hash of the instructions, of the processor and of what writes
-them, so that it cannot be out of date. Every function has the one form
+A ``casadi.Function`` of symbols is a list of elementary instructions. They are translated to LLVM's and compiled in some
+hundredths of a second. The machine code is kept on disk under a hash of the instructions, the processor and this module, so
+that it cannot be out of date. Every function has the form
 
     f(t, a, b, c, d, out)        t a float, the others arrays of floats
 
-so that a kernel compiled once, in `kernel`, works with the functions of any mechanism. Kernels are kept on disk, in a folder
-whose name is a hash of all that they are compiled from.
+so that a kernel, compiled once, works with the functions of any mechanism. Kernels are kept on disk in a folder whose name is
+a hash of all their sources.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import hashlib
 import os
 import shutil
 import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -37,11 +36,11 @@ from numba import float64, int64, njit, types
 from numba.core import event
 from numba.extending import intrinsic
 from numba.np.unsafe.ndarray import to_fixed_tuple
-from platformdirs import user_cache_dir
 
 from linkwork.errors import LinkworkError
 
 from . import linking
+from .cache import code_folder
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -52,26 +51,26 @@ _ARGUMENTS = [_DOUBLE, *[_DOUBLE.as_pointer()] * 5]
 
 # Machine code of functions
 
-#: Held while code is made, so that threads make it once and each finds it whole.
+#: Held while code is compiled, so that threads compile it once and each finds it complete.
 MAKING = RLock()
 _ALIVE: list[Any] = []
 
 
 class MachineCode:
-    """Machine code of functions, which stays in the process for good: someone may hold an address.
+    """Machine code of functions, which stays in the process, as a caller may hold an address.
 
     Parameters
     ----------
     functions : sequence of casadi.Function
-        Of SX, with the inputs (t, a, b, c, d) and dense outputs, which follow one another in ``out``, matrices column by
-        column.
+        Of SX, with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in ``out``, matrices column
+        by column.
 
     Attributes
     ----------
     addresses : dict of str to int
         Address of each function by its name.
     fingerprint : str
-        Hash of the instructions, of the processor and of what writes them.
+        Hash of the instructions, the processor and this module.
 
     Raises
     ------
@@ -98,7 +97,7 @@ class MachineCode:
 
 
 def _compile(functions: Sequence[Any], triple: str, machine: Any) -> bytes:
-    """An object file of functions."""
+    """Return an object file with functions."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
@@ -116,14 +115,14 @@ def _own_source() -> bytes:
 
 
 def _kept(key: str, make: Callable[[], bytes]) -> bytes:
-    """The object file of a key from disk, or a new one, with a hash: LLVM ends the process over one that is damaged."""
+    """Return the object file for a key, from disk or newly made; its hash is checked, as LLVM crashes on a damaged file."""
     path = code_folder("llvm") / key
     with suppress(OSError):
         digest, code = (text := path.read_bytes())[:32], text[32:]
         if hashlib.sha256(code).digest() == digest:
             return code
     code = make()
-    # where the disk is full or cannot be written to it is made again the next time
+    # where the disk is full or read-only, it is compiled again the next time
     part = path.with_suffix(f".{os.getpid()}")
     with suppress(OSError):
         try:
@@ -157,13 +156,14 @@ _INTRINSICS = {"OP_SQRT": "llvm.sqrt.f64", "OP_FABS": "llvm.fabs.f64"}
 
 @cache
 def _operations() -> dict[int, str]:
-    """CasADi's names of its operations by their codes."""
+    """Return the names of CasADi's operations by code."""
     casadi = _casadi()
     return {getattr(casadi, name): name for name in dir(casadi) if name.startswith("OP_")}
 
 
 @cache
 def _prepare() -> None:
+    """Start LLVM, and give it the addresses of the C library's functions."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     library = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else ctypes.util.find_library("m"))
@@ -175,7 +175,7 @@ def _prepare() -> None:
 
 
 class _Writer:
-    """Writes one function of CasADi into a module of LLVM."""
+    """Translates one function of CasADi into a module of LLVM."""
 
     def __init__(self, module: ir.Module, function: Any) -> None:
         self.module = module
@@ -199,6 +199,7 @@ class _Writer:
         }
 
     def write(self) -> None:
+        """Translate all instructions."""
         f, build = self.source, self.build
         sizes = [f.size1_out(i) * f.size2_out(i) for i in range(f.n_out())]
         if any(f.nnz_out(i) != size for i, size in enumerate(sizes)):
@@ -228,8 +229,8 @@ class _Writer:
         name = (_FUNCTIONS | _INTRINSICS).get(operation)
         if name is None:
             raise LinkworkError(
-                f"{self.source.name()}: CasADi's operation {operation} has no counterpart in machine code; equations are "
-                "straight lines of arithmetic and functions such as sin, sqrt, exp"
+                f"{self.source.name()}: CasADi's operation {operation} cannot be compiled; equations consist of "
+                "arithmetic and functions such as sin, sqrt, exp"
             )
         target = self.module.globals.get(name)
         if target is None:
@@ -274,7 +275,7 @@ def evaluate(typing_context, address, t, a, b, c, d, out):
 
 @intrinsic
 def call_user(typing_context, address, t, x):
-    """Value of a user's C function f(t, x) of a float and an array of floats, by its address."""
+    """Return the value of a user's C function f(t, x) of a float and an array of floats, given by its address."""
 
     def generate(context, builder, signature, arguments):
         kind = ir.FunctionType(_DOUBLE, _ARGUMENTS[:2]).as_pointer()
@@ -285,7 +286,7 @@ def call_user(typing_context, address, t, x):
 
 
 def user_function(function: Any, size: int) -> Any:
-    """A user's function f(t, x1, ..., x_size) as a C function of t and x, NaN where it raises, with its ``address``."""
+    """Compile a user's function f(t, x1, ..., x_size) to a C function of t and x, which returns NaN where the user's raises."""
     own = njit(error_model="numpy")(getattr(function, "py_func", function))
 
     @njit(error_model="numpy")
@@ -305,30 +306,30 @@ def user_function(function: Any, size: int) -> Any:
 # Kernels
 
 _PART: dict[str, Any] = {
-    "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": linking.OfParts
+    "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": linking.PartCompiler
 }  # fmt: skip
-#: Decorator of functions that kernels call; Python cannot.
+#: Decorator of functions that kernels call, and Python cannot call.
 part = njit(**_PART)
-#: The same for functions that make no arrays: to count references to those they are handed would cost more than all they do.
+#: The same for functions that make no arrays: counting the references to their arguments would cost more than their work.
 inner = njit(**_PART, _nrt=False)
 
 
 @inner
 def copy(source, target):
-    """Copy a vector. For ``target[:] = source`` Numba compiles what writes a message about shapes, which takes a second."""
+    """Copy a vector; ``target[:] = source`` takes a second longer to compile, for its message about shapes."""
     for i in range(target.shape[0]):
         target[i] = source[i]
 
 
 def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorator: compile a function for its explicit signature when it is first called, and keep the machine code on disk.
+    """Return a decorator that compiles a function when it is first called, and keeps the machine code on disk.
 
     Parameters
     ----------
     *signature
-        Numba's.
+        Types of the arguments, or Numba's signature.
     purpose : str
-        What it is for, as the end of "compiling ...", which is said once on standard error when it really is compiled.
+        Ends the message "compiling ...", which is printed once on standard error when the function is really compiled.
     """
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -350,10 +351,10 @@ class Kernel:
 
     @property
     def compiled(self) -> Any:
-        """Numba's dispatcher."""
+        """Numba's dispatcher, compiled or read from disk."""
         with MAKING:
             if self._compiled is None:
-                folder = cache_folder(fingerprint(self.py_func, self.signature))
+                folder = code_folder(f"numba-{fingerprint(self.py_func, self.signature)[:16]}")
                 try:
                     self._compiled = self._compile(folder)
                 except Exception as error:
@@ -363,7 +364,7 @@ class Kernel:
                         return self._compiled
                     if not any(folder.glob("**/*.nb[ic]")):
                         raise
-                    # Numba reads what is damaged as whatever it happens to be
+                    # Numba raises any kind of error for a damaged file
                     warnings.warn(
                         f"the compiled code in {folder} is damaged ({error!r}): it is compiled again",
                         RuntimeWarning,
@@ -375,7 +376,7 @@ class Kernel:
         return self._compiled
 
     def _compile(self, folder: Path | None) -> Any:
-        """Compile, and keep the code in a folder if there is one."""
+        """Compile, and keep the code in a folder unless that is None."""
         before = numba.config.CACHE_DIR
         if folder is not None:
             numba.config.CACHE_DIR = str(folder)
@@ -383,7 +384,7 @@ class Kernel:
             with _announced(self.purpose):
                 return njit(
                     *self.signature, cache=folder is not None, error_model="numpy", nogil=True, no_cfunc_wrapper=True,
-                    pipeline_class=linking.OfKernels,
+                    pipeline_class=linking.KernelCompiler,
                 )(self.py_func)  # fmt: skip
         finally:
             numba.config.CACHE_DIR = before
@@ -393,7 +394,7 @@ class Kernel:
 
 
 class _Announcer(event.Listener):
-    """Says what is compiled; what several functions are for, of the first of them."""
+    """Announces the compilation; of several functions with the same purpose only the first."""
 
     said: ClassVar[set[str]] = set()
 
@@ -415,20 +416,18 @@ def _announced(purpose: str) -> Iterator[None]:
         yield
 
 
-# The cache of kernels
-
-
 def fingerprint(function: Any, signature: Any = None) -> str:
-    """Hash of everything that a compiled function is compiled from.
+    """Return a hash of all that a compiled function depends on.
 
-    That is its code and all functions and constants that it reads, how Numba is to compile them, and the sources of our
-    modules in which they are, for what cannot be seen in a function alone, such as the fields of a NamedTuple.
+    It covers the function's code, all functions and constants that it reads, Numba's options, and the sources of our modules
+    in which they stand, for facts that a function does not show, such as the fields of a NamedTuple.
     """
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {signature}".encode())
     seen: set[int] = set()
     files = {Path(__file__), Path(linking.__file__)}
 
     def add(value: Any) -> None:
+        """Add a value to the hash, with all that it refers to."""
         digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
         value = getattr(value, "py_func", getattr(value, "_defn", value))
         if isinstance(value, ModuleType):
@@ -461,7 +460,7 @@ def fingerprint(function: Any, signature: Any = None) -> str:
             digest.update(repr(value).encode())
 
     def note(module: str | None) -> None:
-        """Remember the source of a module of ours."""
+        """Add the source of a module, if it is ours."""
         if module is not None and module.partition(".")[0] in ("analysis", "linkwork") and module in sys.modules:
             files.add(Path(str(sys.modules[module].__file__)))
 
@@ -481,94 +480,9 @@ def fingerprint(function: Any, signature: Any = None) -> str:
 
 
 def _names(code: CodeType) -> set[str]:
+    """Return the global names that code reads, those of functions inside it included."""
     names = set(code.co_names)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             names |= _names(constant)
     return names
-
-
-def cache_root() -> Path:
-    """Folder of all that is kept: LINKWORK_CACHE_DIR, else the user's cache folder."""
-    return Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False))
-
-
-def cache_folder(key: str) -> Path:
-    """Folder for machine code that belongs to ``key``, a hash."""
-    return code_folder(f"numba-{key[:16]}")
-
-
-def code_folder(name: str) -> Path:
-    """Folder for what is loaded as code: below `cache_root` if nobody else can write there, else below a temporary one.
-
-    What others can write to could make us run their code: that is said once on standard error, and not used.
-    """
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    folder = cache_root() / name
-    if _usable(folder):
-        if _ours(folder, user):
-            return folder
-        _say_shared(folder.parent)
-    folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
-    if _usable(folder) and _ours(folder, user):
-        return folder
-    return Path(tempfile.mkdtemp(prefix="linkwork-"))
-
-
-@cache
-def _say_shared(folder: Path) -> None:
-    sys.stderr.write(
-        f"linkwork: others can write to {folder}, or to a folder above it: compiled code is kept elsewhere; "
-        "LINKWORK_CACHE_DIR can name a folder of yours alone\n"
-    )
-
-
-#: Bytes that must fit into a folder for code.
-_LEAST = 1_000_000
-
-
-def _usable(folder: Path) -> bool:
-    try:
-        for path in (folder.parent, folder):
-            path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(_LEAST))  # on a full disk files can be made, but not filled
-            file.flush()
-            return True
-    except OSError:
-        return False
-
-
-def _ours(folder: Path, user: int) -> bool:
-    """Whether only ``user`` and root can change what is in a folder, or put another in its place."""
-    if os.name == "nt":
-        return True  # user_cache_dir is below the user's profile, which others cannot write to
-    folder = folder.resolve()
-    for path in (folder, *folder.parents):
-        status = path.stat()
-        shared = status.st_mode & 0o002 or (status.st_mode & 0o020 and not _of_one(status.st_gid, user))
-        # in a folder with the sticky bit others can write, but not touch what is not theirs
-        if status.st_uid not in (user, 0) or (shared and (path == folder or not status.st_mode & 0o1000)):
-            return False
-    with os.scandir(folder) as entries:
-        return folder.stat().st_uid == user and all(_is_of(entry, user) for entry in entries)
-
-
-def _is_of(entry: os.DirEntry[str], user: int) -> bool:
-    """Whether a file is a user's; one that another process has renamed or removed meanwhile does no harm."""
-    try:
-        return entry.stat(follow_symlinks=False).st_uid == user
-    except FileNotFoundError:
-        return True
-
-
-def _of_one(group: int, user: int) -> bool:
-    """Whether a group is that of a user alone, of the user's name, as many systems make them."""
-    import grp
-    import pwd
-
-    try:
-        name = pwd.getpwuid(user).pw_name
-        return grp.getgrgid(group).gr_name == name and not set(grp.getgrgid(group).gr_mem) - {name}
-    except KeyError:
-        return False

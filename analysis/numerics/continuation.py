@@ -2,8 +2,8 @@
 
 It knows no mechanics. Each step goes along the tangent and returns to the curve in the plane across it (E. L. Allgower,
 K. Georg, Numerical Continuation Methods, Springer 1990); its length follows from the effort of the correction and the turn
-of the tangent. Unknowns and parameter are scaled, so that an arc means the same whatever the units. The corrections are
-Newton's where the derivatives of G come with it, and of the secant type (Broyden) where a value alone is cheaper.
+of the tangent. Unknowns and parameter are scaled, so that arc length does not depend on units. The corrections are Newton's if
+G comes with its derivatives, and of the secant type (Broyden) if a value alone is cheaper.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Correction, relative to the scales, at which a point counts as on the curve.
 TOLERANCE = 1e-10
-#: Corrections at most, and the number of them from which on a step counts as hard.
+#: Corrections at most, and the number from which on a step counts as hard.
 MOST_CORRECTIONS, HARD = 10, 5
-#: Distance of a point from the end of the tangent, relative to the step, beyond which it may be of another curve.
+#: Distance of a point from the end of the tangent, relative to the step, beyond which it may lie on another curve.
 REACH = 0.5
-#: Inverse of the cosine between a tangent and the one before it from which on the latter does not serve to compute it.
+#: Inverse cosine of the angle between successive tangents from which on the old one does not serve to compute the new one.
 _OBLIQUE = 1e3
-#: A step grows and shrinks by these.
+#: Factors by which a step grows and shrinks.
 GROWTH, SHRINKAGE = 1.4, 0.5
 
 Vector = NDArray[np.float64]
@@ -42,16 +42,16 @@ class Evaluation(NamedTuple):
     data: Any
 
 
-#: G(y, lambda); raises a `LinkworkError` where it is not defined.
+#: G(y, lambda); raises a `LinkworkError` if it is not defined there.
 Evaluate = Callable[[Vector, float], Evaluation]
 
 
 class ContinuationError(LinkworkError):
-    """A curve could not be begun: the point given does not lead to one on it."""
+    """No point of a curve was found near the given one."""
 
 
 class Reason(Enum):
-    """Why a curve ends."""
+    """Reason for the end of a curve."""
 
     BOX = "it leaves the box"
     CLOSED = "it is closed"
@@ -63,7 +63,7 @@ class Reason(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class End:
-    """An end of a curve in a plane: why, the last good point, and why there is no value beyond, if that is it."""
+    """An end of a curve in a plane: its reason, the last good point, and why there is no value beyond."""
 
     reason: Reason
     point: tuple[float, float]
@@ -97,11 +97,11 @@ class Point:
 
     @property
     def orientation(self) -> float:
-        """Sign of the determinant of the derivatives with the tangent below them: it changes where another curve is met."""
+        """Sign of the determinant of the derivatives above the tangent: it changes where two curves cross."""
         return float(np.linalg.slogdet(np.vstack([self.derivatives, self.tangent]))[0])
 
     def turned(self) -> Point:
-        """The same point, looking the other way."""
+        """Return the same point with the opposite direction."""
         return replace(self, tangent=-self.tangent)
 
 
@@ -118,9 +118,9 @@ class Curve:
     end : Reason
         Why it ended.
     reason : str
-        The same in words, with what stood in the way.
+        The same in words, with the obstacle.
     message : str
-        What G had to say where it has no value; empty elsewhere.
+        The message of G if it has no value; else empty.
     """
 
     points: tuple[Point, ...]
@@ -129,6 +129,11 @@ class Curve:
     reason: str
     message: str = ""
 
+    def plane_end(self, message: str) -> End:
+        """Return its end in the plane of the last unknown and the parameter."""
+        last = self.points[-1]
+        return End(reason=self.end, point=(float(last.y[-1]), last.parameter), message=message)
+
     @property
     def closed(self) -> bool:
         """Whether it came back to where it began."""
@@ -136,13 +141,13 @@ class Curve:
 
     @property
     def reached(self) -> bool:
-        """Whether it ended where it should: at an end of the range, or where it began."""
+        """Whether it ended as it should: at an end of the range, or where it began."""
         return self.end in (Reason.BOX, Reason.CLOSED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """How a curve is followed.
+    """Range and steps of a continuation.
 
     Attributes
     ----------
@@ -156,9 +161,9 @@ class Settings:
         Greatest step of the parameter itself, in its range.
     most_points : int
     greatest_turn, growing_turn : float
-        Greatest angle between the tangents at two neighbouring points (rad), and that up to which the step grows.
+        Greatest angle between the tangents at neighbouring points (rad), and the angle up to which the step grows.
     oriented : bool
-        Whether the curve ends where it meets another. This also keeps the two sides of a narrow region apart.
+        Whether the curve ends where it crosses another. This also keeps the two sides of a narrow region apart.
 
     Raises
     ------
@@ -195,7 +200,7 @@ class _Failure(NamedTuple):
 
 
 class _Landing(NamedTuple):
-    """A corrected point: scaled, with its evaluation and the corrections it took."""
+    """A corrected point, scaled, with its evaluation and number of corrections."""
 
     z: Vector
     evaluation: Evaluation
@@ -203,7 +208,7 @@ class _Landing(NamedTuple):
 
 
 def _null_vector(derivatives: Vector, ahead: Vector) -> Vector:
-    """The vector of length 1 that the derivatives, (n, n + 1), take to zero, in the direction of ``ahead``: at folds too."""
+    """Return the unit vector in the kernel of the derivatives, (n, n + 1), in the direction of ``ahead``, at folds too."""
     try:
         vector = np.linalg.solve(np.vstack([derivatives, ahead]), np.append(np.zeros(len(derivatives)), 1.0))
         length = float(np.linalg.norm(vector))
@@ -211,24 +216,24 @@ def _null_vector(derivatives: Vector, ahead: Vector) -> Vector:
         length = np.inf
     if length * float(np.linalg.norm(ahead)) < _OBLIQUE:
         return np.asarray(vector / length)
-    # nearly at a right angle to it: by the singular value decomposition, which costs more
+    # the tangent is nearly normal to it: take the singular value decomposition, which costs more
     tangent: Vector = np.linalg.svd(derivatives)[2][-1]
     return -tangent if tangent @ ahead < 0.0 else tangent
 
 
 class Follower:
-    """One curve being followed.
+    """The continuation of one curve.
 
     Parameters
     ----------
     evaluate : callable
-        G with its derivatives; see `Evaluation`. It is not called beyond the bounds: there G goes on in a straight line.
+        G with its derivatives; see `Evaluation`. It is not called beyond the bounds, where G is extrapolated linearly.
     scale : array_like, shape (n,)
         Magnitudes of the unknowns.
     settings : Settings
     residual : callable, optional
-        G alone, where its derivatives cost much more: the corrections are then of the secant type, from the derivatives at
-        the point before.
+        G alone, if its derivatives cost much more: corrections are then of the secant type, from the derivatives at the last
+        point.
     """
 
     def __init__(
@@ -247,9 +252,9 @@ class Follower:
             self.low[number], self.high[number] = low, high
 
     def start(self, y: ArrayLike, parameter: float, direction: int, across: ArrayLike | None = None) -> Point:
-        """The point of the curve at a parameter, near ``y``, looking to higher (+1) or lower (-1) parameters.
+        """Return the point of the curve at a parameter, near ``y``, directed to higher (+1) or lower (-1) parameters.
 
-        With ``across``, of shape (n + 1,) and scaled, it lies in the plane across this direction instead, and looks along it.
+        With ``across``, of shape (n + 1,) and scaled, it lies in the plane across this direction, and is directed along it.
 
         Raises
         ------
@@ -266,7 +271,7 @@ class Follower:
         return self._point(found, direction * fixed)
 
     def along(self, y: ArrayLike, parameter: float, tangent: ArrayLike) -> Point:
-        """A point as the first of a curve in a given direction (unscaled, shape (n + 1,)): a branch to be switched to."""
+        """Return a given point as the first of a curve in a direction (unscaled, shape (n + 1,)), to switch to a branch."""
         direction = np.asarray(tangent, dtype=float) / self.scale
         evaluation = self.evaluate(np.asarray(y, dtype=float), parameter)
         return Point(
@@ -278,13 +283,13 @@ class Follower:
         )
 
     def resume(self, y: ArrayLike, parameter: float, ahead: ArrayLike) -> Point:
-        """A point on the curve as the first of a curve that goes on in the direction of ``ahead`` (scaled, shape (n + 1,))."""
+        """Return a point on the curve as the first of a curve that goes on towards ``ahead`` (scaled, shape (n + 1,))."""
         whole = np.append(np.asarray(y, dtype=float), parameter)
         found = _Landing(whole / self.scale, self.evaluate(whole[:-1], parameter), 0)
         return self._point(found, np.asarray(ahead, dtype=float))
 
     def step(self, point: Point, length: float) -> Point | None:
-        """The point an arc length further along the tangent; None if there is none."""
+        """Return the point an arc length further along the tangent; None if there is none."""
         found = self._step(point, length)
         return None if isinstance(found, _Failure) else self._point(found, point.tangent)
 
@@ -297,7 +302,7 @@ class Follower:
     ) -> Curve:
         """Follow the curve from a point to an end of the range, back to the point, or as far as it goes.
 
-        ``watch`` receives every point on the way; ``leave`` gives a reason to stop there, or an empty text.
+        ``watch`` receives every point; ``leave`` returns a reason to stop at a point, or an empty text.
         """
         settings = self.settings
         points, steps = [first], list[float]()
@@ -341,8 +346,18 @@ class Follower:
             tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
         )
 
+    def follow_both(
+        self, first: Point, *, leave: Callable[[Point], str] | None = None
+    ) -> tuple[list[Point], Curve, Curve]:
+        """Follow the curve from a point in both directions; return all its points, and both curves, backward first."""
+        forth = self.follow(first, leave=leave)
+        if forth.closed:
+            return [*forth.points], forth, forth
+        back = self.follow(first.turned(), leave=leave)
+        return [*(point.turned() for point in back.points[:0:-1]), *forth.points], back, forth
+
     def locate(self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]) -> tuple[Point, float]:
-        """The point within a step at which a test, of opposite signs at its ends, is zero, and its distance along the step."""
+        """Return the point within a step at which a test with opposite signs at its ends is zero, and its distance."""
         # the parabola through the end of the step
         bend = 2.0 * (self._scaled(beyond) - self._scaled(point) - length * point.tangent) / length**2
 
@@ -360,7 +375,7 @@ class Follower:
         return at(s), s
 
     def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:
-        """A step, if its end is on the same curve for certain, and the corrections it took; see `_step`."""
+        """Take a step if its end is certainly on the same curve; return it with the number of corrections."""
         found = self._step(last, length, bend)
         if isinstance(found, _Failure):
             return found
@@ -375,7 +390,7 @@ class Follower:
         return point, found.corrections
 
     def _step(self, point: Point, length: float, bend: Vector | None = None) -> _Landing | _Failure:
-        """A step along the tangent, which turns by ``bend`` an arc length, as far as that is known."""
+        """Take a step along the tangent, which turns by ``bend`` per arc length if that is known."""
         aside = np.zeros(len(point.tangent)) if bend is None else 0.5 * length**2 * bend
         aside = aside - (aside @ point.tangent) * point.tangent
         return self._correct(self._scaled(point) + length * point.tangent, point.tangent, point, aside)
@@ -383,7 +398,7 @@ class Follower:
     def _correct(
         self, plane: Vector, normal: Vector, last: Point | None, aside: Vector | float = 0.0
     ) -> _Landing | _Failure:
-        """Newton's or Broyden's method for G = 0 from a point in the plane through another across ``normal``; all scaled."""
+        """Solve G = 0 by Newton's or Broyden's method in the plane through a point across ``normal``; all scaled."""
         n, z, before = len(plane) - 1, plane + aside, np.inf
         matrix = np.vstack([np.zeros((n, n + 1)), normal])
         secant = self.residual is not None and last is not None
@@ -414,13 +429,13 @@ class Follower:
         return _Failure(Reason.TIP, "the corrections do not converge")
 
     def _inside(self, z: Vector) -> tuple[Vector, Vector]:
-        """Unscaled unknowns and parameter moved into the bounds, and how far they are beyond them."""
+        """Return unscaled unknowns and parameter clipped to the bounds, and the distance beyond them."""
         whole = z * self.scale
         inside = np.clip(whole, self.low, self.high)
         return inside, whole - inside
 
     def _evaluate(self, z: Vector) -> Evaluation:
-        """G with its derivatives; beyond the bounds it goes on in a straight line."""
+        """Return G with its derivatives, extrapolated linearly beyond the bounds."""
         inside, beyond = self._inside(z)
         found = self.evaluate(inside[:-1], float(inside[-1]))
         further = found.jacobian @ beyond[:-1] + found.slope * beyond[-1]
@@ -435,7 +450,7 @@ class Follower:
         return np.asarray(value / self.scale[:-1])
 
     def _scaled_evaluation(self, evaluation: Evaluation) -> tuple[Vector, Vector]:
-        """G, shape (n,), and its derivatives, shape (n, n + 1), in scaled unknowns and parameter."""
+        """Return G, shape (n,), and its derivatives, shape (n, n + 1), in scaled unknowns and parameter."""
         n = len(self.scale) - 1
         derivatives = np.column_stack([evaluation.jacobian, evaluation.slope]) * self.scale / self.scale[:n, None]
         return evaluation.residual / self.scale[:n], derivatives
@@ -457,7 +472,7 @@ class Follower:
         return scaled
 
     def _turned_beyond(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
-        """Where the curve turns back beyond a bound within a step that comes in again; otherwise the step as it is."""
+        """Return where the curve turns back beyond a bound within a step that ends inside; otherwise the step itself."""
         for axis in np.flatnonzero(last.tangent * point.tangent < 0.0).tolist():
             ahead, behind = abs(last.tangent[axis]), abs(point.tangent[axis])
             bound = (self.high if last.tangent[axis] > 0.0 else self.low)[axis] / self.scale[axis]
@@ -469,7 +484,7 @@ class Follower:
         return point, length
 
     def _to_bound(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
-        """Where a step leaves the bounds, exactly on one of them, and its distance along the step."""
+        """Return the point of a step exactly on a bound, and its distance along the step."""
         here, there = self._scaled(last), self._scaled(beyond)
         low, high = self.low / self.scale, self.high / self.scale
         way = there - here
@@ -497,12 +512,12 @@ class Follower:
         return self._to_bound(last, point, s) if self.is_beyond(point) else (point, s)
 
     def is_beyond(self, point: Point) -> bool:
-        """Whether a point lies out of the bounds."""
+        """Return whether a point lies outside the bounds."""
         whole = np.append(point.y, point.parameter)
         return bool((whole < self.low).any() or (whole > self.high).any())
 
     def _passes(self, first: Point, last: Point, point: Point) -> bool:
-        """Whether the step between two points passes the first one in its direction."""
+        """Return whether the step between two points passes the first one in its direction."""
         chord, way = self._scaled(point) - self._scaled(last), self._scaled(first) - self._scaled(last)
         length = float(np.linalg.norm(chord))
         part = float(way @ chord) / length**2

@@ -1,7 +1,7 @@
-"""Dual numbers a + eps b with eps^2 = 0, as parts that are NumPy arrays: exact derivatives, and screws in space.
+"""Dual numbers a + eps b with eps^2 = 0, whose parts are NumPy arrays: exact derivatives, and screws in space.
 
-As numbers they differentiate: f(a + eps b) = f(a) + eps f'(a) b. NumPy's functions work on them (``np.sin(x)``), scalars
-and arrays mix with them, and what compares them compares their real parts.
+As numbers they differentiate: f(a + eps b) = f(a) + eps f'(a) b. NumPy's functions work on them (``np.sin(x)``), they mix
+with scalars and arrays, and comparisons compare their real parts.
 
 >>> x = Dual(2.0, 1.0)
 >>> (x * x + np.sqrt(x)).dual == 4.0 + 0.5 / np.sqrt(2.0)
@@ -51,7 +51,7 @@ _UNARY: dict[Any, Callable[[Array, Array], Any]] = {
 
 
 def _power(a: Dual, b: Dual) -> Dual:
-    """a^b; the logarithm of a is taken only where b varies, so that a constant power of a negative number is one."""
+    """Return a^b; the logarithm of a is taken only where b varies, so that a negative a has constant powers."""
     value = np.power(a.real, b.real)
     # b a^(b-1), which is 0 for b = 0 whatever a is
     slope = b.real * np.power(a.real, np.where(b.real == 0.0, 1.0, b.real - 1.0)) * a.dual
@@ -61,7 +61,7 @@ def _power(a: Dual, b: Dual) -> Dual:
 
 
 def _matmul(a: Dual, b: Dual) -> Dual:
-    """a @ b, a vector on either side as NumPy has it."""
+    """Return a @ b, with vectors on either side as in NumPy."""
     if a.real.ndim == 1:
         return _matmul(a[None, :], b)[..., 0, :] if b.real.ndim > 1 else _matmul(a, b[:, None])[..., 0]
     if b.real.ndim == 1:
@@ -83,11 +83,11 @@ def _hypot(a: Dual, b: Dual) -> Dual:
 
 
 def _chosen(value: Array, a: Dual, b: Dual) -> Dual:
-    """The one of two that has the ``value``; of equal ones the first."""
+    """Return the one of two numbers that has the ``value``; the first if both have it."""
     return Dual(value, np.where(value == a.real, a.dual, b.dual))
 
 
-#: Functions of two arguments but the matrix product, whose vectors are a case of their own.
+#: Functions of two arguments, without the matrix product, which treats vectors separately.
 _BINARY: dict[Any, Callable[[Dual, Dual], Dual]] = {
     np.add: lambda a, b: Dual(a.real + b.real, a.dual + b.dual),
     np.subtract: lambda a, b: Dual(a.real - b.real, a.dual - b.dual),
@@ -107,10 +107,10 @@ class Dual(NDArrayOperatorsMixin):
     Parameters
     ----------
     real, dual : array_like
-        The parts. They are spread to a common shape, but the dual part may have more axes in front: directions in which
-        derivatives are taken at once. So ``Dual(2.0, [1.0, 0.0])`` is one number with the derivatives in two directions, and
-        a real part of shape (n,) with m directions has a dual part of shape (m, n). In a calculation the axes of real parts
-        are matched with each other, and those of directions with each other.
+        The parts, broadcast to a common shape. The dual part may have more axes in front, one entry for each direction of
+        differentiation: ``Dual(2.0, [1.0, 0.0])`` is a number with its derivatives in two directions, and a real part of shape
+        (n,) with m directions has a dual part of shape (m, n). Calculations match the axes of real parts with each other,
+        and the axes of directions with each other.
     """
 
     __slots__ = ("dual", "real")
@@ -138,46 +138,40 @@ class Dual(NDArrayOperatorsMixin):
 
     @property
     def T(self) -> Dual:
-        """Transpose in the last two axes: of an orthogonal dual matrix the inverse (eq 4)."""
+        """Transpose in the last two axes, the inverse of an orthogonal dual matrix (eq 4)."""
         return Dual(np.swapaxes(self.real, -1, -2), np.swapaxes(self.dual, -1, -2))
 
     @property
     def directions(self) -> int:
-        """How many axes of directions the dual part has in front."""
+        """Number of axes of directions, in front of the dual part."""
         return self.dual.ndim - self.real.ndim
 
     def __len__(self) -> int:
-        """Length of the real part's first axis; a single number has none (TypeError)."""
+        """Return the length of the real part's first axis; TypeError for a single number."""
         return len(self.real)
 
     def __iter__(self) -> Iterator[Dual]:
-        """The elements along the real part's first axis."""
+        """Iterate along the real part's first axis."""
         return (self[i] for i in range(len(self)))
 
     def __bool__(self) -> bool:
-        """Whether a single number's real part is not 0."""
+        """Return whether a single number's real part is not 0."""
         return bool(self.real)
 
     def __getitem__(self, index: Any) -> Dual:
-        """The elements that the index takes from the real part, with all their directions."""
+        """Return the elements at an index of the real part, with all their directions."""
         directions = (slice(None),) * self.directions
         return Dual(self.real[index], self.dual[directions + (index if isinstance(index, tuple) else (index,))])
 
     def __array__(self, *_: Any, **__: Any) -> Array:
-        """Refused.
-
-        Raises
-        ------
-        TypeError
-            Always: an array of objects, or the real part alone, would be wrong in silence.
-        """
+        """Raise TypeError: an array of objects, or of the real part alone, would be silently wrong."""
         raise TypeError(
-            "a dual number is not an array, and NumPy's functions but those of element by element do not take it: take its "
-            "real or its dual part, or join several with stack() or join() of analysis.numerics.dual"
+            "a dual number is not an array, and only NumPy's element-wise functions take it: use its real or dual part, or "
+            "stack() or join() of analysis.numerics.dual for several"
         )
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        """NumPy's function ``ufunc`` of dual numbers; one without a derivative here is a TypeError."""
+        """Apply NumPy's function ``ufunc`` to dual numbers; TypeError if its derivative is not known here."""
         if method != "__call__" or options:
             return NotImplemented
         if ufunc in _COMPARISONS:
@@ -197,7 +191,7 @@ class Dual(NDArrayOperatorsMixin):
 
 
 def _aligned(*x: Dual) -> tuple[Dual, ...]:
-    """The same numbers with as many axes of the real part each, so that NumPy matches directions with directions."""
+    """Give all real parts the same number of axes, so that NumPy matches directions with directions."""
     axes = max(part.real.ndim for part in x)
     return tuple(part if part.real.ndim == axes or not part.directions else _with_axes(part, axes) for part in x)
 
@@ -213,14 +207,14 @@ def _inexact(part: Any) -> Array:
 
 
 def dual(x: Any) -> Dual:
-    """``x`` as a dual number: itself, or with the dual part zero."""
+    """Return ``x`` as a dual number, with the dual part zero if it is none."""
     return x if isinstance(x, Dual) else Dual(x)
 
 
 def variables(*values: Any) -> tuple[Dual, ...]:
-    """Independent variables: the i-th has the derivative 1 in direction i and 0 in the others.
+    """Return independent variables: the i-th has the derivative 1 in direction i and 0 in the others.
 
-    What is calculated from them has the whole gradient in its dual part, directions first.
+    A result computed from them has its gradient in the dual part, directions first.
 
     Parameters
     ----------
@@ -233,7 +227,7 @@ def variables(*values: Any) -> tuple[Dual, ...]:
 
 
 def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
-    """Dual numbers joined along a new axis, which is counted from the end (negative)."""
+    """Join dual numbers along a new axis, counted from the end (negative)."""
     x = _aligned(*(dual(part) for part in parts))
     real = np.broadcast_arrays(*(part.real for part in x))
     slopes = np.broadcast_arrays(*(part.dual for part in x), np.empty(real[0].shape))[:-1]
@@ -241,56 +235,56 @@ def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
 
 
 def join(*parts: Dual) -> Dual:
-    """Dual vectors or matrices joined along their last axis."""
+    """Join dual vectors or matrices along their last axis."""
     directions = np.broadcast_shapes(*(x.dual.shape[: x.directions] for x in parts))
     slopes = [np.broadcast_to(x.dual, directions + x.real.shape) for x in parts]
     return Dual(np.concatenate([x.real for x in parts], -1), np.concatenate(slopes, -1))
 
 
 def cross(a: Any, b: Any) -> Dual:
-    """Product a x b of dual vectors (..., 3).
+    """Return the cross product a x b of dual vectors (..., 3).
 
-    With a dual velocity a it is the rate of a screw b that moves with the body: its own rate in the frame of the body, if
-    there is one, is to be added.
+    If a is the dual velocity of a body, this is the rate of a screw b fixed in the body; for others add their rate relative
+    to the body.
     """
     x, y = _aligned(dual(a), dual(b))
     return Dual(np.cross(x.real, y.real), np.cross(x.real, y.dual) + np.cross(x.dual, y.real))
 
 
 def skew(a: Any) -> Dual:
-    """The matrix (..., 3, 3) of the cross product by a dual vector (..., 3)."""
+    """Return the matrix (..., 3, 3) of the cross product by a dual vector (..., 3)."""
     x = dual(a)
     return Dual(_skew(x.real), _skew(x.dual))
 
 
 def axial(m: Any) -> Dual:
-    """The dual vector (..., 3) of the antisymmetric part of a dual matrix (..., 3, 3): axial(skew(a)) = a."""
+    """Return the dual vector (..., 3) of the antisymmetric part of a dual matrix (..., 3, 3): axial(skew(a)) = a."""
     x = dual(m)
     return Dual(_axial(x.real), _axial(x.dual))
 
 
 def apply(m: Any, a: Any) -> Dual:
-    """Dual matrix (..., 3, 3) times dual vector (..., 3)."""
+    """Multiply a dual matrix (..., 3, 3) by a dual vector (..., 3)."""
     return cast(Dual, dual(m) @ dual(a)[..., None])[..., 0]
 
 
 def about_i(angle: Any) -> Dual:
-    """Matrix of a screw displacement about and along the i axis by a dual angle (eq 2)."""
+    """Return the matrix of a screw displacement about and along the i axis by a dual angle (eq 2)."""
     return _about(angle, 0)
 
 
 def about_j(angle: Any) -> Dual:
-    """Matrix of a screw displacement about and along the j axis by a dual angle."""
+    """Return the matrix of a screw displacement about and along the j axis by a dual angle."""
     return _about(angle, 1)
 
 
 def about_k(angle: Any) -> Dual:
-    """Matrix of a screw displacement about and along the k axis by a dual angle (eq 1)."""
+    """Return the matrix of a screw displacement about and along the k axis by a dual angle (eq 1)."""
     return _about(angle, 2)
 
 
 def origin(m: Dual) -> Array:
-    """Origin p (..., 3) of the frame that an orthogonal dual matrix R + eps [p]R stands for."""
+    """Return the origin p (..., 3) of the frame that an orthogonal dual matrix R + eps [p]R describes."""
     return _axial(m.dual @ np.swapaxes(m.real, -1, -2))
 
 

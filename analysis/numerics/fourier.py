@@ -24,7 +24,7 @@ class FourierSeries:
     Raises
     ------
     InputError
-        If the two do not have the same length, or a coefficient is not finite.
+        If the lengths differ, or a coefficient is not finite.
     """
 
     cos: NDArray[np.float64]
@@ -42,20 +42,25 @@ class FourierSeries:
 
     @classmethod
     def constant(cls, value: float) -> FourierSeries:
-        """A constant."""
+        """Return a constant as a series."""
         return cls(np.array([value]), np.zeros(1))
 
     @classmethod
     def from_samples(cls, samples: ArrayLike, order: int | None = None) -> FourierSeries:
-        """Series through samples at equal steps over one period, the first at x = 0, up to an order.
+        """Compute the series through n samples at equal steps over one period, the first at x = 0.
 
-        Without one it is the highest that the samples determine, (n - 1) // 2.
+        The default of ``order`` is the highest that the samples determine, (n - 1) // 2.
+
+        Raises
+        ------
+        InputError
+            If the order is higher.
         """
         values = np.asarray(samples, dtype=float)
         c = np.fft.rfft(values) / len(values)
         highest = (len(values) - 1) // 2
         if order is not None and order > highest:
-            raise InputError(f"order {order} from {len(values)} samples: they determine no more than order {highest}")
+            raise InputError(f"order {order} from {len(values)} samples, which determine no more than order {highest}")
         c = c[: (highest if order is None else order) + 1]
         cos, sin = 2.0 * c.real, -2.0 * c.imag
         cos[0] = c[0].real
@@ -73,7 +78,7 @@ class FourierSeries:
 
     @property
     def amplitudes(self) -> NDArray[np.float64]:
-        """Amplitude of each harmonic, the mean's with its sign; shape (n + 1,)."""
+        """Mean, with its sign, and amplitude of each harmonic, shape (n + 1,)."""
         size = np.hypot(self.cos, self.sin)
         size[0] = self.cos[0]
         return size
@@ -105,19 +110,19 @@ class FourierSeries:
     __rmul__ = __mul__
 
     def derivative(self) -> FourierSeries:
-        """df/dx."""
+        """Return df/dx."""
         k = np.arange(len(self.cos))
         return FourierSeries(k * self.sin, -k * self.cos)
 
     def to_order(self, order: int) -> FourierSeries:
-        """The series cut off after an order, or filled up to it with zeros."""
+        """Return the series cut off after an order, or padded with zeros."""
         n = order + 1
         pad = max(0, n - len(self.cos))
         return FourierSeries(*(np.append(values[:n], np.zeros(pad)) for values in (self.cos, self.sin)))
 
 
 def trigonometric(values: NDArray[np.float64], period: float) -> Callable[[float], NDArray[np.float64]]:
-    """The trigonometric polynomial through values at n equal steps of a period, shape (n, ...), as a function."""
+    """Return the trigonometric polynomial through values at n equal steps of a period, shape (n, ...), as a function."""
     n = len(values)
     order = (n - 1) // 2
     c = np.fft.rfft(values, axis=0)[: order + 1] / n

@@ -13,15 +13,15 @@ FloatArray = NDArray[np.float64]
 
 
 class Gauss(NamedTuple):
-    """What collocation at s nodes takes.
+    """Nodes, weights and matrices of a collocation method with s nodes.
 
     Attributes
     ----------
     nodes, weights : ndarray, shape (s,)
     integrals : ndarray, shape (s, s)
-        Of the polynomial through values at the nodes, from 0 to each node.
+        Integrals from 0 to each node of the polynomial through values at the nodes, as a matrix that acts on these values.
     coefficients : ndarray, shape (s, s)
-        From values at the nodes to the coefficients of Legendre's polynomials on -1 to 1.
+        Matrix from values at the nodes to the coefficients of Legendre's polynomials on -1 to 1.
     """
 
     nodes: FloatArray
@@ -32,7 +32,7 @@ class Gauss(NamedTuple):
 
 @cache
 def gauss(count: int) -> Gauss:
-    """Nodes, weights and matrices of so many nodes."""
+    """Compute the nodes, weights and matrices for a number of nodes."""
     roots, weights = legendre.leggauss(count)
     values = legendre.legvander(roots, count)
     coefficients = (np.arange(count)[:, None] + 0.5) * (values[:, :count] * weights[:, None]).T

@@ -1,7 +1,8 @@
-"""How Numba compiles the functions that kernels call: machine code is made once, of a kernel with all that it calls.
+"""Compiler classes with which Numba makes machine code once, of a kernel together with all functions that it calls.
 
-Numba optimises each function with all that it calls, makes machine code of that, and does the same again for its caller. That
-code is for nobody, where only a kernel is called from Python: it took a third of a kernel's compilation.
+By default Numba optimises each function with all that it calls, makes machine code of it, and does the same again for its
+caller. Where Python calls only the kernel, nobody uses the code of the inner functions, and it takes a third of the time. Numba
+has no public option for this: the classes below override private ones, hence the upper bound of its version.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ _ALIVE: list[Any] = []
 
 
 class _Options(Flags):
-    """Numba's options, which it compares whenever it looks for the type of a call: by what is set, not one after the other."""
+    """Numba's options with a fast comparison: Numba compares them at each call that it types."""
 
     def __eq__(self, other: object) -> bool:
         return self._values == other._values if isinstance(other, _Options) else bool(super().__eq__(other))
@@ -27,14 +28,14 @@ class _Options(Flags):
 
 
 class _Part(JITCodeLibrary):
-    """Code that is neither optimised nor made machine code of where it stands, but where it is linked into a kernel."""
+    """Code of an inner function, which is optimised and turned into machine code only as part of a kernel."""
 
     def _optimize_final_module(self) -> None:
         pass
 
     def _finalize_final_module(self) -> None:
         self._finalized = True
-        # Numba writes the address of a function's environment, which a function without Python objects does not read
+        # Numba sets the address of a function's environment, though a function without Python objects does not read it
         engine = self.codegen._engine
         for variable in self._final_module.global_variables:
             if variable.name.startswith("_ZN08NumbaEnv") and not engine.is_symbol_defined(variable.name):
@@ -42,8 +43,8 @@ class _Part(JITCodeLibrary):
                 engine.add_global_mapping(variable, ctypes.addressof(_ALIVE[-1]))
 
 
-class OfKernels(Compiler):
-    """Numba's compiler, for `njit(pipeline_class=...)`."""
+class KernelCompiler(Compiler):
+    """Compiler of kernels, for `njit(pipeline_class=...)`."""
 
     def __init__(
         self, typing_context: Any, context: Any, library: Any, arguments: Any, result: Any, flags: Any, local: Any
@@ -51,8 +52,8 @@ class OfKernels(Compiler):
         super().__init__(typing_context, context, library, arguments, result, _Options(flags), local)
 
 
-class OfParts(OfKernels):
-    """The same for the functions that kernels call, which Python cannot."""
+class PartCompiler(KernelCompiler):
+    """Compiler of the functions that kernels call, and Python cannot call."""
 
     def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
         super().__init__(typing_context, context, library or _Part(context.codegen(), "part"), *rest)

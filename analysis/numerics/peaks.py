@@ -1,4 +1,4 @@
-"""Maxima of a series of values, and how far each stands out."""
+"""Peaks of a series of values and their prominences."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 
 def peaks(values: NDArray[np.float64]) -> list[tuple[int, float]]:
-    """Places inside a series that are above both sides, with their prominences; of a flat one the middle.
+    """Find the peaks inside a series, of a flat peak its middle, with their prominences.
 
-    The prominence is the height above the higher of the two lowest places between the peak and the next higher value, or the
-    end, on either side: `scipy.signal.find_peaks`, whose import takes longer than all that a response needs.
+    The prominence is a peak's height above the higher of two minima: those between the peak and the next higher value, or the
+    end, on either side. It equals `scipy.signal.find_peaks`, whose import takes longer than a response curve.
 
     >>> peaks(np.array([0.0, 3.0, 1.0, 2.0, 2.0, 0.5]))
     [(1, 2.5), (3, 1.0)]

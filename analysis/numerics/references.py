@@ -1,7 +1,7 @@
-"""NamedTuples that compiled functions hand on by reference.
+"""References to NamedTuples, which compiled functions pass on instead of the tuples.
 
-Numba hands a tuple on by value, number by number: of one of thirty arrays, two hundred, for each function that takes it. That
-took more of a kernel's compilation than what the functions do.
+Numba passes a tuple by value, number by number: two hundred numbers for a tuple of thirty arrays, for each function that takes
+it. Compiling that took longer than compiling the functions.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _field(context: Any, builder: Any, reference: Reference, value: Any, name: s
 
 @intrinsic
 def refer(typing_context, fields):
-    """A reference to a NamedTuple, which is good as long as the function that makes it has not returned."""
+    """Return a reference to a NamedTuple; it is valid until the function that made it returns."""
 
     def generate(context, builder, signature, arguments):
         return cgutils.alloca_once_value(builder, arguments[0])

@@ -1,7 +1,7 @@
 """Functions traced with CasADi: exact derivatives of the one set of equations.
 
-The code objects of the equations are called as they stand (`tracing`). What is traced can be differentiated to any order,
-evaluated as a ``casadi.Function``, or turned into machine code (`codegen`).
+The code of the equations runs unchanged on symbols (`tracing`). The result can be differentiated to any order, evaluated
+as a ``casadi.Function``, or compiled to machine code (`codegen`).
 """
 
 from __future__ import annotations
@@ -15,38 +15,38 @@ from numpy.typing import NDArray
 
 from .tracing import Rebound, rebound
 
-#: What equations may take from `math`.
+#: Functions of `math` that equations may use.
 ELEMENTARY = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "fabs", "hypot",
 )  # fmt: skip
 
 
 def library() -> Any:
-    """CasADi, imported when it is first used: that takes a tenth of a second."""
+    """Return CasADi, imported when it is first used, as that takes a tenth of a second."""
     import casadi
 
     return casadi
 
 
 def traced(modules: tuple[ModuleType, ...], **others: Any) -> Rebound:
-    """The functions of ``modules`` for CasADi symbols in the place of floats; ``others`` are called by their names."""
+    """Return the functions of ``modules`` for CasADi symbols instead of floats; ``others`` replace further names."""
     casadi = library()
     return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY} | others)
 
 
 def over(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:
-    """A ``casadi.Function`` with scalar outputs over arrays.
+    """Evaluate a ``casadi.Function`` with scalar outputs over arrays.
 
     Parameters
     ----------
     function : casadi.Function
     *arguments : array_like
-        Arrays of one shape, or numbers, for its scalar inputs; columns for its columns, the same for all.
+        For a scalar input an array, all of one shape, or a number; for a column input one column, which serves all.
 
     Returns
     -------
     tuple of ndarray
-        Its outputs, of that shape.
+        Outputs of that shape.
     """
     scalar = [function.numel_in(i) == 1 for i in range(function.n_in())]
     shape = np.broadcast_shapes(*(np.shape(a) for a, one in zip(arguments, scalar) if one))
@@ -59,23 +59,25 @@ def over(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:
 
 
 def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple[Any, Any]]) -> Any:
-    """A function of Python for CasADi, which does not trace it.
+    """Wrap a function of Python for CasADi, which calls it instead of tracing it.
 
     Parameters
     ----------
     name : str
     inputs, outputs : int
-        Lengths of its column and of what it returns.
+        Lengths of its argument and of its value, both columns.
     evaluate : callable
-        ``evaluate(x, slopes)``: values (outputs,) and, with ``slopes``, derivatives (outputs, inputs); NaN where there are
-        none.
+        ``evaluate(x, slopes)`` returns values (outputs,) and, if ``slopes``, derivatives (outputs, inputs); NaN where
+        there are none.
 
     Returns
     -------
     casadi.Callback
-        It must be kept as long as what is made of it.
+        The caller must keep a reference as long as an expression contains it.
     """
     casadi = library()
+
+    dense = casadi.Sparsity.dense
 
     class Slopes(casadi.Callback):  # type: ignore[misc, name-defined]
         def __init__(self, name: str, options: Any) -> None:
@@ -85,14 +87,11 @@ def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple
         def get_n_in(self) -> int:
             return 2
 
-        def get_n_out(self) -> int:
-            return 1
-
         def get_sparsity_in(self, i: int) -> Any:
-            return casadi.Sparsity.dense(inputs, 1) if i == 0 else casadi.Sparsity(outputs, 1)
+            return dense(inputs, 1) if i == 0 else casadi.Sparsity(outputs, 1)
 
         def get_sparsity_out(self, i: int) -> Any:
-            return casadi.Sparsity.dense(outputs, inputs)
+            return dense(outputs, inputs)
 
         def eval(self, arguments: Any) -> list[Any]:
             return [evaluate(np.asarray(arguments[0]).ravel(), True)[1]]
@@ -103,17 +102,11 @@ def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple
             self.slopes: Any = None
             self.construct(name, {})
 
-        def get_n_in(self) -> int:
-            return 1
-
-        def get_n_out(self) -> int:
-            return 1
-
         def get_sparsity_in(self, i: int) -> Any:
-            return casadi.Sparsity.dense(inputs, 1)
+            return dense(inputs, 1)
 
         def get_sparsity_out(self, i: int) -> Any:
-            return casadi.Sparsity.dense(outputs, 1)
+            return dense(outputs, 1)
 
         def eval(self, arguments: Any) -> list[Any]:
             return [evaluate(np.asarray(arguments[0]).ravel(), False)[0]]
@@ -129,16 +122,12 @@ def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple
 
 
 def ipopt(name: str, program: dict[str, Any], **options: Any) -> Any:
-    """IPOPT for a program of CasADi, without output of its own: where it finds nothing, its ``stats()`` say so."""
-    return library().nlpsol(
-        name,
-        "ipopt",
-        program,
-        {
-            "print_time": False,
-            "error_on_fail": False,
-            "show_eval_warnings": False,
-            "calc_lam_p": False,
-            "ipopt": {"print_level": 0, "sb": "yes", **options},
-        },
-    )
+    """Return IPOPT for a CasADi program, silent; its ``stats()`` say whether it found a solution."""
+    settings = {
+        "print_time": False,
+        "error_on_fail": False,
+        "show_eval_warnings": False,
+        "calc_lam_p": False,
+        "ipopt": {"print_level": 0, "sb": "yes", **options},
+    }
+    return library().nlpsol(name, "ipopt", program, settings)

@@ -1,8 +1,7 @@
-"""The plant's own functions on other numbers than floats: the code objects as they stand, their globals bound anew.
+"""Run the plant's own functions on other numbers than floats: the same code objects with other globals.
 
-The equations are straight lines of arithmetic that take what is not arithmetic from `math`. With that bound to the functions
-of another library the same code runs on CasADi's symbols, on NumPy's arrays, on dual numbers. The modules themselves are not
-touched.
+The equations are straight lines of arithmetic and functions of `math`. With the functions of another library in place of these,
+the same code runs on CasADi's symbols, on NumPy's arrays and on dual numbers. The modules themselves are not changed.
 """
 
 from __future__ import annotations
@@ -17,19 +16,19 @@ from linkwork.errors import LinkworkError
 
 
 class Rebound(SimpleNamespace):
-    """Functions by name; of two of one name that of the later module. Methods of classes by `of` alone."""
+    """Functions by name, the later module first; methods of classes are found by `of` only."""
 
     def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
         super().__init__(**{f.__name__: f for f in functions.values() if "." not in f.__qualname__})
         self._functions = functions
 
     def of(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """What became of a function.
+        """Return the new function for an original function or method.
 
         Raises
         ------
         LinkworkError
-            If it stands in none of the modules.
+            If it is in none of the modules.
         """
         if function not in self._functions:
             name = f"{function.__module__}.{function.__qualname__}"
@@ -38,14 +37,14 @@ class Rebound(SimpleNamespace):
 
 
 def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> Rebound:
-    """The functions of ``modules``, on the numbers that ``elementary`` is for.
+    """Return the functions of ``modules`` for another kind of numbers.
 
     Parameters
     ----------
     modules : tuple of modules
-        Their functions call each other's where they are imported by name.
+        Functions that they import by name from one another are replaced too.
     elementary : mapping
-        Functions by the names that they have in `math`, or among the built-in ones.
+        Functions of that kind of numbers, by their names in `math` or among the built-in functions.
     """
     spaces = [dict(vars(module)) for module in modules]
     functions: dict[Callable[..., Any], FunctionType] = {}

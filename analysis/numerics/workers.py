@@ -1,4 +1,4 @@
-"""Work over cores and machines: by joblib, in the threads, processes or cluster that the caller has chosen."""
+"""Parallel work by joblib, in the threads, processes or cluster that the caller has chosen."""
 
 from __future__ import annotations
 
@@ -20,37 +20,36 @@ from linkwork.errors import InputError, LinkworkError
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
-#: How often workers are started anew after one was killed; as often does Dask give an item to another worker.
+#: How often workers are restarted after one was killed.
 RETRIES = 3
 
-#: Bytes of a pickled result that go through the pipe itself: with what joblib adds, less than a pipe takes in one piece.
+#: Greatest pickled result (bytes) that goes through the pipe: with what joblib adds, a pipe takes it in one piece.
 _PIECE = 2048
 
-#: Work, number of an item, the item, the caller's process and a folder for results; number of an item, its result or error.
+#: Work, number of an item, the item, the caller's process id, a folder for results. Number of an item, its result, its error.
 _Task = tuple[Callable[[Any], Any], int, Any, int, str]
 _Found = tuple[int, Any, Exception | None]
 
 _WATCHED: set[int] = set()
-#: Seconds between two looks at who the caller is.
+#: Seconds between two checks that the caller is alive.
 _INTERVAL = 0.5
 
 
 class WorkersLost(LinkworkError):
-    """The workers failed, as where they are killed again and again, or the scheduler of a cluster is gone."""
+    """The workers failed: they were killed again and again, or the scheduler of a cluster is gone."""
 
 
 class Heard(list[bool]):
-    """Has an entry for each Ctrl-C; ``waiting`` while others compute, and Ctrl-C may end the wait by an exception."""
+    """A list with an entry for each Ctrl-C; while ``waiting`` for other processes, Ctrl-C also raises KeyboardInterrupt."""
 
     waiting = False
 
 
 @contextmanager
 def interruptible() -> Iterator[Heard]:
-    """Hear Ctrl-C as an entry in a list, to be looked at between two steps or calls.
+    """Record Ctrl-C as an entry in a list, for the caller to look at between two steps.
 
-    An exception would strike wherever it finds the interpreter: inside an FMU, whose interpreter this is, or inside Numba,
-    which may drop it.
+    An exception could arise anywhere: inside an FMU that runs in this interpreter, or inside Numba, which may drop it.
     """
     heard = Heard()
     if threading.current_thread() is not threading.main_thread():
@@ -66,12 +65,12 @@ def interruptible() -> Iterator[Heard]:
     try:
         yield heard
     finally:
-        # None stands for a handler that was not set from Python
+        # None is a handler that was not set from Python
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
 def check_jobs(n_jobs: int | None) -> None:
-    """Refuse no workers at all.
+    """Check a number of workers.
 
     Raises
     ------
@@ -79,21 +78,21 @@ def check_jobs(n_jobs: int | None) -> None:
         If ``n_jobs`` is 0.
     """
     if n_jobs == 0:
-        raise InputError("0 cores: it must be a number of them, or -1 for all")
+        raise InputError("0 cores: give a number of cores, or -1 for all")
 
 
 def cores_of(n_jobs: int | None, *, threads: bool = False) -> int:
-    """How many workers `over_workers` has: as `joblib.Parallel` counts them, on a cluster all of its cores."""
+    """Return the number of workers of `over_workers`, as `joblib.Parallel` counts them; on a cluster all of its cores."""
     return _workers(n_jobs, threads)[0]
 
 
 def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
-    """Whether the workers that `over_workers` has are this process and its threads."""
+    """Return whether the workers of `over_workers` are this process and its threads."""
     return not _workers(n_jobs, threads)[1]
 
 
 def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool]:
-    """Number of workers, and whether they are other processes."""
+    """Return the number of workers, and whether they are other processes."""
     import joblib
 
     check_jobs(n_jobs)
@@ -110,19 +109,19 @@ def over_workers(
     n_jobs: int | None = None,
     threads: bool = False,
 ) -> Iterator[tuple[int, Made]]:
-    """Number and result of each item, in the order in which they are done.
+    """Yield number and result of each item as soon as it is done.
 
     The workers are ``n_jobs`` processes of this machine, threads if ``threads`` are preferred, or those of the backend that
-    `joblib.parallel_config` has set: "dask", "loky", "threading" or another. One job is this process itself. An item whose
-    worker was killed goes to another worker. Processes that were started here end with this one.
+    `joblib.parallel_config` has set, such as "dask", "loky" or "threading". One job runs in this process. An item
+    whose worker was killed goes to another worker. Processes that are started here end with this one.
 
     Parameters
     ----------
     work : callable
-        What it raises is raised here.
+        An exception that it raises is raised here.
     items : sequence
     heard : Heard, optional
-        Of `interruptible`. A Ctrl-C while others compute ends the iteration; without it, it is a KeyboardInterrupt.
+        From `interruptible`. With it, Ctrl-C ends the iteration; without it, Ctrl-C raises KeyboardInterrupt.
 
     Raises
     ------
@@ -131,8 +130,8 @@ def over_workers(
 
     Notes
     -----
-    Processes of this machine hand over what is large in files: joblib would wait for ever for the end of a message whose sender
-    was killed within it.
+    Processes of this machine pass large results in files: if a sender is killed in the middle of a message, joblib waits for
+    ever for the rest.
     """
     count, elsewhere = _workers(n_jobs, threads)
     listening = Heard() if heard is None else heard
@@ -155,7 +154,7 @@ def over_workers(
                     del todo[number]
                     yield number, made
                 return
-            except KeyboardInterrupt:  # of this process, or of a worker
+            except KeyboardInterrupt:  # in this process, or in a worker
                 if heard is None:
                     raise
                 if not heard:
@@ -163,7 +162,7 @@ def over_workers(
                 return
             except _OfWork as caught:
                 raise caught.error from None
-            except LinkworkError:  # of what cannot be sent
+            except LinkworkError:  # from an item that cannot be sent
                 raise
             except BrokenExecutor as error:
                 if attempt == RETRIES:
@@ -173,27 +172,27 @@ def over_workers(
                     RuntimeWarning,
                     stacklevel=2,
                 )
-            except Exception as error:  # of any backend
+            except Exception as error:  # from any backend
                 raise WorkersLost(f"the workers failed: {type(error).__name__}: {error}") from error
             finally:
                 with warnings.catch_warnings():
-                    # that items were cancelled is what was asked for
+                    # the remaining items are cancelled on purpose
                     warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
                     results.close()
 
 
 def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Any:
-    """What other processes send, as it comes: a generator."""
+    """Yield what other processes send, as it comes."""
     import joblib
 
-    # many small results together would be a large message
+    # small results in one batch would make a large message
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered", batch_size=1)
-    # in a tuple: Dask would keep a larger argument on one worker alone, and lose it with that
+    # as one tuple: Dask would keep a large argument on one worker only, and lose it with that worker
     return parallel(joblib.delayed(_one)(task) for task in tasks)
 
 
 def _here(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
-    """What is found in this process, or in threads of it: joblib would look for it a hundred times a second only."""
+    """Yield results from this process or its threads; joblib would look for them only a hundred times a second."""
     if count == 1:
         yield from map(_one, tasks)
         return
@@ -206,7 +205,7 @@ def _here(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
 
 
 class _OfWork(Exception):
-    """An error of the work, in contrast to one of the workers."""
+    """An error raised by the work, not by the workers."""
 
     def __init__(self, error: Exception) -> None:
         self.error = error
@@ -214,31 +213,31 @@ class _OfWork(Exception):
 
 
 def _one(task: _Task) -> _Found | Path:
-    """What is found of an item, or the file that it is in."""
+    """Return the result of an item, or the file that holds it."""
     work, number, item, caller, folder = task
     end_with(caller)
     found: _Found
     try:
         found = number, work(item), None
-    except Exception as error:  # to be told from those of the workers
+    except Exception as error:  # is passed on, to be told from errors of the workers
         found = number, None, error
     return _handed_over(found, Path(folder, str(number))) if folder and os.getppid() == caller else found
 
 
 def _handed_over(found: _Found, path: Path) -> _Found | Path:
-    """What a process of this machine sends: a message that a pipe takes in one piece, as far as that can be had."""
+    """Return a result that a pipe takes in one piece: itself if it is small, else the file that it is written to."""
     try:
         content = pickle.dumps(found)
         if len(content) <= _PIECE:
             return found
         path.write_bytes(content)
-    except Exception:  # what cannot be pickled or written goes as joblib sends it
+    except Exception:  # cannot be pickled or written: joblib sends it
         return found
     return path
 
 
 def _taken(sent: _Found | Path) -> _Found:
-    """What was found, out of its file where it is in one."""
+    """Return a result, read from its file if it is in one."""
     if not isinstance(sent, Path):
         return sent
     found: _Found = pickle.loads(sent.read_bytes())
@@ -248,10 +247,10 @@ def _taken(sent: _Found | Path) -> _Found:
 
 
 def end_with(caller: int) -> None:
-    """End this process soon after its parent, if that is ``caller``: called in a worker, first of all.
+    """End this process soon after its parent, if that is ``caller``; a worker calls it first.
 
-    A worker that nobody waits for would go on for minutes. Workers that somebody else started, of a cluster, are left alone,
-    and so is the caller's own process; under Windows, which keeps the number of a parent that is gone, so are all.
+    Without it a worker would go on for minutes after its caller is gone. Workers that others started, as in a cluster, and the
+    caller's own process are left alone. It has no effect under Windows, which keeps the process id of a parent that is gone.
     """
     if os.getppid() == caller and caller not in _WATCHED:
         _WATCHED.add(caller)

@@ -2,13 +2,11 @@ from .chart.boundary import CrossingCurve as CrossingCurve
 from .chart.boundary import Monodromy as Monodromy
 from .chart.boundary import RemovalError as RemovalError
 from .chart.boundary import RemovingDamping as RemovingDamping
-from .chart.boundary import WorstDamping as WorstDamping
 from .chart.boundary import follow_crossing as follow_crossing
 from .chart.boundary import orbit_monodromy as orbit_monodromy
 from .chart.boundary import orbit_test as orbit_test
+from .chart.boundary import plane_test as plane_test
 from .chart.boundary import removing_damping as removing_damping
-from .chart.boundary import removing_damping_over as removing_damping_over
-from .chart.boundary import test_of as test_of
 from .chart.chart import OTHER_ORBIT as OTHER_ORBIT
 from .chart.chart import TRUE_ORBIT as TRUE_ORBIT
 from .chart.chart import Axis as Axis
@@ -22,7 +20,7 @@ from .chart.coexistence import Basins as Basins
 from .chart.coexistence import Coexistence as Coexistence
 from .chart.coexistence import basins as basins
 from .chart.coexistence import coexistence as coexistence
-from .chart.coexistence import of_turns as of_turns
+from .chart.coexistence import format_turns as format_turns
 from .chart.grid import Grid as Grid
 from .chart.grid import GridInterrupted as GridInterrupted
 from .chart.grid import grid as grid
@@ -50,9 +48,9 @@ from .motion.floquet import require_sign as require_sign
 from .motion.floquet import verdict as verdict
 from .motion.flow import crank_of as crank_of
 from .motion.orbit import ORBIT_TOLERANCE as ORBIT_TOLERANCE
+from .motion.orbit import OrbitEquations as OrbitEquations
 from .motion.orbit import PeriodicOrbit as PeriodicOrbit
 from .motion.orbit import Turn as Turn
-from .motion.orbit import orbit_equations as orbit_equations
 from .motion.orbit import orbit_of as orbit_of
 from .motion.search import Jump as Jump
 from .motion.search import Orbits as Orbits

@@ -13,6 +13,7 @@ from linkwork.errors import InputError
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import OFFSET_CASE
 
+from ..units import RAD_S_PER_RPM
 from .case import Case, published_case
 from .cosimulation import Comparison, compare, cosimulate
 from .inputs import Inputs
@@ -45,7 +46,7 @@ def _slider_crank(title: str, inputs: Inputs, **changes: Any) -> Case:
     )
 
 
-_RPM_50 = 50.0 * pi / 30.0
+_RPM_50 = 50.0 * RAD_S_PER_RPM
 _GENERAL = {
     "guide_twist": 4.0,
     "crank_cog_y": 0.02,

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, Interrupted, LinkworkError
 from linkwork.mechanism import Mechanism
 
+from ..display import format_count
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from ..notebook import format_count
 from ..numerics.workers import WorkersLost, check_jobs, interruptible, over_workers, share_memory
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_options, takes_published

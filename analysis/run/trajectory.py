@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..display import Shown, format_count, format_range
 from ..files import unknown_name
+from ..libraries import require
 from ..mechanisms import MECHANISMS, Parameters, output_units
-from ..notebook import Shown, format_count, format_range
 
 if TYPE_CHECKING:
     import pandas
@@ -125,7 +126,8 @@ class Trajectory(Shown):
         return write_csv(path, columns)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The run as a DataFrame indexed by time; needs pandas (``pip install linkwork[dataframe]``)."""
+        """The run as a DataFrame indexed by time; needs pandas, of Linkwork's extra ``dataframe``."""
+        require("pandas")
         import pandas
 
         return pandas.DataFrame(self.values, index=pandas.Index(self.time, name="time"), columns=list(self.names))

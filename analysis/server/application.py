@@ -14,13 +14,17 @@ from http import HTTPStatus
 from typing import Any, get_args
 from urllib.parse import parse_qs
 
-from waitress import wasyncore
-from waitress.server import create_server
-
 from linkwork.errors import InputError
 
-from ..mechanisms import Kind
+from ..libraries import MissingLibraryError
+from ..synthesis import Kind
 from .worker import Busy, Worker
+
+try:
+    from waitress import wasyncore
+    from waitress.server import create_server
+except ImportError as error:
+    raise MissingLibraryError("waitress") from error
 
 #: The only address that is listened at; bytes of a request's body and of its head, at most; seconds of silence after which a
 #: connection is closed; connections at a time.

@@ -9,7 +9,14 @@ from __future__ import annotations
 
 from .cases import TABLES, SliderCase, linkage_from_csv, load_slider_case, run_case, slider_case_from
 from .inverse import BestSpring, Load, SliderDrive, TurnBalance, best_spring, inverse_dynamics
-from .motion import SmoothnessCurve, SmoothnessInterrupted, greatest, motion_of_plant, slider_motion, smoothness_curve
+from .motion import (
+    SmoothnessCurve,
+    SmoothnessInterrupted,
+    greatest_derivative,
+    motion_of_plant,
+    slider_motion,
+    smoothness_curve,
+)
 from .strategy import Step, Strategy, StrategyInterrupted, simplest_mechanism
 from .tracking import TrackingController, TrackingMetrics, TrackingResult, track
 from .variational import VariationalMotion, variational_motion
@@ -31,7 +38,7 @@ __all__ = [
     "TurnBalance",
     "VariationalMotion",
     "best_spring",
-    "greatest",
+    "greatest_derivative",
     "inverse_dynamics",
     "linkage_from_csv",
     "load_slider_case",

@@ -1,4 +1,4 @@
-"""The motion of a slider from the tables of a TOML or JSON file, every quantity with its unit; see `docs/slider-cases.md`."""
+"""Case files of a slider motion: TOML or JSON tables, every quantity with its unit; see `docs/slider-cases.md`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,6 @@ from ..synthesis import (
     Task,
     TimedPath,
     UntimedPath,
-    direction,
     synthesis_case_from,
     synthesize,
 )
@@ -68,14 +67,14 @@ def _increasing(value: Any, name: str) -> tuple[int, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderTable:
-    """The motion that is sought.
+    """The table ``[slider]``: harmonics and bounds of the motion.
 
     Attributes
     ----------
     harmonics : tuple of int
-        Increasing; each is searched for, from the one before.
+        Numbers of harmonics, increasing; each search starts from the solutions of the one before.
     links : str
-        Whether the links are kept, or free: optimised together with the motion.
+        "kept", or "free": optimised together with the motion.
     guide_angle, position, stroke, speed, acceleration
         Bounds, as of `SliderUnknown`.
     starts : int
@@ -94,7 +93,7 @@ class SliderTable:
         self.unknown(0)  # checks them
 
     def unknown(self, harmonics: int) -> SliderUnknown:
-        """A motion with so many harmonics and its bounds."""
+        """Return the unknown motion with a number of harmonics and the bounds."""
         bounds = {name: getattr(self, name) for name in ("guide_angle", "position", "stroke", "speed", "acceleration")}
         return SliderUnknown(harmonics=harmonics, **bounds)
 
@@ -113,7 +112,7 @@ class StrategyWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveWanted:
-    """What inverse dynamics is asked for: crank speed (rad/s), samples of a turn, the best spring or not."""
+    """The table ``[drive]``: crank speed (rad/s), samples of a turn, and whether the best spring is put in."""
 
     speed: float = entry(Quantity("rad/s", above=0.0))
     samples: int = entry(Whole(72), 720)
@@ -122,20 +121,20 @@ class DriveWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingWanted:
-    """A run under control: arguments of `track`, and what its plant has that the model does not.
+    """The table ``[tracking]``: arguments of `track`, and departures of the plant from the model.
 
     Attributes
     ----------
     period : float
-        Of sampling (s).
+        Sampling period (s).
     bandwidth : float, optional
-        Of the feedback, a PID (rad/s); ten times the crank's speed by default, 0 for none.
+        Bandwidth of the feedback, a PID (rad/s); ten times the crank's speed by default, 0 for none.
     feedforward : bool
     revolutions : float
     limit : float
-        Of the force (N).
+        Limit of the force (N).
     coulomb_friction : float, optional
-        Of the plant (N); by default the model's.
+        Coulomb friction of the plant (N); by default the model's.
     mass_error : float
         Share by which the plant's slider and links are heavier than the model's.
     load_known : bool
@@ -154,7 +153,7 @@ class TrackingWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """Load at P (N), along the ground link and to its left."""
+    """The table ``[load]``: load at P (N), along the ground link and to its left."""
 
     fx: float = entry(Quantity("N"), 0.0)
     fy: float = entry(Quantity("N"), 0.0)
@@ -162,18 +161,18 @@ class Load:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderCase:
-    """What a case file asks for.
+    """A case file of a slider motion.
 
     Attributes
     ----------
     synthesis : SynthesisCase
-        Task, bounds, constraints, search, and what the linkage is made of.
+        Task, bounds, constraints, search, and masses of the linkage.
     linkage : Linkage or None
-        The one whose pivot is moved; None if it is to be found first.
+        Linkage whose pivot is moved; None if it is to be found first.
     slider : SliderTable
-        The motion that is sought.
+        Unknowns and bounds of the motion.
     strategy, drive, tracking
-        What is asked for besides; None for what is not.
+        Further computations; None if not asked for.
     load : Load, optional
     """
 
@@ -207,13 +206,13 @@ class SliderCase:
         return constraints
 
     def _bounds(self) -> Mapping[str, tuple[float, float]]:
-        """Bounds of the links, where a linkage is given and they are kept, that linkage."""
+        """Return bounds of the links; a given linkage that is kept fixes all of them."""
         if self.linkage is None or self.free:
             return self.synthesis.bounds
-        return _kept(self.linkage)
+        return _fixed_bounds(self.linkage)
 
     def four_bar(self, *, progress: bool = False) -> Solution:
-        """The linkage with its pivot fixed: the one given, evaluated, or the best that is found."""
+        """Return the given linkage with its pivot fixed, evaluated, or the best linkage of a search."""
         task = self.synthesis.task
         if self.linkage is None:
             return self.synthesis.solve(progress=progress).best
@@ -222,13 +221,15 @@ class SliderCase:
         # where it is on the way of the task is not given: found with every dimension fixed
         only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
         return synthesize(
-            task, _kept(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
+            task, _fixed_bounds(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
         ).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
-        """The best motion with so many harmonics; see `slider_motion`."""
+        """Find the best motion with a number of harmonics; see `slider_motion`."""
         search = self.synthesis.search
-        bounds = _around(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
+        bounds = (
+            _free_bounds(four_bar.linkage, self.synthesis.task) | dict(self.synthesis.bounds) if self.free else None
+        )
         return slider_motion(
             self.synthesis.task,
             four_bar,
@@ -236,11 +237,11 @@ class SliderCase:
             bounds=bounds,
             constraints=self._constraints,
             guesses=guesses,
-            search=search.search(method="scan", starts=self.slider.starts, progress=progress),
+            search=search.search(starts=self.slider.starts, progress=progress),
         )
 
     def simplest(self, *, progress: bool = False) -> Strategy:
-        """The simplest mechanism within the tolerance; see `simplest_mechanism`."""
+        """Find the simplest mechanism within the tolerance; see `simplest_mechanism`."""
         wanted, search = self.strategy, self.synthesis.search
         assert wanted is not None
         return simplest_mechanism(
@@ -255,10 +256,10 @@ class SliderCase:
     # Dynamics
 
     def driven(self, solution: Solution) -> SliderDrive:
-        """Force, torque and pin forces of the motion; the crank turns the way the task is done."""
+        """Compute force, torque and pin forces of the motion; the crank turns in the direction of the task."""
         wanted = self.drive
         assert wanted is not None
-        speed = direction(solution) * wanted.speed
+        speed = solution.direction * wanted.speed
         motion, parameters = motion_of_plant(solution.linkage), self.synthesis.make.moving(solution.linkage)
         load = (0.0, 0.0) if self.load is None else (self.load.fx, self.load.fy)
         if wanted.best_spring:
@@ -266,7 +267,7 @@ class SliderCase:
         return inverse_dynamics(parameters, motion, speed, load=load, samples=wanted.samples)
 
     def tracked(self, drive: SliderDrive) -> TrackingResult:
-        """The run under control."""
+        """Run the plant under control."""
         wanted = self.tracking
         assert wanted is not None
         model = drive.parameters
@@ -296,13 +297,13 @@ class SliderCase:
         )
 
 
-def _kept(linkage: Linkage) -> dict[str, tuple[float, float]]:
-    """Bounds that fix the dimensions of a linkage."""
+def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:
+    """Return bounds that fix the dimensions of a linkage."""
     return {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
 
 
-def _around(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
-    """Bounds of links that are free: from a quarter to four times, the rest anywhere near; what a rocker ignores is kept."""
+def _free_bounds(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
+    """Return bounds of free links: lengths from a quarter to four times; dimensions without effect on a rocker stay fixed."""
     near = {name: (0.25 * getattr(linkage, name), 4.0 * getattr(linkage, name)) for name in LINKS}
     near["crank_phase"] = (linkage.crank_phase - pi, linkage.crank_phase + pi)
     if isinstance(task, RockerFunction):
@@ -318,7 +319,7 @@ def _around(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
 
 
 def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
-    """Tables of a case file that runs one turn under the control force, read from a file; see `docs/case-files.md`."""
+    """Return the tables of a case file that runs one turn under the control force of a file; see `docs/case-files.md`."""
     assert not callable(drive.load)
     position, velocity = drive.states[0, [1, 3]].tolist()
     return {
@@ -341,14 +342,14 @@ TABLES: Mapping[str, type] = {
 # Reading
 
 
-def _strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
-    """The tolerance is one of an error, or of the quality function, which is squared."""
+def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
+    """Read the table ``[strategy]``; its tolerance has the unit of the criterion, the quality function is squared."""
     unit = ("rad" if angular else "m") + "**2" * (table_of(value, name).get("criterion") == "error")
     return read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
 
-def _linkage(value: Any, name: str, *, folder: Path) -> Linkage:
-    """A linkage by its dimensions, or one of those in a file that `linkwork synthesize` wrote."""
+def _read_linkage(value: Any, name: str, *, folder: Path) -> Linkage:
+    """Read a linkage from its dimensions or from a file of `linkwork synthesize`."""
     if "file" not in table_of(value, name):
         dimensions = {d: Quantity("rad" if d in ANGLES else "m") for d in DIMENSIONS}
         return read(Linkage, value, name, readers={**dimensions, "branch": Whole()})
@@ -362,7 +363,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or what it says is not usable.
+        If the file cannot be read, or an entry is not usable.
     InfeasibleError
         If bounds and constraints contradict one another.
     """
@@ -373,7 +374,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def slider_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
-    """A case from the tables of a case file; ``folder`` is where its files are looked for."""
+    """Build a case from the tables of a case file; its files are looked for in ``folder``."""
     data = {"title": title} | overridden(data, overrides or {})
     own = [name for name in names_of(SliderCase) if name != "synthesis"]
     check_names(data, "", [name for name in (*names_of(SynthesisCase), *own) if name != "trade_off"])
@@ -386,14 +387,14 @@ def slider_case_from(
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
         "",
         readers={
-            "linkage": partial(_linkage, folder=folder),
-            "strategy": partial(_strategy, angular=angular),
+            "linkage": partial(_read_linkage, folder=folder),
+            "strategy": partial(_read_strategy, angular=angular),
         },
     )
 
 
 def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
-    """A linkage of a file that `Synthesis.to_csv` wrote: ``rank`` 1 is the best.
+    """Read a linkage from a file of `Synthesis.to_csv`: ``rank`` 1 is the best.
 
     Raises
     ------

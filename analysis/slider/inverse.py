@@ -1,7 +1,7 @@
 """Inverse dynamics: the control force, the crank torque and the pin forces of a prescribed motion of the slider.
 
 The slider follows u(th2) while the crank turns at a constant speed w2, so that u' = w2 du/dth2 and u'' = w2^2 d2u/dth2^2.
-The second equation of motion then is no differential equation any more but gives the force,
+The second equation of motion then gives the force,
 
     F2 = m22 u'' + b2 - Q2
 
@@ -42,14 +42,14 @@ LEAST_SAMPLES = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TurnBalance:
-    """Energy over one turn of a periodic motion (J): what comes in is what friction and damper take.
+    """Energy over one turn of a periodic motion (J): friction and damper take as much as is supplied.
 
     Attributes
     ----------
     force, torque, load : float
         Work of the slider force, of the crank torque, of the load at P.
     dissipated : float
-        By damper and guide friction.
+        Work of damper and guide friction.
     """
 
     force: float
@@ -65,7 +65,7 @@ class TurnBalance:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderDrive:
-    """One turn of the crank with the slider on a prescribed motion, at equal steps of the crank angle, the end left out.
+    """One turn of the crank with a prescribed slider motion, at equal steps of the crank angle, without the end.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class SliderDrive:
 
     Notes
     -----
-    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are those of the samples. `linearise.linearise_along`
+    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are taken over the samples. `linear.linearise_along`
     takes a drive as the motion to linearise about.
     """
 
@@ -105,17 +105,17 @@ class SliderDrive:
         return self.values[:, NAMES.index(name)]
 
     def pin_force(self, pin: str) -> FloatArray:
-        """Magnitude of the force in pin A, B, C or D (N), shape (n,)."""
+        """Return the magnitude of the force in pin A, B, C or D (N), shape (n,)."""
         magnitude: FloatArray = np.hypot(self[f"pin.{pin}.fx"], self[f"pin.{pin}.fy"])
         return magnitude
 
     def turn(self, samples: int) -> SliderDrive:
-        """The same motion at another number of samples."""
+        """Return the same motion at another number of samples."""
         return inverse_dynamics(self.parameters, self.slider, self.crank_speed, load=self.load, samples=samples)
 
     @property
     def modes(self) -> tuple[int, ...]:
-        """Values of the mechanism's modes: the crank's speed is commanded."""
+        """Values of the mechanism's modes: a commanded crank speed."""
         return (1,)
 
     @property
@@ -145,17 +145,17 @@ class SliderDrive:
 
     @property
     def peak_power(self) -> float:
-        """Largest power either way (W)."""
+        """Largest magnitude of the power (W)."""
         return float(np.abs(self.power).max())
 
     @property
     def positive_work(self) -> float:
-        """Work that the control force does over the turn while its power is positive (J)."""
+        """Work of the control force over the parts of the turn with positive power (J)."""
         return float(np.maximum(self.power, 0.0).mean()) * self.period
 
     @property
     def negative_work(self) -> float:
-        """Work that it takes up while its power is negative (J), at most zero."""
+        """Work of the control force over the parts of the turn with negative power (J), at most zero."""
         return float(np.minimum(self.power, 0.0).mean()) * self.period
 
     @property
@@ -165,12 +165,12 @@ class SliderDrive:
 
     @property
     def peak_force(self) -> float:
-        """Largest control force either way (N)."""
+        """Largest magnitude of the control force (N)."""
         return float(np.abs(self.force).max())
 
     @property
     def peak_torque(self) -> float:
-        """Largest crank torque either way (N.m)."""
+        """Largest magnitude of the crank torque (N.m)."""
         return float(np.abs(self.torque).max())
 
     @property
@@ -193,7 +193,7 @@ class SliderDrive:
         )
 
     def columns(self) -> Mapping[str, FloatArray]:
-        """Time, force, power and outputs by name with unit, as `analysis.files.write_csv` takes them."""
+        """Return time, force, power and outputs by name with unit, as `analysis.files.write_csv` takes them."""
         own = {"time [s]": self.time, "slider.force [N]": self.force, "slider.power [W]": self.power}
         units = output_units()
         return own | {f"{name} [{units[name]}]": self[name] for name in NAMES}
@@ -202,7 +202,7 @@ class SliderDrive:
 def slider_force(
     th2: float, u: float, w2: float, v: float, acceleration: float, load: tuple[float, float], p: Constants
 ) -> float:
-    """Slider force F2 (N) that gives the slider an acceleration u'' (m/s2) at a constant crank speed.
+    """Return the slider force F2 (N) for a slider acceleration u'' (m/s2) at constant crank speed.
 
     Raises ValueError, ZeroDivisionError if the links cannot be joined there; InputError if there is friction by contact
     forces.
@@ -226,7 +226,7 @@ def inverse_dynamics(
     load: Load = (0.0, 0.0),
     samples: int = 720,
 ) -> SliderDrive:
-    """What it takes to move the slider along u(th2) while the crank turns at a constant speed.
+    """Compute forces and torque that move the slider along u(th2) while the crank turns at a constant speed.
 
     Parameters
     ----------
@@ -238,17 +238,17 @@ def inverse_dynamics(
     load : (float, float) or function of the crank angle (rad)
         Force at the coupler point P (N).
     samples : int
-        Of the turn, at equal steps of the crank angle from 0 on.
+        Number of samples of the turn, at equal steps of the crank angle from 0 on.
 
     Raises
     ------
     InputError
         If the speed is zero or not finite, the load is not two finite numbers, or there are too few samples for the series.
     AssemblyError
-        If the links cannot be joined somewhere on the turn, with where.
+        If the links cannot be joined somewhere on the turn, with the place.
     """
     check_speed(crank_speed)
-    samples = whole(samples, "samples of a turn")
+    samples = whole_number(samples, "samples of a turn")
     least = max(LEAST_SAMPLES, 2 * slider.order + 1)
     if samples < least:
         raise InputError(f"{samples} samples of a turn: a motion of order {slider.order} needs at least {least}")
@@ -263,7 +263,7 @@ def inverse_dynamics(
     inputs[:, 1] = crank_speed
     for x, i, a in zip(states.tolist(), inputs, acceleration.tolist()):
         _check_joined(parameters, x[0], x[1])
-        at_p = load_at(load, x[0])
+        at_p = load_at_angle(load, x[0])
         i[3], i[4], i[5] = slider_force(x[0], x[1], x[2], x[3], a, at_p, p), *at_p
     values = outputs_of(FIVE_BAR, np.array([1.0]), np.array([*p, 0.0]), states, inputs)
     return SliderDrive(
@@ -280,20 +280,20 @@ def inverse_dynamics(
 
 
 def check_speed(crank_speed: float) -> None:
-    """Make sure that a constant crank speed (rad/s) is one; raises InputError if it is zero or not finite."""
+    """Make sure that a constant crank speed (rad/s) is finite and not zero; raises InputError otherwise."""
     if not (isfinite(crank_speed) and crank_speed != 0.0):
         raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
 
 
-def whole(value: float, what: str) -> int:
-    """Make sure that a number of something is a whole one; raises InputError if it is not."""
+def whole_number(value: float, what: str) -> int:
+    """Return a whole number as an int; raises InputError with the name of the quantity if it is not whole."""
     if not float(value).is_integer():
         raise InputError(f"{value} {what}: it must be a whole number")
     return int(value)
 
 
-def load_at(load: Load, crank_angle: float) -> tuple[float, float]:
-    """The load at P (N, N) at a crank angle (rad); raises InputError if it is not two finite numbers."""
+def load_at_angle(load: Load, crank_angle: float) -> tuple[float, float]:
+    """Return the load at P (N, N) at a crank angle (rad); raises InputError if it is not two finite numbers."""
     given = load(crank_angle) if callable(load) else load
     try:
         fx, fy = (float(part) for part in given)
@@ -317,18 +317,18 @@ def _check_joined(parameters: FiveBarParameters, crank_angle: float, slider_posi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BestSpring:
-    """The spring at the slider with which a motion takes the least control force.
+    """The spring at the slider that minimises the rms control force of a motion.
 
     Attributes
     ----------
     parameters : FiveBarParameters
-        With that spring in the place of the one they had.
+        Parameters with that spring.
     stiffness, free_position : float
         N/m, m; no spring is a stiffness of zero.
     rms_force : float
-        Of the control force with it (N).
+        Rms control force with that spring (N).
     rms_force_without : float
-        Without any spring (N).
+        Rms control force without any spring (N).
     """
 
     parameters: FiveBarParameters
@@ -349,7 +349,7 @@ def best_spring(
     load: Load = (0.0, 0.0),
     samples: int = 720,
 ) -> BestSpring:
-    """Stiffness and free position of the spring that minimise the rms control force of a motion.
+    """Find stiffness and free position of the spring that minimise the rms control force of a motion.
 
     The force is affine in k and k u0, so that this is linear least squares over the wedge k >= 0, low k <= k u0 <= high k:
     its minimum inside, or else on one of the two edges.
@@ -358,7 +358,7 @@ def best_spring(
     ----------
     free_position : (float, float), optional
         Least and greatest free position (m); by default the ground link's length either way. Without bounds a constant
-        force would pass for an endlessly soft spring.
+        force would be matched by an arbitrarily soft spring.
     parameters, slider, crank_speed, load, samples
         As for `inverse_dynamics`; the spring of the parameters does not matter.
 

@@ -1,8 +1,8 @@
-"""The direct search for the slider's motion: a Fourier series of the crank's rotation (thesis, chapter VII).
+"""Direct search for the slider's motion as a Fourier series of the crank's rotation (thesis, chapter VII).
 
-The rocker pivot of a given linkage is moved so that it does its task better: mean, harmonics and the guide's angle are sought
-with exact Jacobians from several starts, within bounds of stroke, speed and acceleration; or the links together with them. The
-optimum at every crank angle by itself is in `analysis.slider.variational`; it may jump, a Fourier series cannot.
+The rocker pivot of a given linkage is moved to improve its task: mean, harmonics and guide angle, and the links if they are
+free, are optimised with exact Jacobians from several starts, within bounds of stroke, speed and acceleration. The optimum at
+each crank angle alone is in `analysis.slider.variational`; it may jump, a Fourier series cannot.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from ..synthesis import (
     SynthesisInterrupted,
     Task,
     improve,
-    there_and_back,
+    solve_both_ways,
 )
 from ..units import Amount, in_si
 
@@ -53,15 +53,15 @@ def slider_motion(
     guesses: Sequence[Linkage | Solution] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Move the rocker pivot of a linkage so that it does a task as well as it can.
+    """Find the motion of the rocker pivot with which a linkage does a task best.
 
     Parameters
     ----------
     task : Task
-        Of `analysis.synthesis`; weights are the task's own.
+        Task of `analysis.synthesis`, with its weights.
     linkage : Linkage or Solution
-        Its dimensions are kept, but for those that ``bounds`` sets free. For an open path it must be a solution, which brings
-        the crank rotations of the stations.
+        Its dimensions are kept except those with ``bounds``. For an open path it must be a solution, which has the crank
+        rotations of the stations.
     unknown : SliderUnknown or CrankUnknown
         Harmonics, and bounds of guide angle, stroke, speed and acceleration.
     bounds : mapping, optional
@@ -69,9 +69,9 @@ def slider_motion(
     constraints : sequence
         By default the links stay joined over the turn.
     guesses : sequence of Linkage or Solution
-        Searched from as well: their pivots' motion, and with free dimensions those too.
+        Further starts of the search: their pivots' motion, and their free dimensions.
     search : Search
-        Its starts are random ones besides: phases and amplitudes of the harmonics, guide angles all round; there is no scan.
+        Its starts are random phases and amplitudes of the harmonics and guide angles; there is no scan.
 
     Returns
     -------
@@ -117,14 +117,14 @@ def slider_motion(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SmoothnessCurve:
-    """Error of the task against the smoothness of the slider's motion.
+    """Error of the task over the smoothness of the slider's motion.
 
     Attributes
     ----------
     acceleration : ndarray, shape (n,)
-        Greatest ``|d2u/dphi2|`` that was allowed (m/rad2), increasing.
+        Bounds of ``|d2u/dphi2|`` (m/rad2), increasing.
     solutions : tuple of Solution or None
-        The best at each; None where there is none.
+        Best solution for each bound; None if there is none.
     """
 
     acceleration: FloatArray
@@ -132,25 +132,26 @@ class SmoothnessCurve:
 
     @property
     def error(self) -> np.ma.MaskedArray:
-        """Quality function at each, masked where there is no solution; shape (n,)."""
+        """Value of the quality function at each bound, masked where there is no solution; shape (n,)."""
         return np.ma.masked_invalid(np.array([np.nan if s is None else s.error for s in self.solutions]))
 
     @property
     def attained(self) -> np.ma.MaskedArray:
         """Greatest ``|d2u/dphi2|`` of each motion (m/rad2)."""
-        return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
+        values = [np.nan if s is None else greatest_derivative(s.linkage, 2) for s in self.solutions]
+        return np.ma.masked_invalid(np.array(values))
 
 
 class SmoothnessInterrupted(Interrupted):
-    """A smoothness curve was stopped from the keyboard; ``curve`` has the best so far at each bound."""
+    """A smoothness curve was stopped from the keyboard; ``curve`` has the best motion so far at each bound."""
 
     def __init__(self, curve: SmoothnessCurve, done: int, problems: int) -> None:
         self.curve = curve
         super().__init__(f"stopped after {done} of {problems} problems of the smoothness curve")
 
 
-def greatest(linkage: Linkage, order: int) -> float:
-    """Greatest magnitude over a turn of the slider's position (order 0), or of a derivative of it by the crank's rotation."""
+def greatest_derivative(linkage: Linkage, order: int) -> float:
+    """Return the greatest magnitude over a turn of the slider's position (order 0) or of a derivative by the rotation."""
     if not isinstance(linkage.pivot, SliderMotion):
         return 0.0
     series = linkage.pivot.series
@@ -160,7 +161,7 @@ def greatest(linkage: Linkage, order: int) -> float:
 
 
 def motion_of_plant(linkage: Linkage) -> FourierSeries:
-    """The slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
+    """Return the slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
 
     Raises
     ------
@@ -186,11 +187,11 @@ def smoothness_curve(
     constraints: Sequence[Constraint] = (FullTurn(),),
     search: Search = USUAL_SEARCH,
 ) -> SmoothnessCurve:
-    """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
+    """Find the best motion for each bound of its second derivative: error against smoothness, warm started.
 
-    From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one
-    before, their harmonics shrunk to the new bound, and from its own random starts; then back, each problem keeping the
-    smoother solution or what is polished from it, so that the error never grows with the freedom.
+    From no bound to the tightest, each problem starts from the solutions of the one before, their harmonics scaled down to the
+    new bound, and from random starts. Then back: each problem keeps the smoother solution or one refined from it, so that a
+    wider bound never has a larger error.
 
     Parameters
     ----------
@@ -207,7 +208,7 @@ def smoothness_curve(
         On Ctrl-C, with the best so far at each bound.
     """
     if not isinstance(unknown, SliderUnknown):
-        raise InputError(f"the smoothness of {unknown!r}: it must be that of a SliderUnknown")
+        raise InputError(f"the unknown is {unknown!r}: a smoothness curve needs a SliderUnknown")
     values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
     if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
@@ -225,13 +226,13 @@ def smoothness_curve(
 
     found: dict[int, Solution] = {}
     done: int | None = 0
-    # what is best without a bound is the start for a wide one
+    # the best motion without a bound is the start for a wide bound
     with suppress(SynthesisInterrupted, KeyboardInterrupt):
         try:
             widest = best(inf, [], search.starts)
         except InfeasibleError:
             widest = ()
-        found, done = there_and_back(
+        found, done = solve_both_ways(
             range(len(values))[::-1],
             lambda k, guesses, back: best(float(values[k]), guesses, 0 if back else search.starts),
             widest,
@@ -243,8 +244,8 @@ def smoothness_curve(
 
 
 def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:
-    """The linkage with its slider's harmonics made smaller, down to the bound."""
-    most = greatest(linkage, 2)
+    """Return the linkage with the slider's harmonics scaled down to a bound of the second derivative."""
+    most = greatest_derivative(linkage, 2)
     if not isinstance(linkage.pivot, SliderMotion) or most <= acceleration:
         return linkage
     series = linkage.pivot.series

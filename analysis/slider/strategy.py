@@ -1,8 +1,8 @@
-"""The simplest mechanism that meets a tolerance (thesis, section 7.4).
+"""Search for the simplest mechanism that meets a tolerance (thesis, section 7.4).
 
 A four-bar first; if its best is not good enough, a four-bar whose rocker pivot is moved by a slider, harmonic by harmonic,
 links and motion optimised together; then five-bars, whose rocker pivot is on a second crank, geared to the first or turned
-independently. Each step starts from the one before, and says why it was not the last.
+independently. Each step starts from the one before, and records why it was not enough.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Literal
 
 from linkwork.errors import InputError, Interrupted
 
-from ..notebook import format_count
+from ..display import format_count
 from ..synthesis import (
     QUICK_SEARCH,
     USUAL,
@@ -39,16 +39,16 @@ RATIOS = (1, -1, 2, -2)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
-    """One mechanism that was tried.
+    """One mechanism of the search.
 
     Attributes
     ----------
     mechanism : str
-        In words.
+        Description of the mechanism.
     solution : Solution or None
-        Its best; None if there is none.
+        Its best solution; None if there is none.
     value : float
-        What was compared with the tolerance; infinite without a solution.
+        Value compared with the tolerance; infinite without a solution.
     reason : str
         Why it was taken, or why it was not enough.
     """
@@ -61,7 +61,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Strategy:
-    """What was tried, in order of simplicity, and what was chosen.
+    """Mechanisms tried in order of simplicity, and the chosen one.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Strategy:
 
     @property
     def chosen(self) -> Step:
-        """The step that meets the tolerance; without one, the simplest of those that come nearest, if any without a defect."""
+        """The step that meets the tolerance; without one, the nearest, those without a defect first."""
         if self.met:
             return self.steps[-1]
         return min(self.steps, key=lambda s: (s.solution is None or not s.solution.verdicts.sound, s.value))
@@ -89,7 +89,7 @@ class Strategy:
 
 
 class StrategyInterrupted(Interrupted):
-    """A search for the simplest mechanism was stopped; ``strategy`` holds the steps so far, or is None if there are none."""
+    """The search for the simplest mechanism was stopped; ``strategy`` holds the steps so far, or None."""
 
     def __init__(self, strategy: Strategy | None) -> None:
         self.strategy = strategy
@@ -109,28 +109,27 @@ def simplest_mechanism(
     second_crank: float | None = None,
     search: Search = QUICK_SEARCH,
 ) -> Strategy:
-    """The simplest mechanism without a circuit, branch or order defect whose error is within a tolerance.
+    """Find the simplest mechanism whose error is within a tolerance, without circuit, branch or order defect.
 
     Parameters
     ----------
     task : Task
     tolerance : float
-        Of the quality function (m2; of a rocker function rad2), or of the worst error (m, of a motion with its errors of angle
-        times its length; rad).
+        Bound of the quality function (m2, rad2), or of the worst error (m, rad; angular errors of a motion times its length).
     criterion : "error" or "worst"
-        Which of them; with ``"worst"`` it is also what is made small, whatever the task's objective.
+        The criterion; ``"worst"`` is also minimised, whatever the task's objective.
     bounds, constraints
-        Of the links, as for `synthesize`: they hold for every mechanism.
+        Bounds and constraints of the links of every mechanism, as for `synthesize`.
     stroke : float, optional
         Greatest stroke of the slider (m); half the ground link of the best four-bar by default.
     harmonics : int
-        Up to so many of the slider, and of an independent second crank.
+        Greatest number of harmonics of the slider, and of an independent second crank.
     ratios : sequence of int
-        Gears that are tried.
+        Gear ratios to be tried.
     second_crank : float, optional
         Its greatest length (m); half the stroke by default.
     search : Search
-        Of each mechanism; of a four-bar with twice as many starts.
+        Search for each mechanism; the four-bar has twice as many starts.
 
     Returns
     -------
@@ -159,7 +158,7 @@ def simplest_mechanism(
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
     if criterion == "worst":
-        # what is judged is what is made small
+        # the criterion is also the objective
         task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
     four_bar = tried.four_bar()
@@ -200,7 +199,7 @@ def simplest_mechanism(
 
 @dataclass(eq=False)
 class _Trials:
-    """The mechanisms tried so far; fields as the arguments of `simplest_mechanism`."""
+    """Mechanisms tried so far; fields as the arguments of `simplest_mechanism`."""
 
     task: Task
     tolerance: float
@@ -212,11 +211,11 @@ class _Trials:
     _met: bool = False
 
     def met(self) -> bool:
-        """Whether the last mechanism meets the tolerance without a defect."""
+        """Return whether the last mechanism meets the tolerance without a defect."""
         return self._met
 
     def four_bar(self) -> Solution:
-        """The best four-bar."""
+        """Find the best four-bar and record it."""
         search = replace(self.search, starts=2 * int(self.search.starts))
         solution = self._step("four-bar", self._found("four-bar", search))
         assert solution is not None
@@ -225,7 +224,7 @@ class _Trials:
     def attempt(
         self, mechanism: str, unknown: SliderUnknown | CrankUnknown, guesses: Sequence[Solution]
     ) -> Solution | None:
-        """Links and the pivot's motion together, from a scan and from simpler mechanisms."""
+        """Optimise links and pivot motion together, from a scan and from simpler mechanisms, and record the result."""
         try:
             found = self._found(mechanism, self.search, unknown, guesses)
         except InfeasibleError:
@@ -247,7 +246,7 @@ class _Trials:
             raise StrategyInterrupted(self.result() if self.steps else None) from None
 
     def _step(self, mechanism: str, found: Synthesis | None) -> Solution | None:
-        """Record a mechanism, with the reason why it is taken or not."""
+        """Record a mechanism with the reason why it is taken or not."""
         if found is None:
             self.steps.append(
                 Step(mechanism=mechanism, solution=None, value=inf, reason="none keeps the constraints: moved on")

@@ -1,14 +1,14 @@
-"""Feed-forward and feedback: the slider follows u(th2) on the full plant, and how well.
+"""Tracking of a slider motion u(th2) on the full plant by feed-forward and feedback.
 
 The force over a sampling period h is
 
     F2 = F_ff + feedback on (u - u_ref, u' - u_ref')
 
-F_ff is that of inverse dynamics on the model half a period ahead, th2 + w2 h/2, for a force that is held is right in the
-middle of its period: the error then goes with h^2, while that of the force at the sample goes with h. The reference
-goes with the measured crank. The feedback's gains, its integral and its limit are those of `analysis.linear`.
+F_ff is the force of inverse dynamics on the model half a period ahead, at th2 + w2 h/2: a held force is right in the middle of
+its period, so that the error is of order h^2, whereas the force at the sample would make it of order h. The reference follows
+the measured crank. Gains, integral and limit of the feedback are those of `analysis.linear`.
 
-The plant in the loop may differ from the model in what is not known beforehand: friction, masses, the load at P.
+The plant in the loop may differ from the model in friction, masses, and the load at P.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from ..linear import (
     check_limit,
     check_period,
     control_loop,
-    limited,
     peak,
     rms,
+    saturate,
 )
 from ..numerics.fourier import FourierSeries
 from ..run import Function, Inputs
-from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at, slider_force
+from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at_angle, slider_force
 
 
 class TrackingController:
-    """Feed-forward by inverse dynamics on a model, feedback by a design, or both; a `Controller`.
+    """Controller with feed-forward by inverse dynamics on a model, feedback by a design, or both.
 
     Parameters
     ----------
     parameters : FiveBarParameters
-        Of the model.
+        Parameters of the model.
     slider : FourierSeries
         Reference u(th2) (m).
     period : float
-        Of sampling (s).
+        Sampling period (s).
     design : Design, optional
-        Of the feedback, on a model in speed drive; by default there is none.
+        Design of the feedback, on a model in speed drive; none by default.
     feedforward : bool
-        Without it the force that holds the slider on the design's linear model takes its place.
+        Whether there is a feed-forward; otherwise the holding force of the design's linear model takes its place.
     load : (float, float) or function of the crank angle
         At P (N), as far as the feed-forward knows it.
     limit : float
@@ -63,7 +63,7 @@ class TrackingController:
     Raises
     ------
     InputError
-        If there is neither feed-forward nor feedback, or something given is not usable.
+        If there is neither feed-forward nor feedback, or an argument is not usable.
     """
 
     channel = "slider.force"
@@ -95,17 +95,17 @@ class TrackingController:
 
     @property
     def method(self) -> str:
-        """What it consists of."""
+        """Name of the control: feed-forward, the feedback's method, or both."""
         parts = ["feed-forward"] if self.feedforward else []
         return " + ".join(parts + ([self.feedback.method] if self.feedback else []))
 
     def reset(self) -> None:
-        """Forget the integral."""
+        """Set the integral to zero."""
         if self.feedback:
             self.feedback.reset()
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """The force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
+        """Return the force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
         th2, u, w2, v = measured
         if self.feedforward:
             forward = self._forward(th2 + 0.5 * w2 * self.period, w2)
@@ -113,28 +113,28 @@ class TrackingController:
             assert self.feedback is not None
             forward = self.feedback.holding_force(reference)
         if self.feedback is None:
-            return limited(forward, self.limit)
+            return saturate(forward, self.limit)
         return self.feedback.follow(forward, u - reference, v - w2 * float(self._slope(th2)))
 
     def _forward(self, th2: float, w2: float) -> float:
         u, v, a = float(self.slider(th2)), w2 * float(self._slope(th2)), w2 * w2 * float(self._curvature(th2))
-        return slider_force(th2, u, w2, v, a, load_at(self.load, th2), self._p)
+        return slider_force(th2, u, w2, v, a, load_at_angle(self.load, th2), self._p)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingMetrics:
-    """How well a motion was followed over the last turn.
+    """Tracking errors, force and power over the last turn.
 
     Attributes
     ----------
     rms_error, peak_error : float
-        Of the slider against its reference (m).
+        Deviation of the slider from its reference (m).
     rms_point_error, peak_point_error : float
-        Of the coupler point P against where the model has it on the reference (m).
+        Distance of the coupler point P from the model's P on the reference (m).
     rms_force, peak_force : float
         N.
     mean_power, peak_power : float
-        Of the slider force, the peak either way (W).
+        Power of the slider force (W); the peak is its greatest magnitude.
     """
 
     rms_error: float
@@ -149,12 +149,12 @@ class TrackingMetrics:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrackingResult:
-    """A run of the slider along its reference, at the times at which the controller sampled.
+    """A run of the slider along its reference, at the controller's sampling times.
 
     Attributes
     ----------
     method : str
-        Of control.
+        Name of the control.
     crank_speed : float
         rad/s.
     loop : LoopResult
@@ -162,9 +162,9 @@ class TrackingResult:
     error : ndarray, shape (n,)
         u - u_ref (m).
     point_error : ndarray, shape (n,)
-        Distance of P from where the model has it on the reference (m).
+        Distance of P from the model's P on the reference (m).
     power : ndarray, shape (n,)
-        Of the slider force, its mean over the period before each sample (W); zero at the first.
+        Mean power of the slider force over the period before each sample (W); zero at the first.
     """
 
     method: str
@@ -175,7 +175,7 @@ class TrackingResult:
     power: FloatArray
 
     def metrics(self) -> TrackingMetrics:
-        """Errors, force and power over the last turn.
+        """Compute errors, force and power over the last turn.
 
         Raises
         ------
@@ -209,21 +209,21 @@ def track(
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
 ) -> TrackingResult:
-    """Let the slider follow u(th2) on the full nonlinear plant, in process or as its FMU.
+    """Run the full nonlinear plant under a tracking controller, in process or as its FMU.
 
     Parameters
     ----------
     controller : TrackingController
-        With the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean one along
-        the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
+        Controller with the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean
+        model along the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
     crank_speed : float
         Constant prescribed speed (rad/s).
     revolutions : float
         Turns of the crank.
     plant : FiveBarParameters, optional
-        Of the plant; by default it is the controller's model.
+        Parameters of the plant; by default those of the controller's model.
     load : (float, float) or function of the crank angle
-        At P (N), held over a period at its value in the middle of it; what the feed-forward knows of it is the controller's.
+        At P (N), held over a period at its value in the middle of it; the feed-forward uses the controller's load.
     initial : InitialState, optional
         By default on the reference at crank angle 0.
     fmu : path, optional
@@ -239,9 +239,9 @@ def track(
     Raises
     ------
     InputError
-        If something given is not usable.
+        If an argument is not usable.
     AssemblyError
-        If the links of the model cannot be joined somewhere on the reference, or those of the plant at the start.
+        If the links cannot be joined: the model's somewhere on the reference, or the plant's at the start.
     """
     check_speed(crank_speed)
     if not 0.0 < revolutions < inf:
@@ -258,7 +258,7 @@ def track(
         return start.crank_angle + crank_speed * t
 
     def load_part(part: int) -> Function:
-        return Function(lambda t, *state: load_at(load, angle(t + 0.5 * controller.period))[part])
+        return Function(lambda t, *state: load_at_angle(load, angle(t + 0.5 * controller.period))[part])
 
     loop = control_loop(
         plant or parameters,
@@ -281,7 +281,7 @@ def track(
 
 
 def _point_error(parameters: FiveBarParameters, loop: LoopResult) -> FloatArray:
-    """Distance of the coupler point from where the model has it on the reference."""
+    """Return the distance of the coupler point from the model's coupler point on the reference."""
     assert loop.trajectory is not None
     p = parameters.constants()
     wanted = [

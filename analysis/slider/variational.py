@@ -1,4 +1,4 @@
-"""The slider's motion that brings the linkage as near to its target as it can come, at every crank angle, in closed form.
+"""The slider position of least error at every crank angle, in closed form: the variational method of the thesis.
 
 The links are given, and the crank is at phi. In the frame of the guide, with its zero at the end E of the ground link, let
 b = (B - E) exp(-i alpha), s = th3 - alpha, t = th4 - alpha. Loop closure is then (Youssef, section 7.3)
@@ -12,14 +12,14 @@ and one freedom is left, the slider position u. It moves the links by
 For a path, P turns with the coupler about B and |P - p*|^2 falls with the angle between BP and the direction from B to p*; for
 a function the rocker has to be at th4*. So the error as a function of u has its minima
 
-    with the link at the angle that is wanted, the other link on either side of the perpendicular to the guide;
+    with the link at the target angle, the other link on either side of the perpendicular to the guide;
     with the other link perpendicular to the guide, either way, and the link on either side: cos t = 0 for a path, cos s = 0
     for a function;
     at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
-The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the best may lie
-in the other assembly, past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least
-transmission angle before.
+The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the optimum may lie in the
+other assembly, past a dead centre. A linkage that keeps its assembly stops there, and earlier if it keeps a least transmission
+angle.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ JUMP = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VariationalMotion:
-    """Slider positions at which the error is least, one for each crank rotation.
+    """Slider positions of least error, one for each crank rotation.
 
     Attributes
     ----------
@@ -66,12 +66,12 @@ class VariationalMotion:
     branch : ndarray of int, shape (n,)
         Assembly, the sign of sin(th4 - th3).
     kind : ndarray of str, shape (n,)
-        Why the error is least: "target" (the link is at the angle that is wanted), "perpendicular" (the other link is, to the
+        Why the error is least: "target" (the link is at the target angle), "perpendicular" (the other link is, to the
         guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
     error : ndarray, shape (n,)
         Distance from the target point (m), or from the target angle (rad).
     weights : ndarray, shape (n,)
-        Of the squared errors.
+        Weights of the squared errors.
     jumps : ndarray of int
         Every k for which the slider would have to jump from rotation k to the next: no path of minima of one assembly leads
         across.
@@ -101,7 +101,7 @@ class VariationalMotion:
         return float(np.ptp(self.u))
 
     def to_series(self, order: int) -> FourierSeries:
-        """Fourier series of the crank's rotation nearest to u by weighted least squares: a start for a direct search.
+        """Fit a Fourier series of the crank's rotation to u by weighted least squares: a start for a direct search.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class VariationalMotion:
 
 
 class _Minima(NamedTuple):
-    """Candidates of every kind and assembly at crank rotations, each of shape (m, n); only the valid ones are minima."""
+    """Candidates of every kind and assembly at crank rotations, each of shape (m, n); ``valid`` marks the minima."""
 
     u: FloatArray
     coupler: FloatArray
@@ -131,7 +131,7 @@ class _Minima(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Problem:
-    """What is asked of a linkage; target points are complex numbers, target angles real ones."""
+    """Linkage, guide and bounds of the problem; target points are complex numbers, target angles real ones."""
 
     linkage: Linkage
     guide_angle: float
@@ -159,16 +159,16 @@ class _Problem:
         return np.array(kinds * len(self.assemblies)), np.repeat(self.assemblies, len(kinds))
 
     def _limits(self) -> list[tuple[float, float, float]]:
-        """Limits of the range of u: angle at C between coupler and rocker, BD, and +1 if BD may not be longer."""
+        """Return the limits of the range of u: angle at C between coupler and rocker, BD, and +1 if BD may not be longer."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
         most = sqrt((l3 + l4) ** 2 - 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
-        # with B on D the directions of coupler and rocker are those of neither limit: the perpendicular ones are candidates
+        # with B on D the directions of coupler and rocker are undetermined: perpendicular ones are candidates
         return [(pi - low, most, 1.0)] + ([(low, least, -1.0)] if least > 0.0 else [])
 
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
-        """b: the crank pin B from the guide's zero, in the frame of the guide."""
+        """Return b, the position of the crank pin B from the guide's zero, in the frame of the guide."""
         k = self.linkage
         b: NDArray[np.complex128] = (
             k.crank_length * np.exp(1j * (rotation + k.crank_phase)) - k.ground_length
@@ -176,7 +176,7 @@ class _Problem:
         return b
 
     def minima(self, rotation: FloatArray, target: NDArray[np.complex128] | FloatArray) -> _Minima:
-        """Every minimum of the error over the slider position."""
+        """Return the candidates for minima of the error over the slider position."""
         k = self.linkage
         l3, l4 = k.coupler_length, k.rocker_length
         path = np.iscomplexobj(target)
@@ -193,7 +193,7 @@ class _Problem:
             wanted = target.real - k.output_angle - self.guide_angle
             own, other, offset = l4, l3, -b.imag
 
-        # angles of the own and the other link from the guide where the error is stationary
+        # angles from the guide of the target link and the other link where the error is stationary
         sine = (own * np.sin(wanted) + offset) / other
         side = np.arcsin(np.clip(sine, -1.0, 1.0))
         x, y = [wanted, wanted], [side, pi - side]
@@ -229,7 +229,7 @@ class _Problem:
         return _Minima(u, coupler + self.guide_angle, rocker + self.guide_angle, error, valid)
 
     def _ends(self, b: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Ends of the range of u: position, angle at C, direction in which the range lies, and whether it ends there."""
+        """Return the ends of the range of u: position, angle at C, direction into the range, whether the end exists."""
         l3, l4 = self.linkage.coupler_length, self.linkage.rocker_length
         low, high = self.stroke
         ends = []
@@ -262,7 +262,7 @@ def variational_motion(
     continuous: bool = False,
     closed: bool = True,
 ) -> VariationalMotion:
-    """The slider position of least error at each crank rotation, or the continuous motion through minima of the error.
+    """Find the slider position of least error at each crank rotation, or the best continuous motion through minima.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def variational_motion(
     chosen_from = minima.valid if continuous else error == error.min(axis=0)
     bridged = _bridged(problem, phi, goal, minima, chosen_from)
     travel = minima.u / (linkage.coupler_length + linkage.rocker_length)
-    choice = _path(w * minima.error**2, travel, chosen_from, bridged, closed)
+    choice = _choose_minima(w * minima.error**2, travel, chosen_from, bridged, closed)
     at = (choice, np.arange(n))
     kinds, branches = problem.labels
     steps = np.arange(n if closed else n - 1)
@@ -353,13 +353,13 @@ def variational_motion(
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
-    """The angle in (-pi, pi]."""
+    """Return the angle in (-pi, pi]."""
     value: FloatArray = pi - np.mod(pi - angle, 2.0 * pi)
     return value
 
 
 def _out_of_reach(problem: _Problem, phi: FloatArray, n: int) -> str:
-    """What is wrong at rotations, out of n, at which the links cannot be joined at any slider position: the worst of them."""
+    """Return a sentence about the worst of the rotations at which the links cannot be joined at any slider position."""
     b = problem.pin(phi)
     limits = problem._limits()
     most = limits[0][1]
@@ -391,7 +391,7 @@ def _bridged(
     minima: _Minima,
     chosen_from: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Whether minimum i at rotation k and minimum j at the next one belong to one path of minima, shape (n, m, m).
+    """Return whether a path of minima leads from minimum i at rotation k to minimum j at the next, shape (n, m, m).
 
     The last rotation is followed by the first, a turn later.
 
@@ -432,10 +432,10 @@ def _bridged(
     return bridged
 
 
-def _path(
+def _choose_minima(
     squares: FloatArray, travel: FloatArray, chosen_from: NDArray[np.bool_], bridged: NDArray[np.bool_], closed: bool
 ) -> NDArray[np.int64]:
-    """Dynamic programming: the row of each column, for the fewest jumps, then least sum of squares, then least travel."""
+    """Choose the row of each column by dynamic programming: fewest jumps, then least sum of squares, then least travel."""
     m, n = squares.shape
     whole = float(np.where(chosen_from, squares, 0.0).max(axis=0).sum())
     cost = np.where(chosen_from, squares / (whole or 1.0), inf)
@@ -450,7 +450,7 @@ def _path(
         before[k] = ways.argmin(axis=1)
         total = ways.min(axis=1) + cost[:, k]
     if not closed:
-        # what leads back to the first rotation does not count
+        # the step back to the first rotation does not count
         step[-1] = 0.0
     first, row = np.unravel_index(int((total + step[-1].T).argmin()), (m, m))
     choice = np.empty(n, dtype=int)

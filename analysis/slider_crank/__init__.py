@@ -1,4 +1,4 @@
-"""Analysis of the generalised slider-crank: the thesis's own method by dual numbers, and what is built on the plant.
+"""Analysis of the generalised slider-crank: force problems, mobility, tolerances, and the thesis's dual-number method.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

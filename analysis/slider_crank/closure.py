@@ -8,7 +8,7 @@ Round the loop the displacements from joint to joint multiply to the identity, M
     M4 = Z(eps S4) X(alpha4 + eps a4)       guide -> ground
 
 where X and Z are screw displacements about and along i and k. B2 and B3 are the rotations in the ball joints. The thesis
-gives each two angles, with which the loop cannot close for a given theta1 and S1 (`two_rotations`, erratum 1).
+gives each two angles, with which the loop cannot close for a given theta1 and S1 (see `settle` below, erratum 1).
 Here each is a general rotation, corrected in every step by a small rotation about three axes. With S4 these are seven
 unknowns for six equations: the spin of the rod about its own line is idle. The convention that it has none, omega . u = 0,
 is the seventh equation, in each step of Newton's method (the correction turns the rod about no axis with a component along
@@ -19,16 +19,17 @@ the iteration starts; positions and forces do not depend on it.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
-from ..numerics.dual import Array, Dual, about_i, about_k, axial, origin, skew, stack
+from ..numerics.dual import Array, Dual, about_i, about_j, about_k, axial, origin, skew, stack
 from ..run import takes_published
-from ..units import Amount, in_si
+from ..units import INCH, Amount, in_si
 from .quantities import FloatArray
 
 #: Largest residual of a closed loop: rotation in radians, and length as a share of the links' lengths together.
@@ -38,16 +39,20 @@ MAX_ITERATIONS = 60
 
 
 class ClosureError(LinkworkError):
-    """The iteration did not find the closed loop of the assembly that is sought, although the links can be joined."""
+    """The iteration did not find the closed loop in the chosen assembly, although the links can be joined."""
+
+
+def scale(p: SliderCrankParameters, shift: Array) -> float:
+    """Return the length by which lengths are divided to compare them with angles (m): links and largest shift together."""
+    return p.crank_length + p.rod_length + abs(p.guide_offset) + float(np.max(np.abs(shift)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Closure:
-    """Closed loops, one for each of n given crank angles and shifts.
+class Loops:
+    """Loops of the mechanism, closed or not, at n crank angles and shifts.
 
-    ``crank_angle`` (rad) and ``shift`` (m) are the given theta1 and S1, shape (n,); ``crank_ball`` and ``slider_ball`` are
-    the rotations B2 and B3 in the ball joints, shape (n, 3, 3); ``slider_position`` is S4 (m). ``rotation_residual`` (rad)
-    and ``length_residual`` (m) say by how much the loops are not closed; ``iterations`` is the largest number of steps.
+    ``crank_angle`` (rad) and ``shift`` (m) are theta1 and S1, shape (n,); ``crank_ball`` and ``slider_ball`` are the
+    rotations B2 and B3 in the ball joints, shape (n, 3, 3); ``slider_position`` is S4 (m).
     """
 
     parameters: SliderCrankParameters
@@ -56,13 +61,6 @@ class Closure:
     crank_ball: FloatArray
     slider_ball: FloatArray
     slider_position: FloatArray
-    rotation_residual: FloatArray
-    length_residual: FloatArray
-    iterations: int
-
-    def at(self, points: Any) -> Closure:
-        """The loops of some of the points, by their indices (array_like of int): a start for others near them."""
-        return replace(self, **{name: getattr(self, name)[points] for name in _POINTWISE})
 
     @property
     def crank_frame(self) -> Dual:
@@ -73,19 +71,15 @@ class Closure:
     def rod_frame(self) -> Dual:
         """A frame fixed to the rod, in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3).
 
-        It is not the frame 3 in which components of forces are given (`JointLoads.components`): its j and k are
-        turned about the rod by the idle spin, as the start of the iteration has left it.
+        It differs from frame 3, in which components of forces are given (`JointLoads.components`): its j and k are turned
+        about the rod by the idle spin that the start of the iteration has left.
         """
-        return self._frames[0]
+        return cast(Dual, _pin_frame(self.parameters, self.crank_angle, self.shift) @ self.crank_ball)
 
     @property
     def guide_frame(self) -> Dual:
         """Frame 4, its origin in the slider pin, in frame 1: (n, 3, 3)."""
-        return self._frames[1]
-
-    @property
-    def _frames(self) -> tuple[Dual, Dual]:
-        return _frames(self.parameters, self.crank_angle, self.shift, self.crank_ball, self.slider_ball)
+        return cast(Dual, self.rod_frame @ about_i(Dual(0.0, self.parameters.rod_length)) @ self.slider_ball)
 
     @property
     def crank_pin(self) -> FloatArray:
@@ -97,24 +91,48 @@ class Closure:
         """Position of the slider pin in frame 1 (m): (n, 3)."""
         return origin(self.guide_frame)
 
+    @property
+    def product(self) -> Dual:
+        """The product M1 L2 L3 M4 (n, 3, 3) of eq 5, the identity where the loop is closed."""
+        p, s4 = self.parameters, self.slider_position
+        slide = about_k(Dual(np.zeros_like(s4), s4))
+        return cast(Dual, self.guide_frame @ slide @ about_i(Dual(p.guide_twist, p.guide_offset)))
+
+    def corrected(self) -> Loops:
+        """Return the loops after one step of Newton's method; raises LinAlgError if its equations are singular."""
+        length = scale(self.parameters, self.shift)
+        step = _correction(self.product, self.rod_frame, self.guide_frame, length)
+        return replace(
+            self,
+            crank_ball=self.crank_ball @ _rotation(np.concatenate([np.zeros((len(step), 1)), step[:, :2]], -1)),
+            slider_ball=self.slider_ball @ _rotation(step[:, 2:5]),
+            slider_position=self.slider_position + length * step[:, 5],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Closure(Loops):
+    """Closed loops, one for each of n given crank angles and shifts; see `Loops`.
+
+    ``rotation_residual`` (rad) and ``length_residual`` (m) are the closure errors, shape (n,); ``iterations`` is the largest
+    number of steps.
+    """
+
+    rotation_residual: FloatArray
+    length_residual: FloatArray
+    iterations: int
+
+    def at(self, points: Any) -> Closure:
+        """Return the loops of some points, by their indices (array_like of int): a start for others near them."""
+        return replace(self, **{name: getattr(self, name)[points] for name in _POINTWISE})
+
 
 #: Fields of `Closure` that have a value for each point.
 _POINTWISE = tuple(x.name for x in fields(Closure) if x.name not in ("parameters", "iterations"))
 
 
-def scale(p: SliderCrankParameters, shift: Array) -> float:
-    """Length by which lengths are divided to compare them with angles (m): the links' lengths and the largest shift."""
-    return p.crank_length + p.rod_length + abs(p.guide_offset) + float(np.max(np.abs(shift)))
-
-
-def loop(p: SliderCrankParameters, th: Array, s1: Array, crank_ball: Array, slider_ball: Array, s4: Array) -> Dual:
-    """The product M1 L2 L3 M4 (n, 3, 3) of eq 5, the identity where the loop is closed."""
-    guide = _frames(p, th, s1, crank_ball, slider_ball)[1]
-    return cast(Dual, guide @ about_k(Dual(np.zeros_like(s4), s4)) @ about_i(Dual(p.guide_twist, p.guide_offset)))
-
-
-def estimate(p: SliderCrankParameters, th: Array, s1: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where the iteration starts: the planar slider-crank of section 2.6.2, as (B2, B3, S4).
+def planar_loops(p: SliderCrankParameters, th: Array, s1: Array) -> Loops:
+    """Return the start of the iteration: the planar slider-crank of section 2.6.2.
 
     The planar mechanism lies in the plane through the crank pin that the common normal i and the guide span. With
     alpha4 = 270 deg and S1 = 0 it is the thesis's and exact.
@@ -126,7 +144,31 @@ def estimate(p: SliderCrankParameters, th: Array, s1: Array) -> tuple[FloatArray
     i = np.stack([-pin[:, 0], np.zeros_like(beyond), -beyond], -1) / p.rod_length
     j = np.broadcast_to([0.0, 1.0, 0.0], i.shape)
     rod = np.stack([i, j, np.cross(i, j)], -1)
-    return about_k(-th).real @ guide.real @ rod, np.swapaxes(rod, -1, -2), beyond - pin[:, 2]
+    return Loops(
+        parameters=p,
+        crank_angle=th,
+        shift=s1,
+        crank_ball=about_k(-th).real @ guide.real @ rod,
+        slider_ball=np.swapaxes(rod, -1, -2),
+        slider_position=beyond - pin[:, 2],
+    )
+
+
+def _moved(start: Closure, th: Array, s1: Array) -> Loops:
+    """Return a start from closed loops nearby, as many or one: the rod keeps its orientation in space."""
+    if start.crank_angle.size not in (1, th.size):
+        raise InputError(
+            f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"
+        )
+    crank_ball = about_k(start.crank_angle - th).real @ start.crank_ball
+    return Loops(
+        parameters=start.parameters,
+        crank_angle=th,
+        shift=s1,
+        crank_ball=crank_ball,
+        slider_ball=np.broadcast_to(start.slider_ball, crank_ball.shape),
+        slider_position=np.broadcast_to(start.slider_position, th.shape),
+    )
 
 
 @takes_published()
@@ -134,81 +176,58 @@ def estimate(p: SliderCrankParameters, th: Array, s1: Array) -> tuple[FloatArray
 def close(
     parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount, start: Closure | None = None
 ) -> Closure:
-    """Close the loop at the given crank angles and shifts, each for itself, by Newton's method.
+    """Close the loop at each of the given crank angles and shifts by Newton's method.
 
     Parameters
     ----------
     parameters : SliderCrankParameters
-        The mechanism; its ``assembly_branch`` says which assembly is sought.
+        The mechanism; its ``assembly_branch`` chooses the assembly.
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m); numbers, or arrays of shape (n,).
     start : Closure, optional
-        Loops near those that are sought, as many or one, to start from; the rod first keeps its orientation in space. By
-        default the planar `estimate`.
+        Loops near the wanted ones, as many or one, to start from; the rod first keeps its orientation in space. By
+        default the planar slider-crank.
 
     Raises
     ------
     InputError
         If an angle or a shift is not a finite number, or their shapes or the number of loops in ``start`` do not agree.
     AssemblyError
-        If the rod does not reach the guide, with the length that it lacks at the worst of the given angles.
+        If the rod does not reach the guide; the message has the missing length at the worst of the given angles.
     ClosureError
-        If the iteration ends in a loop that is not closed or in the other assembly.
+        If the iteration ends in an open loop or in the other assembly.
     """
     p = parameters
-    th, s1 = points_of(crank_angle, shift)
-    lacking = shortage(p, th, s1)
+    th, s1 = broadcast_points(crank_angle, shift)
+    lacking, length = shortage(p, th, s1), scale(p, s1)
     worst = int(np.argmax(lacking))
-    if lacking[worst] > TOLERANCE * scale(p, s1):
+    if lacking[worst] > TOLERANCE * length:
         raise AssemblyError(
             f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} "
             f"m: the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
         )
-    if start is not None and start.crank_angle.size not in (1, th.size):
-        raise InputError(
-            f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"
-        )
-    if start is None:
-        crank_ball, slider_ball, s4 = estimate(p, th, s1)
-    else:
-        back = about_k(start.crank_angle - th).real
-        crank_ball = back @ start.crank_ball
-        slider_ball = np.broadcast_to(start.slider_ball, crank_ball.shape)
-        s4 = np.broadcast_to(start.slider_position, th.shape)
-    found = False
-    iterations = 0
+    loops = planar_loops(p, th, s1) if start is None else replace(_moved(start, th, s1), parameters=p)
+    iterations, found = 0, False
     while not found and iterations < MAX_ITERATIONS:
         iterations += 1
-        product = loop(p, th, s1, crank_ball, slider_ball, s4)
-        rotation, distance = residuals(product)
+        rotation, distance = residuals(loops.product)
         # one more step from inside the tolerance, after which only rounding is left
-        found = bool(np.all(rotation <= TOLERANCE) and np.all(distance <= TOLERANCE * scale(p, s1)))
+        found = bool(np.all(rotation <= TOLERANCE) and np.all(distance <= TOLERANCE * length))
         try:
-            step = _correction(product, *_frames(p, th, s1, crank_ball, slider_ball), scale(p, s1))
+            loops = loops.corrected()
         except np.linalg.LinAlgError:
             break
-        crank_ball = crank_ball @ _turn(np.concatenate([np.zeros((th.size, 1)), step[:, :2]], -1))
-        slider_ball = slider_ball @ _turn(step[:, 2:5])
-        s4 = s4 + scale(p, s1) * step[:, 5]
-    rotation, distance = residuals(loop(p, th, s1, crank_ball, slider_ball, s4))
-    _check(p, th, s1, rotation, distance, slider_ball, iterations)
-    return Closure(
-        parameters=p,
-        crank_angle=th,
-        shift=s1,
-        crank_ball=crank_ball,
-        slider_ball=slider_ball,
-        slider_position=s4,
-        rotation_residual=rotation,
-        length_residual=distance,
-        iterations=iterations,
-    )
+    rotation, distance = residuals(loops.product)
+    own = {field.name: getattr(loops, field.name) for field in fields(Loops)}
+    closed = Closure(rotation_residual=rotation, length_residual=distance, iterations=iterations, **own)
+    _check(closed)
+    return closed
 
 
 @takes_published()
 @in_si(crank_angle="rad", shift="m")
 def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
-    """Close the loop by continuation: the first point from the planar estimate, every other from the one before it.
+    """Close the loop by continuation: start the first point from the planar slider-crank, the others from their predecessor.
 
     The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.
 
@@ -224,7 +243,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
     InputError, AssemblyError, ClosureError
         As `close`; a step that would change the assembly is a ClosureError.
     """
-    th, s1 = points_of(crank_angle, shift)
+    th, s1 = broadcast_points(crank_angle, shift)
     points: list[Closure] = []
     for angle, position in zip(th, s1):
         points.append(close(parameters, angle, position, points[-1] if points else None))
@@ -233,7 +252,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount
 
 
 def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
-    """By how much loops (..., 3, 3) are not closed: angle (rad) and length (unit of the loop), shape (...).
+    """Return the closure errors of loops (..., 3, 3): angle (rad) and length (unit of the loop), shape (...).
 
     The whole matrix is judged: its antisymmetric part alone, which the iteration makes zero, is zero as well where the loop
     closes but for half a turn.
@@ -243,8 +262,8 @@ def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     return 2.0 * np.arcsin(np.minimum(chord, 1.0)), np.linalg.norm(origin(product), axis=-1)
 
 
-def points_of(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
-    """Crank angles and shifts of one shape (n,)."""
+def broadcast_points(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
+    """Return crank angles and shifts broadcast to one shape (n,)."""
     try:
         th, s1 = np.broadcast_arrays(np.asarray(crank_angle, dtype=float), np.asarray(shift, dtype=float))
     except ValueError as error:
@@ -260,18 +279,12 @@ def points_of(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
 
 
 def _pin_frame(p: SliderCrankParameters, th: Array, s1: Array) -> Dual:
-    """M1: the crank's frame moved to the crank pin."""
+    """Return M1, the crank's frame moved to the crank pin."""
     return cast(Dual, about_k(Dual(th, s1)) @ about_i(Dual(0.0, p.crank_length)))
 
 
-def _frames(p: SliderCrankParameters, th: Array, s1: Array, crank_ball: Array, slider_ball: Array) -> tuple[Dual, Dual]:
-    """Frames in frame 1 of the rod, at the crank pin, and of the guide, at the slider pin."""
-    rod = _pin_frame(p, th, s1) @ crank_ball
-    return cast(Dual, rod), cast(Dual, rod @ about_i(Dual(0.0, p.rod_length)) @ slider_ball)
-
-
 def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatArray:
-    """Newton's step (n, 6): rotations about j, k of the rod, about i, j, k of the guide; slide as a share of ``length``.
+    """Return Newton's step (n, 6): rotations about rod axes j, k and guide axes i, j, k; slide as a share of ``length``.
 
     A joint's motion q along its screw s changes the loop E by [s]E q, and the vector of the antisymmetric part of that is
     (tr(E) I - E) s q / 2: the exact derivative, from closed or open loops.
@@ -287,47 +300,207 @@ def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatAr
     )
 
 
-def _turn(vector: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of the vectors (n, 3): axis times tangent of half the angle times two (Cayley)."""
+def _rotation(vector: Array) -> Array:
+    """Return rotation matrices (n, 3, 3) of vectors (n, 3): axis times twice the tangent of half the angle (Cayley)."""
     half = 0.5 * vector
     m = skew(half).real
-    turn: Array = np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
-    return turn
+    rotation: Array = np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
+    return rotation
 
 
-def _check(
-    p: SliderCrankParameters,
-    th: Array,
-    s1: Array,
-    rotation: Array,
-    distance: Array,
-    slider_ball: Array,
-    iterations: int,
-) -> None:
-    """Accept loops that are closed and in the assembly that is sought, or say what is wrong."""
-    error = np.maximum(rotation, distance / scale(p, s1))
+def _check(found: Closure) -> None:
+    """Make sure that the loops are closed and in the chosen assembly; raises ClosureError if they are not."""
+    p, rotation, distance = found.parameters, found.rotation_residual, found.length_residual
+    error = np.maximum(rotation, distance / scale(p, found.shift))
+
+    def place(i: int) -> str:
+        return f"theta1 = {found.crank_angle[i]:.6g} rad, S1 = {found.shift[i]:.6g} m"
+
     worst = int(np.argmax(error))
     if not error[worst] <= TOLERANCE:
         raise ClosureError(
-            f"loop closure residual {rotation[worst]:.1e} rad and {distance[worst]:.1e} m after {iterations} iterations at "
-            f"theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m, though the rod reaches the guide: start nearer "
-            "to the loop that is sought"
+            f"loop closure residual {rotation[worst]:.1e} rad and {distance[worst]:.1e} m after {found.iterations} "
+            f"iterations at {place(worst)}, though the rod reaches the guide: start nearer to the solution"
         )
     # the slider pin is beyond the crank pin's foot on the guide, against k4
-    side = -p.assembly_branch * slider_ball[:, 0, 2]
+    side = -p.assembly_branch * found.slider_ball[:, 0, 2]
     worst = int(np.argmin(side))
     if side[worst] < 0.0:
         raise ClosureError(
-            f"the loop closes in assembly {-p.assembly_branch:+d} at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m, "
-            f"where {p.assembly_branch:+d} is sought: start nearer to it"
+            f"the loop closes in assembly {-p.assembly_branch:+d} at {place(worst)}, not in {p.assembly_branch:+d} as asked: "
+            "start nearer to it"
         )
 
 
 def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArray:
-    """By how much the rod is too short (m), negative where the loop can be closed: the distance of the crank pin from the
-    guide's line less the length of the rod.
-    """
+    """Return the distance of the crank pin from the guide less the rod length (m): above 0 the loop cannot be closed."""
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = origin(_pin_frame(p, np.asarray(crank_angle), np.asarray(shift)))
     across = (pin - origin(guide)) @ guide.real[:, :2]
     return cast(FloatArray, np.linalg.norm(across, axis=-1) - p.rod_length)
+
+
+# The thesis's closure with two rotations in each ball joint (erratum 1)
+#
+# The thesis gives the ball joints the matrices
+#
+#     L2 = Z(theta2) Y(eta2) X(eps a2)        crank -> rod
+#     L3 = Z(theta3) Y(eta3) X(90 deg)        rod -> guide
+#
+# in place of general rotations: Hooke's joints. In the planar mechanism (S1 = 0, alpha4 = 270 deg) the loop closes with
+# eta2 = eta3 = 0. Elsewhere seven joint rates stand against six equations: the chain has one freedom, theta1 and S1 cannot
+# both be given, and the least-squares Newton iteration for (theta2, eta2, theta3, eta3, S4) settles on an open loop. The
+# thesis takes small steps for convergence, but they say nothing about closure; where the steps do not become small, its
+# published limits of "convergence" come from, although the mechanism can be assembled. The least sum of squares adds angles
+# and lengths, so that the result depends on the unit of length.
+#
+# The thesis solves six of the eighteen equations, the entries 12, 13 and 23 (eqs 20 to 26), and adds to the three real ones
+# the deviation of the diagonal. Its steps become small where A'V = 0, which is no minimum of the loop's error.
+
+#: Which equations a step solves: all eighteen; the six of eqs 20 and 21; these with what eq 22 adds, as the thesis does.
+Rows = Literal["all", "upper", "printed"]
+#: Rows and columns of the entries 12, 13 and 23.
+_UPPER = np.array([[0, 0, 1], [1, 2, 2]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settled:
+    """End of the thesis's iteration for each of n crank angles.
+
+    ``unknowns`` (n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (m); ``steps`` how many corrections were made and
+    ``settled`` whether the last was below the tolerance, which the thesis takes for convergence. ``rotation_residual`` (rad)
+    and ``length_residual`` (m) say by how much the loop is open then, ``position_error`` (m) by how much S4 differs from that
+    of the loop with true ball joints.
+    """
+
+    crank_angle: FloatArray
+    shift: FloatArray
+    unknowns: FloatArray
+    steps: NDArray[np.int_]
+    settled: NDArray[np.bool_]
+    rotation_residual: FloatArray
+    length_residual: FloatArray
+    position_error: FloatArray
+
+
+def chain(p: SliderCrankParameters, th: Array, s1: Array, q: Array) -> tuple[Dual, Dual]:
+    """Return the product M1 L2 L3 M4 (n, 3, 3) for unknowns q (n, 5), and their screws in frame 1 (n, 3, 5)."""
+    zero = np.zeros_like(th)
+    pin = about_k(Dual(th, s1)) @ about_i(Dual(zero, p.crank_length))
+    turned = pin @ about_k(q[:, 0])
+    front = turned @ about_j(q[:, 1]) @ about_i(Dual(zero, p.rod_length))
+    turned_front = front @ about_k(q[:, 2])
+    guide = turned_front @ about_j(q[:, 3]) @ about_i(0.5 * np.pi)
+    product = guide @ about_k(Dual(zero, q[:, 4])) @ about_i(Dual(p.guide_twist, p.guide_offset))
+    # the rate of eta is about the axis j that theta has turned (erratum 2)
+    slide = Dual(np.zeros_like(guide.real[..., 2]), guide.real[..., 2])
+    return product, stack([pin[..., 2], turned[..., 1], front[..., 2], turned_front[..., 1], slide])
+
+
+def planar(p: SliderCrankParameters, th: Array) -> FloatArray:
+    """Return the planar estimate of section 2.6.2 for the unknowns (n, 5), exact for S1 = 0 and alpha4 = 270 deg."""
+    across = p.crank_length * np.cos(th) + p.guide_offset
+    beyond = p.assembly_branch * np.sqrt(p.rod_length**2 - across**2)
+    rod = np.arctan2(beyond, -across)
+    zero = np.zeros_like(th)
+    return np.stack([rod - th, zero, -rod, zero, p.crank_length * np.sin(th) + beyond], -1)
+
+
+@takes_published()
+@in_si(crank_angle="rad", shift="m")
+def settle(
+    parameters: SliderCrankParameters,
+    crank_angle: Amount,
+    shift: Amount,
+    *,
+    rows: Rows = "all",
+    start: Array | None = None,
+    unit: float = INCH,
+    step_tolerance: float = 1e-6,
+    max_steps: int = 100,
+) -> Settled:
+    """Run the thesis's iteration: least-squares Newton steps from an estimate until a step is small.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+        The mechanism.
+    crank_angle, shift : array_like
+        theta1 (rad) and S1 (m), numbers or arrays of shape (n,).
+    rows : str
+        Which equations are solved: ``all`` eighteen, or of the upper triangle the six of eqs 20 and 21 (``upper``) or those
+        with eq 22 in the place of eq 20 (``printed``).
+    start : array_like, optional
+        Estimates of the unknowns (n, 5), such as those at the angle before; by default those of the planar mechanism.
+    unit : float
+        Unit of length (m) in which lengths are weighed against angles; the thesis's is the inch.
+    step_tolerance : float
+        A step is small when no angle (rad) and not the slider (``unit``) changes by more.
+    max_steps : int
+        How many steps are made at most.
+
+    Raises
+    ------
+    InputError, AssemblyError, ClosureError
+        As `closure.close`, by which the truth is found.
+    """
+    th, s1 = broadcast_points(crank_angle, shift)
+    truth = close(parameters, th, s1)
+    q = planar(parameters, th) if start is None else np.array(start, dtype=float)
+    steps = np.zeros(th.size, dtype=int)
+    moving = np.ones(th.size, dtype=bool)
+    while np.any(moving) and steps.max() < max_steps:
+        product, screws = chain(parameters, th[moving], s1[moving], q[moving])
+        columns, right = equations(product, screws, unit, rows)
+        step = (np.linalg.pinv(columns) @ right[..., None])[..., 0]
+        q[moving] += step * [1.0, 1.0, 1.0, 1.0, unit]
+        steps[moving] += 1
+        moving[moving] = np.max(np.abs(step), -1) > step_tolerance
+    rotation, distance = residuals(chain(parameters, th, s1, q)[0])
+    return Settled(
+        crank_angle=th,
+        shift=s1,
+        unknowns=q,
+        steps=steps,
+        settled=~moving,
+        rotation_residual=rotation,
+        length_residual=distance,
+        position_error=np.abs(q[:, 4] - truth.slider_position),
+    )
+
+
+def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float, unknowns: Array) -> int:
+    """Return the number of freedoms of the chain at a configuration: seven joint rates less the rank of their screws.
+
+    The screws are those of theta1, S1 and the five unknowns; lengths are counted in rod lengths.
+    """
+    _, screws = chain(parameters, np.array([crank_angle]), np.array([shift]), np.asarray(unknowns)[None])
+    crank = np.zeros((6, 2))
+    crank[2, 0] = crank[5, 1] = 1.0
+    loop = np.concatenate([screws.real[0], screws.dual[0] / parameters.rod_length])
+    columns = np.concatenate([crank, loop], -1)
+    return 7 - int(np.linalg.matrix_rank(columns / np.linalg.norm(columns, axis=0), tol=1e-9))
+
+
+def equations(product: Dual, screws: Dual, unit: float, rows: Rows) -> tuple[FloatArray, FloatArray]:
+    """Return matrix (n, m, 5) and right side (n, m) of the m equations of a step, slide and lengths in ``unit``.
+
+    A joint's motion q along its screw s changes the loop B by [s]B q. All entries of this are to be those of I - B; the thesis
+    writes [s] q = B' - I (eq 11), its matrix A and its right side V (eqs 23 to 25).
+    """
+    changes = [skew(screws[..., i]) for i in range(5)]
+    if rows == "all":
+        real, dual = np.eye(3) - product.real, -product.dual
+        changes, places = [change @ product for change in changes], np.indices((3, 3)).reshape(2, 9)
+    else:
+        real, dual = (np.swapaxes(part, -1, -2) for part in (product.real - np.eye(3), product.dual))
+        places = _UPPER
+        if rows == "printed":
+            diagonal = np.diagonal(real, axis1=-2, axis2=-1)
+            real = real + diagonal[..., :, None] + diagonal[..., None, :]
+    row, column = places
+    columns = np.stack(
+        [np.concatenate([x.real[..., row, column], x.dual[..., row, column] / unit], -1) for x in changes], -1
+    )
+    columns[..., 4] *= unit
+    return columns, np.concatenate([real[..., row, column], dual[..., row, column] / unit], -1)

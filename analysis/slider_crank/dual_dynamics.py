@@ -1,4 +1,4 @@
-"""Velocities, accelerations and all joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
+"""Velocities, accelerations and joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
 
 The velocity of a body is a dual vector, omega + eps v, with v that of the point of the body at the origin of the frame in
 which it is given; forces are F + eps M and momenta p + eps H in the same way. All these go from frame to frame by the dual
@@ -25,15 +25,17 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.dual import Dual, about_i, apply, cross, join, stack
-from .closure import Closure, scale
-from .quantities import DEAD_CENTRE, FloatArray, check_joint, each
+from .closure import Closure, close, scale
+from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
+from .quantities import DEAD_CENTRE, JOINTS, FloatArray, check_joint, per_angle
+from .shifts import has_shaft_groove, plant_functions
 
 #: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
 LIMIT_COSINE = 1e-9
 
 
 class DeadCentreError(LinkworkError):
-    """At a dead centre, dS4/dtheta1 = 0, the crank's torque does not determine the force on the slider.
+    """The crank torque does not determine the slider force: the configuration is a dead centre, dS4/dtheta1 = 0.
 
     ``points`` are the indices of the points concerned.
     """
@@ -45,7 +47,7 @@ class DeadCentreError(LinkworkError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Binor:
-    """Inertia binor of a body in a frame fixed to it (eqs 46 to 48): what makes its dual momentum of its dual velocity.
+    """Inertia binor of a body in a body-fixed frame (eqs 46 to 48): maps its dual velocity to its dual momentum.
 
     ``mass`` in kg, ``moment`` the mass times the coordinates of the centre of mass (3,) in kg.m, ``inertia`` the matrix
     (3, 3) about the frame's origin in kg.m2.
@@ -56,7 +58,7 @@ class Binor:
     inertia: FloatArray
 
     def momentum(self, velocity: Dual) -> Dual:
-        """p + eps H of omega + eps v: p = m v + omega x m c, H = I omega + m c x v. Rates likewise, shape (..., 3)."""
+        """Return p + eps H for omega + eps v, shape (..., 3): p = m v + omega x m c, H = I omega + m c x v."""
         omega, v = velocity.real, velocity.dual
         return Dual(
             self.mass * v + np.cross(omega, self.moment),
@@ -64,13 +66,13 @@ class Binor:
         )
 
     def rate(self, velocity: Dual, acceleration: Dual) -> Dual:
-        """Rate of the dual momentum (eqs 49 to 58), for the velocity and the rate of its components in the frame."""
+        """Return the rate of the dual momentum (eqs 49 to 58) from the velocity and the rate of its components."""
         return cast(Dual, self.momentum(acceleration) + cross(velocity, self.momentum(velocity)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rates:
-    """Dual velocities of the links in frame 1 and their rates, and what the slider does.
+    """Dual velocities of the links in frame 1 with their rates, and velocity and acceleration of the slider.
 
     Dual vectors of shape (n, 3): omega + eps v with v that of the body's point at O. ``slider_velocity`` and
     ``slider_acceleration`` are S4' (m/s) and S4'' (m/s2), ``ratio`` is dS4/dtheta1 (m/rad), each of shape (n,).
@@ -89,7 +91,7 @@ class Rates:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointLoads:
-    """Forces and moments in all joints, by their components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
+    """Forces and moments in all joints, as components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
 
     ``bearing`` is the force of the bearing on the crank, without axial component, ``axial`` the force along the axis that
     the motion takes of whatever drives or holds the shift; ``bearing_moment`` is about O, the drive's ``torque`` included.
@@ -113,7 +115,7 @@ class JointLoads:
     residual: FloatArray
 
     def components(self, name: str, frame: int) -> FloatArray:
-        """Components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
+        """Return components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
 
         The moments keep the points about which they are taken.
 
@@ -141,7 +143,7 @@ def rates(
     acceleration: Any = 0.0,
     shift_acceleration: Any = 0.0,
 ) -> Rates:
-    """Dual velocities (eqs 29 to 45) and their rates, for theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
+    """Compute dual velocities (eqs 29 to 45) and their rates from theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
 
     The screws of the joints times their rates add up to nothing round the loop: six equations, all of them used (the
     thesis drops the last, erratum 3), and omega . u = 0 for the rod's spin. Their derivative, in which each screw moves
@@ -155,8 +157,8 @@ def rates(
         At the limit of assembly, where the rod is perpendicular to the guide.
     """
     n = closure.crank_angle.size
-    w, v = each("speed", speed, n), each("shift_velocity", shift_velocity, n)
-    e, a = each("acceleration", acceleration, n), each("shift_acceleration", shift_acceleration, n)
+    w, v = per_angle("speed", speed, n), per_angle("shift_velocity", shift_velocity, n)
+    e, a = per_angle("acceleration", acceleration, n), per_angle("shift_acceleration", shift_acceleration, n)
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
     cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
@@ -177,7 +179,7 @@ def rates(
     matrix[:, 6, 0] = 1.0
 
     def solve(known: Dual, turning: Dual) -> FloatArray:
-        """The joints' rates when the loop's known part is ``known`` and the rod's ``turning``."""
+        """Return the joints' rates for the known part of the loop and the known rotation of the rod."""
         spin = np.sum(turning.real * rod.real[..., 0], -1)
         right = np.concatenate([known.real, known.dual / length, spin[:, None]], -1)
         return cast(FloatArray, -np.linalg.solve(matrix, right[..., None])[..., 0])
@@ -207,7 +209,7 @@ def rates(
 
 
 def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
-    """Inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at the slider pin).
+    """Return the inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at its pin).
 
     Of the crank's inertia only what concerns its axis is of effect, of the rod's only that about transverse axes, of the
     slider's, which does not turn, none.
@@ -244,7 +246,7 @@ def joint_loads(
     torque: Any = None,
     slider_force: Any = None,
 ) -> JointLoads:
-    """All joint forces and moments for a given motion (eqs 62 to 69) and either the crank's torque or the slider's force.
+    """Compute all joint forces and moments of a motion (eqs 62 to 69) for a given crank torque or slider force.
 
     Parameters
     ----------
@@ -285,7 +287,7 @@ def joint_loads(
     # the rod's moment about its line is the equation that is met by itself
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = each("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    known = per_angle("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
     free = np.delete(np.arange(18), given)
     unknown = np.linalg.solve(
         matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
@@ -308,14 +310,14 @@ def joint_loads(
 
 
 def _ball_frames(closure: Closure) -> tuple[Dual, Dual]:
-    """The crank's frame moved to the crank pin, and the rod's moved to the slider pin."""
+    """Return the crank's frame moved to the crank pin, and the rod's moved to the slider pin."""
     p = closure.parameters
     pin = closure.crank_frame @ about_i(Dual(0.0, p.crank_length))
     return cast(Dual, pin), cast(Dual, closure.rod_frame @ about_i(Dual(0.0, p.rod_length)))
 
 
 def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArray, FloatArray]:
-    """Matrix (n, 18, 18) and right-hand side (n, 18) of eqs 62 to 64, moments and moments' arms divided by ``length``.
+    """Return matrix (n, 18, 18) and right side (n, 18) of eqs 62 to 64, moments and arms divided by ``length``.
 
     The unknowns, by the screws of their lines of action or axes: bearing 1Fi, 1Fj, 1Ti, 1Tj, axial 1Fk, torque 1Tk; crank
     pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider.
@@ -363,12 +365,12 @@ def _check_dead_centres(closure: Closure, motion: Rates) -> None:
 
 
 def _axes(frame: Dual) -> Dual:
-    """The same axes with the origin in that of frame 1."""
+    """Return the same axes with the origin of frame 1."""
     return Dual(frame.real)
 
 
 def _rod_axes(closure: Closure) -> FloatArray:
-    """Axes of frame 3 in frame 1 (n, 3, 3): i along the rod, j perpendicular to it and to the crank axis."""
+    """Return the axes of frame 3 in frame 1 (n, 3, 3): i along the rod, j perpendicular to rod and crank axis."""
     i = closure.rod_frame.real[..., 0]
     across = np.hypot(i[:, 0], i[:, 1])
     if np.min(across) < 1e-12:
@@ -387,3 +389,113 @@ _FRAMES: dict[int, Callable[[Closure], FloatArray]] = {
     3: _rod_axes,
     4: lambda closure: closure.guide_frame.real,
 }
+
+
+# Against vector mechanics
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """Largest difference of a quantity between the two methods, in SI.
+
+    ``largest`` is the greatest magnitude of the quantity, ``relative`` the difference over the greatest magnitude of any
+    quantity of the same unit.
+    """
+
+    quantity: str
+    unit: str
+    largest: float
+    difference: float
+    relative: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Differences between the dual-number method and vector mechanics.
+
+    Attributes
+    ----------
+    differences : tuple of Difference
+    angles : int
+        Crank angles that were compared: those at which everything is determined.
+    rotation_residual, length_residual : float
+        By how much the loop fails to close at most (rad, m).
+    iterations : int
+        That closing it took at most.
+    rod_moment : float
+        Greatest moment about the rod's line (N.m), which no equation asks to be none.
+    """
+
+    differences: tuple[Difference, ...]
+    angles: int
+    rotation_residual: float
+    length_residual: float
+    iterations: int
+    rod_moment: float
+
+    def agrees(self, tolerance: float) -> bool:
+        """Return whether all relative differences are within a tolerance."""
+        return all(d.relative <= tolerance for d in self.differences)
+
+
+def compare(turn: ForceTurn) -> Comparison:
+    """Compute motion and forces of a turn again by dual matrices and compare them with vector mechanics.
+
+    Raises
+    ------
+    InputError
+        If the slider's force is sought and a groove in the shaft makes the shift, which the dual method does not cover, or if
+        it is determined at none of the angles.
+    """
+    sought = turn.sought == SLIDER_FORCE
+    if sought and has_shaft_groove(turn.law):
+        raise InputError(
+            "the dual-number method seeks the slider's force of a shift that is driven apart from the crank: give the load, "
+            "or a groove that is not in the shaft"
+        )
+    good = ~np.ma.getmaskarray(turn.slider_force)
+    if not good.any():
+        none = "the slider's force has no lever on the crank at any of the angles, which are all dead centres"
+        raise InputError(f"there is nothing to compare: {NO_LEVER if turn.without_lever else none}; give the load")
+    closure = close(turn.parameters, turn.angle[good], turn.shift[good])
+    moving: dict[str, Any] = {
+        "speed": turn.speed[good],
+        "acceleration": turn.acceleration[good],
+        "shift_velocity": turn.shift_velocity[good],
+        "shift_acceleration": turn.shift_acceleration[good],
+    }
+    motion = rates(closure, **moving)
+    # what the dual vectors call the slider's force is all along the guide, spring, damper and friction included
+    pushed = plant_functions().slider_resistance(
+        closure.slider_position, motion.slider_velocity, 0.0, turn.parameters.constants()
+    )
+    if sought:
+        loads = joint_loads(closure, torque=turn.torque.data[good], **moving)
+    else:
+        loads = joint_loads(closure, slider_force=pushed + turn.slider_force.data[good], **moving)
+    pairs: list[tuple[str, str, Any, Any]] = [
+        ("slider position", "m", closure.slider_position, turn.slider_position),
+        ("slider velocity", "m/s", motion.slider_velocity, turn.slider_velocity),
+        ("slider acceleration", "m/s2", motion.slider_acceleration, turn.slider_acceleration),
+        ("slider force", "N", loads.slider_force - pushed, turn.slider_force),
+        ("axial force on the crank", "N", loads.axial, turn.axial_force),
+    ]
+    pairs += [(joint.words, joint.unit, getattr(loads, name), turn.vector(name)) for name, joint in JOINTS.items()]
+    found = [
+        (words, unit, float(np.abs(b[good]).max()), float(np.abs(a - np.ma.getdata(b)[good]).max()))
+        for words, unit, a, b in pairs
+    ]
+    scales = {unit: max(size for _, other, size, _ in found if other == unit) or 1.0 for _, unit, _, _ in found}
+    return Comparison(
+        differences=tuple(
+            Difference(
+                quantity=words, unit=unit, largest=size, difference=difference, relative=difference / scales[unit]
+            )
+            for words, unit, size, difference in found
+        ),
+        angles=int(good.sum()),
+        rotation_residual=float(closure.rotation_residual.max()),
+        length_residual=float(closure.length_residual.max()),
+        iterations=closure.iterations,
+        rod_moment=float(np.abs(loads.residual).max()),
+    )

@@ -1,4 +1,4 @@
-"""Both force problems of the generalised slider-crank, over the turn: all joint forces and moments for a given motion.
+"""Both force problems of the generalised slider-crank: all joint forces and moments of a given motion over the turn.
 
 Crank and shift move as prescribed, so that the axial force on the crank is an unknown (Rahman prescribes it, erratum 7).
 Then either the slider's load L is given and the crank's torque T sought, or the torque is given and the force on the slider
@@ -35,7 +35,6 @@ from linkwork.slider_crank.vectors import Vector
 from ..run import at_its_speed, takes_published
 from ..units import Amount, in_si
 from . import mobility
-from .course import Course
 from .mobility import DeadCentre
 from .quantities import (
     DEAD_CENTRE,
@@ -43,12 +42,12 @@ from .quantities import (
     FloatArray,
     MaskedArray,
     check_joint,
-    each,
+    float_array,
     masked_array,
-    numbers,
+    per_angle,
     unit_table,
 )
-from .shifts import ConstantShift, ShiftLaw, ShiftMotion, in_the_shaft, on_arrays, with_groove
+from .shifts import ConstantShift, Course, ShiftLaw, ShiftMotion, has_shaft_groove, plant_functions, with_groove
 
 #: Angles over the turn by default: every degree, both ends.
 SAMPLES = 361
@@ -67,7 +66,7 @@ TORQUE, SLIDER_FORCE = "torque", "slider force"
 
 
 class Solution(NamedTuple):
-    """What `solve` finds: `Position`, `Coefficients`, `Motion` and `Reactions` of the kind of numbers that it was given."""
+    """Result of `solve`: `Position`, `Coefficients`, `Motion` and `Reactions`, of the given kind of numbers."""
 
     position: Any
     coefficients: Any
@@ -107,7 +106,7 @@ def solve(
     Solution
         ``ratio`` is minus the derivative of the torque by the load (m): kth, or with a groove in the shaft dS4/dtheta1.
     """
-    f = on_arrays()
+    f = plant_functions()
     q = f.position(angle, shift.shift, p)
     k = f.coefficients(q, p)
     x = (angle, shift.shift, speed, shift.velocity, 0.0, 0.0)
@@ -186,20 +185,20 @@ class ForceTurn:
 
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
-        """Configurations between the first and the last angle at which the slider turns back, located to the last digit."""
+        """Dead centres of the slider between the first and the last angle, located to the last digit."""
         return self._course.dead_centres(*self._span)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
-        """Configurations between the first and the last angle at which the torque does not determine the slider's force.
+        """Configurations between the first and last angle at which the torque does not determine the slider force.
 
-        The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
+        Zeros of ``ratio``. They differ from the dead centres only if the shift moves without a groove in the shaft.
         """
-        return self.dead_centres if in_the_shaft(self.law) else self._course.singularities(*self._span)
+        return self.dead_centres if has_shaft_groove(self.law) else self._course.singularities(*self._span)
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
-        """Crank angles (rad) from the first to the last that was asked for at which a range of assembly ends.
+        """Crank angles (rad) between the first and last given one at which a range of assembly ends.
 
         There rod and guide are perpendicular, and velocity, acceleration and all forces grow without bound.
         """
@@ -208,7 +207,7 @@ class ForceTurn:
 
     @cached_property
     def breaks(self) -> tuple[int, ...]:
-        """Index of each angle between which and the next the mechanism cannot be assembled."""
+        """Indices of angles between which and the next one the mechanism cannot be assembled."""
         outside = np.sort(np.concatenate([self.unreachable, self.limits]))
         low, high = np.minimum(self.angle[:-1], self.angle[1:]), np.maximum(self.angle[:-1], self.angle[1:])
         between = np.searchsorted(outside, high) - np.searchsorted(outside, low, side="right")
@@ -216,19 +215,19 @@ class ForceTurn:
 
     @property
     def without_lever(self) -> bool:
-        """Whether the slider's force is sought and has no lever on the crank at any angle."""
+        """Whether the slider force is unknown and has no lever on the crank at any angle."""
         return bool(np.ma.getmaskarray(self.slider_force).all()) and not self.singularities
 
     @property
     def _parallel(self) -> NDArray[np.bool_]:
         """Where the rod is parallel to the crank axis."""
         p = self.parameters.constants()
-        r = on_arrays().rod(self._position, p)
+        r = plant_functions().rod(self._position, p)
         return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
 
     @cached_property
     def masked(self) -> tuple[str, ...]:
-        """What is masked and why, in sentences, one for each run of angles."""
+        """Sentences about masked values and the reasons, one for each run of angles."""
         sentences = [NO_LEVER] if self.without_lever else []
         dead = np.ma.getmaskarray(self.slider_force) & (not sentences)
         for flags, what, why in (
@@ -244,23 +243,23 @@ class ForceTurn:
         return tuple(sentences)
 
     def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
-        """Which angles (n,) are further than ``degrees`` from where forces grow without bound.
+        """Return which angles (n,) are further than ``degrees`` from poles of the forces.
 
-        That is at the limits of assembly and, where the slider's force is sought, at ``singularities``; without ``poles``
-        the limits alone. What is beyond the first and the last angle counts.
+        Poles are at the limits of assembly and, if the slider force is unknown, at the singularities; without ``poles`` at the
+        limits alone. Poles beyond the first and the last angle count.
         """
         away = radians(degrees)
         low, high = self._span
         reach = low - away, high + away
         places = list(self._course.limits(*reach))
         if poles and self.sought == SLIDER_FORCE:
-            find = self._course.dead_centres if in_the_shaft(self.law) else self._course.singularities
+            find = self._course.dead_centres if has_shaft_groove(self.law) else self._course.singularities
             places += [c.crank_angle for c in find(*reach)]
         distances = np.abs(self.angle[:, None] - np.array(places)[None, :])
         return np.asarray((distances > away).all(axis=1))
 
     def vector(self, name: str, frame: int = 1) -> MaskedArray:
-        """Components of a force or moment, masked where it is not determined.
+        """Return the components of a force or moment, masked where it is undetermined.
 
         Parameters
         ----------
@@ -286,7 +285,7 @@ class ForceTurn:
         ground = self._joints[name]
         if frame == 1:
             return ground.copy()
-        f, p, q = on_arrays(), self.parameters.constants(), self._position
+        f, p, q = plant_functions(), self.parameters.constants(), self._position
         components = Vector(*ground.filled(0.0).T)
         mask = np.ma.getmaskarray(ground)
         if frame == 2:
@@ -297,10 +296,10 @@ class ForceTurn:
             with np.errstate(divide="ignore", invalid="ignore"):
                 turned = f.to_rod_frame(components, q, p)
             mask = mask | self._parallel[:, None]
-        return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
+        return np.ma.MaskedArray(_stacked(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
-        """Everything by name with unit, as for a file; NaN where a value is masked; the last two columns say why.
+        """Return all values by name with unit, as for a file: NaN for masked values, the last two columns say why.
 
         Parameters
         ----------
@@ -357,12 +356,12 @@ def force_turn(
     torque: ArrayLike | Amount = None,
     partial: bool = False,
 ) -> ForceTurn:
-    """Forces and moments in all joints over the turn, for a prescribed motion of crank and shift.
+    """Compute forces and moments in all joints over the turn for a prescribed motion of crank and shift.
 
     Parameters
     ----------
     parameters : SliderCrankParameters
-        Or a published set or its name, which brings its crank speed and its shift.
+        Parameters, or a published set or its name, which has a crank speed and a shift.
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2); a number may be a text with its unit, such as "50 rpm", here and below.
     shift : ShiftLaw
@@ -375,15 +374,15 @@ def force_turn(
     torque : array_like, scalar or shape (n,), optional
         Torque of the drive on the crank (N.m); the load on the slider is sought. Excludes ``load``.
     partial : bool
-        Whether to leave out the angles at which the rod does not reach the guide, which ``unreachable`` then has.
+        Whether to leave out the angles at which the rod does not reach the guide; ``unreachable`` lists them.
 
     Raises
     ------
     InputError
         If both ``load`` and ``torque`` are given, a value is no finite number or of the wrong shape, or ``shift`` is no law.
     AssemblyError
-        If the rod does not reach the guide at an angle, with the ranges in which it does; with ``partial`` only if it does at
-        none.
+        If the rod does not reach the guide at some angle, with the ranges in which it does; with ``partial`` only if it does
+        not at any angle.
 
     Examples
     --------
@@ -402,18 +401,22 @@ def force_turn(
         )
     th = _crank_angles(angles)
     n = th.size
-    w, e = each("crank_speed", crank_speed, n), each("crank_acceleration", crank_acceleration, n)
-    given = each("torque", torque, n) if torque is not None else each("load", 0.0 if load is None else load, n)
-    moving = ShiftMotion(*(each(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items()))
+    w, e = per_angle("crank_speed", crank_speed, n), per_angle("crank_acceleration", crank_acceleration, n)
+    given = (
+        per_angle("torque", torque, n) if torque is not None else per_angle("load", 0.0 if load is None else load, n)
+    )
+    moving = ShiftMotion(
+        *(per_angle(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items())
+    )
     p = with_groove(parameters.constants(), shift)
-    reached = on_arrays().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
+    reached = plant_functions().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
     if not (reached.any() if partial else reached.all()):
         raise _not_assembled(parameters, shift, th, moving.shift, reached)
     unreachable = th[~reached]
     th, w, e, given = (x[reached] for x in (th, w, e, given))
     moving = ShiftMotion(*(x[reached] for x in moving))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=in_the_shaft(shift))
+        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=has_shaft_groove(shift))
     n, m, r = th.size, found.motion, found.reactions
     never = np.zeros(n, dtype=bool)
     dead = never if torque is None else np.abs(found.ratio) <= DEAD_CENTRE * p.a1
@@ -443,7 +446,7 @@ def force_turn(
         # the slider's mass times its acceleration has no part in the load
         _joints=MappingProxyType(
             {
-                name: masked_array(_joined(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
+                name: masked_array(_stacked(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
                 for name in JOINTS
             }
         ),
@@ -452,18 +455,18 @@ def force_turn(
 
 
 def _crank_angles(angles: ArrayLike | None) -> FloatArray:
-    """Crank angles (n,) as they are asked for, by default over a turn."""
+    """Return the given crank angles (n,), or those of a turn by default."""
     if angles is None:
         return np.linspace(0.0, tau, SAMPLES)
     message = "the angles must be a list of finite numbers (rad), at least one"
-    th = np.atleast_1d(numbers(angles, f"{message}, not {angles!r}"))
+    th = np.atleast_1d(float_array(angles, f"{message}, not {angles!r}"))
     if th.ndim != 1 or th.size == 0 or not np.isfinite(th).all():
         raise InputError(message)
     return th
 
 
-def _joined(vector: Vector, n: int) -> FloatArray:
-    """Components as an array (n, 3)."""
+def _stacked(vector: Vector, n: int) -> FloatArray:
+    """Return the components as an array (n, 3)."""
     return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
 
 
@@ -474,9 +477,9 @@ def _deg(angle: float) -> str:
 def _not_assembled(
     parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, s1: FloatArray, reached: NDArray[np.bool_]
 ) -> AssemblyError:
-    """What to raise where the rod does not reach the guide at all angles."""
+    """Return the error for angles at which the rod does not reach the guide."""
     p = parameters.constants()
-    square = on_arrays().assembly_square(th, s1, p)
+    square = plant_functions().assembly_square(th, s1, p)
     worst = int(np.argmin(square))
     short = float(np.sqrt(p.a2 * p.a2 - square[worst]) - p.a2)
     by_how_much = f"{short:.6g} m too short" if short > 0.0 else "perpendicular to the guide within the limit"
@@ -496,6 +499,6 @@ def _not_assembled(
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each run of true values."""
+    """Return first and last index of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]

@@ -1,4 +1,4 @@
-"""Where the slider-crank can be assembled and how far its slider goes: margin, ranges, dead centres, stroke.
+"""Mobility of the slider-crank: margin of assembly, ranges of the crank, dead centres, stroke.
 
 With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
 
@@ -7,10 +7,9 @@ With f and g the crank pin's coordinates across the guide, as in `kinematics`, a
     S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
 
 and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
-found by halving the turn: how much each of the two functions can change over a piece is bounded by the lengths and by the
-bounds of the law's derivatives, and a piece is dropped only where that excludes a zero. What is left is bisected to the
-last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, between which the slider moves by some
-1e-10 of the crank's length.
+found by halving the turn: lengths and the bounds of the law's derivatives bound the change of each function over a piece, and a
+piece is dropped only if this bound excludes a zero. The remaining pieces are bisected to the last digit. No zero is missed
+except pairs closer together than `FINEST`, between which the slider moves by some 1e-10 of the crank's length.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ class PeriodicShift:
     Parameters
     ----------
     at : callable
-        Of the crank angle (rad): the shift (m) and its first derivative by the angle (m/rad); further items are ignored,
-        so that it may be of the form of `kinematics.groove`.
+        Function of the crank angle (rad) that returns the shift (m) and its first derivative by the angle (m/rad); further
+        items are ignored, so that `kinematics.groove` fits.
     rate, curvature : float
         Bounds of the absolute first and second derivatives by the angle (m/rad, m/rad2). They need not be sharp.
     turns : int
@@ -87,7 +86,7 @@ class PeriodicShift:
 
 
 def constant_shift(shift: float) -> PeriodicShift:
-    """The law of a crank held at the shift S1 (m).
+    """Return the law of a crank held at the shift S1 (m).
 
     Raises
     ------
@@ -101,12 +100,12 @@ def constant_shift(shift: float) -> PeriodicShift:
 
 @takes_published()
 def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
-    """The law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
+    """Return the law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
 
     Raises
     ------
     ParameterError
-        If alpha is not a ratio of whole numbers of which the lower is at most 64: the law repeats after that many turns.
+        If alpha is not a ratio of whole numbers with a denominator of at most 64, after which many turns the law repeats.
     """
     p = parameters.constants()
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
@@ -121,7 +120,7 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
 
 
 class Margin(NamedTuple):
-    """Rod length less the crank pin's distance from the guide, at an extreme of it over the turn (m), and the angle (rad)."""
+    """An extreme over the turn of the margin of assembly: rod length less distance of crank pin and guide (m); angle (rad)."""
 
     length: float
     crank_angle: float
@@ -138,8 +137,8 @@ class Place(NamedTuple):
 class DeadCentre(NamedTuple):
     """A configuration in which the slider turns back: angle (rad), shift and slider position (m).
 
-    ``outer`` is true where the slider is out furthest to the side of its assembly: at a maximum of S4 on branch +1, at a
-    minimum on branch -1.
+    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum on branch -1: the slider is furthest out on the side of
+    its assembly.
     """
 
     crank_angle: float
@@ -163,7 +162,7 @@ class Range(NamedTuple):
     least: Place
 
     def full(self, span: float) -> bool:
-        """Whether it has no ends: the crank makes all of the law's turns, its ``span``."""
+        """Return whether the range has no ends: the crank makes all turns of the law, its ``span``."""
         return self.high - self.low >= span * (1.0 - 1e-12)
 
     @property
@@ -178,7 +177,7 @@ class _Zero(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """D, A and B at the middle of a piece, and the most by which each differs from that inside it."""
+    """D, A and B at the middle of a piece, and bounds of their change within it."""
 
     square: float
     pull: float
@@ -189,7 +188,7 @@ class _Change(NamedTuple):
 
 
 def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
-    """D, A and B and their spreads over ``middle`` +- ``half``; ``pitch`` is 0 where A and B leave S1' out, else 1."""
+    """Return D, A, B and their spreads over ``middle`` +- ``half``; with ``pitch`` 0 A and B leave out S1', else it is 1."""
     s1, ds1 = law.at(middle)[:2]
     if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
         raise InputError(
@@ -226,7 +225,7 @@ _Bounded = Callable[[float, float], tuple[float, float]]
 
 
 def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
-    """A, whose zeros are the extremes of the distance between crank pin and guide."""
+    """Return the function A, whose zeros are the extremes of the distance between crank pin and guide."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
         change = _change(middle, half, law, p, 1.0)
@@ -235,11 +234,11 @@ def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
     return slope
 
 
-def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -> _Bounded:
-    """A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
+def _slider_slope(changes: Callable[[float, float], _Change], branch: float) -> _Bounded:
+    """Return the function A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
-        change = change_of(middle, half)
+        change = changes(middle, half)
         h = sqrt(max(0.0, change.square))
         # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
         spread = sqrt(change.square_spread)
@@ -255,7 +254,7 @@ def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -
 
 
 def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
-    """Where ``positive`` changes between ``low`` and ``high``, at which it differs; to the last digit."""
+    """Find to the last digit where ``positive`` changes between ``low`` and ``high``."""
     at_low = positive(low)
     while True:
         middle = 0.5 * (low + high)
@@ -268,7 +267,7 @@ def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float
 
 
 def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
-    """All zeros of ``function`` between ``low`` and ``high`` in which it changes its sign, in order.
+    """Find all sign changes of ``function`` between ``low`` and ``high``, in order.
 
     Where it is zero to the rounding of ``scale`` over a stretch, the stretch is one zero if the signs before and after it
     differ, and none otherwise.
@@ -306,7 +305,7 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
 
 
 def _wrapped(angle: float, law: PeriodicShift) -> float:
-    """The angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
+    """Return the angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
     wrapped = angle % law.span
     return wrapped if wrapped < law.span else 0.0
 
@@ -316,14 +315,14 @@ def _square(angle: float, law: PeriodicShift, p: Constants) -> float:
 
 
 def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
-    """The angles at which the margin of assembly is least or greatest, in order; any one if it is the same everywhere."""
+    """Find the angles of least or greatest margin of assembly, in order; any one if it is the same everywhere."""
     zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
     return [zero.angle for zero in zeros] or [0.0]
 
 
 @takes_published()
 def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
-    """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
+    """Find the least margin of assembly over the turn, negative where the crank cannot turn fully.
 
     The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
     by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
@@ -333,19 +332,19 @@ def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Ma
 
 @takes_published()
 def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
-    """The greatest margin of assembly over the turn, negative where it can be assembled nowhere, and where it is."""
+    """Find the greatest margin of assembly over the turn, negative if it can be assembled nowhere."""
     return _margin(max, law, parameters.constants())
 
 
 def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> Margin:
-    """The margin at the extreme that ``choose``, min or max, takes."""
+    """Return the margin at the extreme chosen by ``choose``, min or max."""
     place = choose(_extremes(law, p), key=lambda angle: _square(angle, law, p))
     return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
 
 
 @takes_published()
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
-    """The greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
+    """Find the greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
 
     It turns fully at a shift of either sign up to this one. With the guide parallel to the crank axis any shift will do, and
     the value is infinite.
@@ -356,7 +355,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
     # value of a1 s |cos(alpha4)| + r, which is that of a slider in the plane but for the cosine
 
-    def change_of(middle: float, half: float) -> _Change:
+    def changes(middle: float, half: float) -> _Change:
         c, s = cos(middle), sin(middle)
         f = p.a1 * c + p.a4
         most = abs(f) + half * p.a1
@@ -370,9 +369,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
         f = p.a1 * cos(angle) + p.a4
         return p.a1 * sin(angle) * abs(p.ca) + sqrt(max(0.0, p.a2 * p.a2 - f * f))
 
-    least = min(
-        bound(zero.angle) for zero in _zeros(_slider_slope(change_of, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
-    )
+    least = min(bound(zero.angle) for zero in _zeros(_slider_slope(changes, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2))
     if least < 0.0:
         return None
     # a twist of pi has a sine of its rounding
@@ -381,7 +378,7 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
 
 
 def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
-    """Configuration at an angle at which the rod reaches the guide; at ``limit`` of assembly it is perpendicular to it."""
+    """Return the configuration at an angle; at the ``limit`` of assembly the rod is perpendicular to the guide."""
     shift = law.at(angle)[0]
     # at the limit the rounding of the angle would be a root of it in h
     h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
@@ -406,7 +403,7 @@ def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
 
 
 def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
-    """Ends of the ranges in which the rod reaches the guide."""
+    """Find the ends of the ranges in which the rod reaches the guide."""
     extremes = _extremes(law, p)
     reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
     if all(reached):
@@ -427,7 +424,7 @@ def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
 
 @takes_published()
 def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """The ranges of crank angles in which the rod reaches the guide, each with its dead centres and its stroke.
+    """Find the ranges of crank angles in which the rod reaches the guide, with dead centres and stroke.
 
     One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
     shift. Their ends, at which rod and guide are perpendicular, are those of geometry: the plant's steps stop as soon as the
@@ -439,12 +436,12 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
 
 @takes_published()
 def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """The `ranges` of a mechanism that can be assembled.
+    """Find the `ranges` of a mechanism that can be assembled.
 
     Raises
     ------
     AssemblyError
-        If there is none, with by how much the rod is too short where that is least.
+        If there is none; the message has the least missing length of the rod.
     """
     found = ranges(parameters, law)
     if not found:
@@ -460,7 +457,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
 
 @takes_published()
 def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """All configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
+    """Find all configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
 
     None where the slider stands still at every angle. At a constant shift there are two where the crank turns fully, of at
     most four on both branches together.
@@ -473,12 +470,12 @@ def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple
 
 @takes_published()
 def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
-    """The configurations along the law in which the crank's torque and the slider's force do not balance: kth = 0.
+    """Find the configurations along the law in which crank torque and slider force do not balance: kth = 0.
 
-    kth is the derivative of the slider position by the crank angle at the shift held. Where the shift is driven by a force
-    of its own, it is this that multiplies the slider force in the crank's equation of motion (the thesis's force problem),
-    whatever the shift's rate. The slider itself stops here only where the shift is constant; ``outer`` says that its
-    position would turn back from a maximum (on branch +1) if the shift were held.
+    kth is the derivative of the slider position by the crank angle at constant shift. If the shift has a drive of its own, kth
+    multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate of the shift.
+    The slider itself stops here only if the shift is constant; ``outer`` is true where its position would have a maximum (on
+    branch +1) at constant shift.
     """
     p = parameters.constants()
     found = (_dead_centres(low, high, law, p, 0.0) for low, high in _assembled(law, p))

@@ -1,4 +1,4 @@
-"""Names, frames and units of the slider-crank's forces, and arrays of values of which some are undetermined or wrong."""
+"""Names, frames and units of the slider-crank's forces, and checked arrays of values."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
-from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
+from linkwork.slider_crank.published import POUND_FORCE, POUND_INCH
 
 from ..files import unknown_name
+from ..units import INCH
 
 FloatArray: TypeAlias = NDArray[np.float64]
 MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
@@ -23,7 +24,7 @@ DEAD_CENTRE = 1e-9
 
 
 class Joint(NamedTuple):
-    """A force or moment in a joint: what acts on what, and its unit."""
+    """A force or moment in a joint: description and unit."""
 
     words: str
     unit: str
@@ -60,7 +61,7 @@ UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
 
 
 def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
-    """The entry of `UNITS`.
+    """Return an entry of `UNITS`.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def check_joint(name: str, frame: int) -> None:
-    """Make sure that there are such a force or moment and such a frame; raises InputError if there are not."""
+    """Make sure that a force or moment and a frame exist; raises InputError if not."""
     if name not in JOINTS:
         raise unknown_name(name, JOINTS, f"joint force or moment {name!r}")
     if frame not in FRAMES:
@@ -82,29 +83,29 @@ def check_joint(name: str, frame: int) -> None:
 
 
 def masked_array(values: ArrayLike, where: NDArray[np.bool_]) -> MaskedArray:
-    """Values as a masked array, NaN under the mask, which is spread to their shape."""
+    """Return values as a masked array, NaN under the mask; the mask is broadcast."""
     whole = np.asarray(values, dtype=float)
     mask = np.broadcast_to(where, whole.shape).copy()
     return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
 
 
-def numbers(value: ArrayLike, message: str) -> FloatArray:
-    """A new array of floats; ``message`` is that of the InputError if the value does not make one."""
+def float_array(value: ArrayLike, message: str) -> FloatArray:
+    """Return a new array of floats; raises InputError with ``message`` if the value is not numeric."""
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise InputError(message) from None
 
 
-def each(name: str, value: ArrayLike, n: int) -> FloatArray:
-    """A finite value for each of n crank angles.
+def per_angle(name: str, value: ArrayLike, n: int) -> FloatArray:
+    """Return a finite value for each of n crank angles.
 
     Raises
     ------
     InputError
         If the value is neither a finite number nor n of them.
     """
-    values = numbers(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
+    values = float_array(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
     if values.shape not in ((), (1,), (n,)):
         raise InputError(f"{name} has the shape {values.shape}: it must be a number or have one for each of {n} angles")
     if not np.isfinite(values).all():

@@ -1,4 +1,4 @@
-"""Random samples of a slider-crank with tolerances, beside the estimates without samples (`tolerances`)."""
+"""Monte Carlo of a slider-crank with tolerances, compared with the estimates without samples (`tolerances`)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,21 @@ from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.workers import check_jobs, cores_of, over_workers
-from .derivatives import ANGLE, FREE_OF_LOAD, KINEMATIC, QUANTITIES, SHIFT, check_names, vary
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, unit_table
-from .tolerances import Estimate, Tolerance, check_tolerances, estimate
+from .tolerances import (
+    ANGLE,
+    FREE_OF_LOAD,
+    KINEMATIC,
+    QUANTITIES,
+    SHIFT,
+    Estimate,
+    Tolerance,
+    check_names,
+    check_tolerances,
+    tolerance_effects,
+    vary,
+)
 
 #: Percentiles that a Monte Carlo gives: the normal distribution's at -3, -2, 0, 2, 3 standard deviations.
 PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 99.86501019683699)
@@ -37,7 +48,7 @@ _BINS = 80
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spread:
-    """The samples of one quantity, angle by angle; n angles.
+    """Statistics of the samples of one quantity at n angles.
 
     Attributes
     ----------
@@ -63,7 +74,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MonteCarlo:
-    """Random samples of a mechanism with tolerances, beside the estimates without samples.
+    """Random samples of a mechanism with tolerances, and the estimates without samples.
 
     Attributes
     ----------
@@ -91,7 +102,7 @@ class MonteCarlo:
     undetermined: NDArray[np.int64]
 
     def notes(self, units: str = "SI") -> tuple[str, ...]:
-        """In sentences: samples that cannot be assembled, poles, and where the linear estimate is off and why.
+        """Return sentences about samples that cannot be assembled, poles, and failures of the linear estimate.
 
         Parameters
         ----------
@@ -130,19 +141,19 @@ class MonteCarlo:
                     f"the tolerances reach a dead centre from {_angles(turn, near)}: there is no linear estimate of {name} "
                     "there"
                 )
-            found += self._off(name, *known[QUANTITIES[name]])
+            found += self._failure_sentence(name, *known[QUANTITIES[name]])
         return tuple(found)
 
     def _without_estimate(self, quantity: str) -> NDArray[np.bool_]:
-        """Where a quantity is determined and there is no estimate, for the nearness of a dead centre (n,)."""
+        """Return where a determined quantity has no estimate because a dead centre is near (n,)."""
         linear = self.estimates[quantity]
         return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
     def linear_is_off(self, quantity: str) -> NDArray[np.bool_]:
-        """Where the linear estimate misses mean or standard deviation by more than 5 % of the latter (n,).
+        """Return where the linear estimate misses mean or standard deviation by more than 5 % of the latter (n,).
 
-        What five standard errors of the samples may account for is allowed on top. Near a dead centre, where there is no
-        estimate or there are no mean and deviation to estimate, it is off.
+        Five standard errors of the samples are allowed on top. Near a dead centre, without an estimate or without mean and
+        deviation, it is off.
         """
         check_names((quantity,), self.spreads, "quantity")
         spread, linear = self.spreads[quantity], self.estimates[quantity]
@@ -157,7 +168,7 @@ class MonteCarlo:
         return cast(NDArray[np.bool_], np.ma.filled(off, False)) | self._without_estimate(quantity)
 
     def place(self, quantity: str, angle: float) -> int:
-        """Index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
+        """Return the index of the crank angle nearest to ``angle`` (rad); the quantity must be determined there.
 
         Raises
         ------
@@ -176,12 +187,12 @@ class MonteCarlo:
         return i
 
     def poles(self, quantity: str) -> tuple[float, ...]:
-        """Crank angles (rad) at which a quantity of the nominal mechanism has a pole."""
+        """Return the crank angles (rad) at which a quantity of the nominal mechanism has a pole."""
         free = self.turn.sought != SLIDER_FORCE or quantity in FREE_OF_LOAD
         return () if free else tuple(centre.crank_angle for centre in self.turn.singularities)
 
-    def _off(self, name: str, unit: str, one: float) -> list[str]:
-        """The sentence on where the linear estimate is off at worst, if it is, in a unit of the value ``one`` in SI."""
+    def _failure_sentence(self, name: str, unit: str, one: float) -> list[str]:
+        """Return the sentence on the worst failure of the linear estimate, if any, in a unit of the value ``one`` in SI."""
         off = np.flatnonzero(self.linear_is_off(name) & ~self._without_estimate(name))
         if not off.size:
             return []
@@ -196,8 +207,8 @@ class MonteCarlo:
         )
         to_second = "" if second is np.ma.masked else f", to second order {second / one:.3g} {unit}"
         return [
-            f"the linear estimate of {name} is off at {_angle(self.turn, i)}{_others(off)}: {first}, the samples' standard "
-            f"deviation is {spread.deviation[i] / one:.3g} {unit}{to_second}; their mean is "
+            f"the linear estimate of {name} is off at {_angle(self.turn, i)}{_count_others(off)}: {first}, the samples' "
+            f"standard deviation is {spread.deviation[i] / one:.3g} {unit}{to_second}; their mean is "
             f"{(spread.mean[i] - linear.nominal[i]) / one:.3g} {unit} from the nominal value"
         ]
 
@@ -211,7 +222,7 @@ def monte_carlo(
     seed: int = 0,
     n_jobs: int | None = None,
 ) -> MonteCarlo:
-    """Sample a mechanism whose dimensions are off by random amounts, at every angle of a turn.
+    """Sample a mechanism with random errors of its dimensions, at every angle of a turn.
 
     The same samples are taken at all angles. An angle takes about 0.2 s with a million samples of the slider's motion, and
     about 2 to 3 s with all joint forces.
@@ -219,21 +230,21 @@ def monte_carlo(
     Parameters
     ----------
     turn : ForceTurn
-        The nominal mechanism; see `sensitivities` for what is held.
+        The nominal mechanism; see `sensitivities` for the quantities held constant.
     tolerances : sequence of Tolerance
     quantities : sequence of str
         Of `QUANTITIES`.
     samples : int
     seed : int
-        Of the random numbers: the same seed gives the same samples.
+        Seed of the random numbers: the same seed gives the same samples.
     n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
+        Number of processes, -1 for one per core; inside `joblib.parallel_config` all cores of the cluster are used.
 
     Raises
     ------
     InputError
-        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are no mechanism: a length
-        that is not above zero, or a crank whose inertia is less than its mass requires.
+        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are invalid: a length not above
+        zero, or a crank inertia below the least that its mass allows.
     ParameterError
         If there is no such quantity.
 
@@ -250,11 +261,11 @@ def monte_carlo(
     if samples < 2:
         raise InputError(f"{samples} samples: there must be at least two")
     check_jobs(n_jobs)
-    linear = estimate(turn, tolerances, quantities)
+    linear = tolerance_effects(turn, tolerances, quantities)
     cores = cores_of(n_jobs)
     size = len(turn) if cores == 1 else -(-len(turn) // (_PARTS * cores))
     parts = [range(k, min(k + size, len(turn))) for k in range(0, len(turn), max(1, size))]
-    work = partial(_drawn, turn, tuple(tolerances), tuple(quantities), samples, seed)
+    work = partial(_sample_angles, turn, tuple(tolerances), tuple(quantities), samples, seed)
     found = dict(over_workers(work, parts, n_jobs=n_jobs))
     drawn = [x for number in sorted(found) for x in found[number]]
     poles = {name: np.array([x.across and name not in FREE_OF_LOAD for x in drawn]) for name in quantities}
@@ -266,14 +277,14 @@ def monte_carlo(
         spreads=MappingProxyType(
             {name: _spread([x.statistics[name] for x in drawn], poles[name]) for name in quantities}
         ),
-        estimates=MappingProxyType({name: _without(linear[name], poles[name]) for name in quantities}),
+        estimates=MappingProxyType({name: _mask_poles(linear[name], poles[name]) for name in quantities}),
         not_assembled=np.array([x.not_assembled for x in drawn], dtype=np.int64),
         undetermined=np.array([x.undetermined for x in drawn], dtype=np.int64),
     )
 
 
-def _without(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
-    """The estimate without what it says of angles at which the samples have a pole."""
+def _mask_poles(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
+    """Return the estimate masked at angles at which the samples have a pole."""
     values = {name: getattr(linear, name) for name in Estimate.__dataclass_fields__ if name != "nominal"}
     return replace(
         linear, **{name: np.ma.masked_where(np.broadcast_to(poles, x.shape), x) for name, x in values.items()}
@@ -281,7 +292,7 @@ def _without(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
 
 
 class _Draws(NamedTuple):
-    """The samples at one angle: statistics by quantity, whether they fall on both sides of a dead centre, what is left out."""
+    """The samples at one angle: statistics by quantity, whether they straddle a dead centre, numbers left out."""
 
     statistics: Mapping[str, tuple[Any, ...]]
     across: bool
@@ -289,7 +300,7 @@ class _Draws(NamedTuple):
     undetermined: int
 
 
-def _drawn(
+def _sample_angles(
     turn: ForceTurn,
     tolerances: Sequence[Tolerance],
     quantities: Sequence[str],
@@ -297,15 +308,15 @@ def _drawn(
     seed: int,
     places: Sequence[int],
 ) -> list[_Draws]:
-    """The samples at some of the angles: drawn anew, which takes less than to send them to another machine."""
+    """Return the samples at some of the angles; drawing them anew takes less time than sending them."""
     generator = np.random.default_rng(seed)
     errors = {t.name: t.draw(generator, samples) for t in tolerances}
     _check_samples(turn.parameters, errors)
-    return [_draws(turn, i, errors, quantities) for i in places]
+    return [_sample_angle(turn, i, errors, quantities) for i in places]
 
 
-def _draws(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
-    """Work through the samples at angle i in chunks."""
+def _sample_angle(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
+    """Evaluate the samples at angle i in chunks."""
     samples = len(next(iter(errors.values())))
     found = {name: np.empty(samples) for name in quantities}
     levers = np.empty(samples)
@@ -330,7 +341,7 @@ def _draws(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities
 
 
 def _statistics(values: FloatArray) -> tuple[Any, ...]:
-    """Fields of `Spread` in their order from the samples at one angle, NaN where there are none; sorts the samples."""
+    """Return the fields of `Spread` for the samples at one angle, NaN if there are none; sorts the samples."""
     if values.size < 2:
         none = np.nan
         return none, none, np.full(len(PERCENTILES), none), none, none, np.zeros(_BINS + 1), np.zeros(_BINS)
@@ -348,7 +359,7 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
 
 
 def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread:
-    """The statistics of all angles, without mean and deviation at the poles."""
+    """Collect the statistics of all angles, without mean and deviation at the poles."""
     mean, deviation, percentiles, least, greatest, edges, counts = (np.array(part) for part in zip(*rows))
     return Spread(
         mean=masked_array(mean, poles | np.isnan(mean)),
@@ -362,9 +373,9 @@ def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread
 
 
 def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
-    """Make sure that every sample is a mechanism, as `SliderCrankParameters` does of one.
+    """Make sure that every sample is a valid mechanism, by the rules of `SliderCrankParameters`.
 
-    Raises InputError if some are none: which tolerances make them, and how many.
+    Raises InputError if some are invalid, with the tolerances that make them so and their number.
     """
     values: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
     for name, x in drawn.items():
@@ -397,9 +408,9 @@ def _angle(turn: ForceTurn, i: int) -> str:
 
 
 def _angles(turn: ForceTurn, points: NDArray[Any]) -> str:
-    return _angle(turn, int(points[0])) + _others(points)
+    return _angle(turn, int(points[0])) + _count_others(points)
 
 
-def _others(points: NDArray[Any]) -> str:
+def _count_others(points: NDArray[Any]) -> str:
     others = points.size - 1
     return f" and {others} other angles" if others > 1 else " and another angle" if others else ""

@@ -1,6 +1,6 @@
-"""How the crank shifts along its axis while it turns: laws of the shift for the force problems, on arrays.
+"""Laws of the axial shift over the crank's turn, on arrays, and the special configurations along them.
 
-The plant's functions on arrays are here too, as a groove's law is one of them.
+The plant's functions on arrays are here too, because the law of a groove is one of them.
 """
 
 from __future__ import annotations
@@ -8,32 +8,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from math import isfinite
+from math import ceil, isfinite, tau
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from linkwork import friction
 from linkwork.errors import InputError, ParameterError
+from linkwork.limits import LIMIT_SINE
 from linkwork.slider_crank import dynamics, kinematics, vectors
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..numerics.tracing import Rebound, rebound
 from ..units import Amount, in_si
 from . import mobility
+from .mobility import DeadCentre
 from .quantities import FloatArray
 
 
 @cache
-def on_arrays() -> Rebound:
-    """The plant's functions by name, for NumPy arrays and for what NumPy's functions work on (`analysis.numerics.dual`)."""
+def plant_functions() -> Rebound:
+    """Return the plant's functions by name, for NumPy arrays and for dual numbers (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
     return rebound((friction, vectors, kinematics, dynamics), elementary)
 
 
 class ShiftMotion(NamedTuple):
-    """The axial shift (m) and its rates by time (m/s, m/s2)."""
+    """The axial shift (m) and its rates (m/s, m/s2)."""
 
     shift: Any
     velocity: Any
@@ -42,13 +45,13 @@ class ShiftMotion(NamedTuple):
 
 @runtime_checkable
 class ShiftLaw(Protocol):
-    """How the crank shifts along its axis while it turns."""
+    """A law of the crank's axial shift over its turn."""
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """Shift and its rates by time at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
+        """Return shift and rates at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
 
     def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """The law as `analysis.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
+        """Return the law for `analysis.slider_crank.mobility`; None if it may not repeat after whole turns."""
 
 
 @in_si(value="m")
@@ -111,7 +114,7 @@ class GrooveShift:
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """See `ShiftLaw`."""
         # all that the plant's function asks the constants for is amplitude and ratio
-        shift, pitch, bend = on_arrays().groove(angle, self)
+        shift, pitch, bend = plant_functions().groove(angle, self)
         return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
     def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
@@ -130,7 +133,7 @@ ArrayFunction: TypeAlias = Callable[[FloatArray], ArrayLike]
 
 @dataclass(frozen=True, slots=True)
 class AngleShift:
-    """A shift that is any function of the crank angle, with its first two derivatives.
+    """A shift given as a function of the crank angle with its first two derivatives.
 
     ``value``, ``slope`` and ``curvature`` take an array of angles (rad) and give m, m/rad and m/rad2.
     """
@@ -155,7 +158,7 @@ class AngleShift:
 
 @dataclass(frozen=True, slots=True)
 class TimeShift:
-    """A shift that is any function of time, with its first two derivatives, for a crank of constant speed.
+    """A shift given as a function of time with its first two derivatives, for a crank of constant speed.
 
     ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 where the
     crank angle is.
@@ -186,11 +189,109 @@ class TimeShift:
         return None
 
 
-def in_the_shaft(law: ShiftLaw) -> bool:
-    """Whether a groove in the crank's shaft makes the shift."""
+def has_shaft_groove(law: ShiftLaw) -> bool:
+    """Return whether the shift is made by a groove in the crank's shaft."""
     return isinstance(law, GrooveShift) and law.in_shaft
 
 
 def with_groove(p: Constants, law: ShiftLaw) -> Constants:
-    """The constants with the groove of the law, where it is one."""
+    """Return the constants with the groove of the law, if it is one."""
     return p._replace(amplitude=law.amplitude, ratio=law.ratio) if isinstance(law, GrooveShift) else p
+
+
+# Special configurations along a law
+
+#: Pieces of a turn in which signs are compared under a law that need not repeat; two zeros in one piece go unseen.
+_PIECES = 1440
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A mechanism whose shift follows a law over the crank angle.
+
+    ``speed`` is the crank speed (rad/s); the derivative of the shift by the angle depends on it only for a law of time.
+    """
+
+    parameters: SliderCrankParameters
+    law: ShiftLaw
+    speed: float
+
+    def dead_centres(self, low: float, high: float) -> tuple[DeadCentre, ...]:
+        """Find the configurations from ``low`` to ``high`` (rad) in which the slider turns back."""
+        return self._zeros(low, high, held=False)
+
+    def singularities(self, low: float, high: float) -> tuple[DeadCentre, ...]:
+        """Find the configurations from ``low`` to ``high`` (rad) in which the slider would turn back at constant shift."""
+        return self._zeros(low, high, held=True)
+
+    def limits(self, low: float, high: float) -> tuple[float, ...]:
+        """Find the ends of the ranges of assembly from ``low`` to ``high`` (rad)."""
+        repeating = self.law.repeating(self.parameters)
+        if repeating is None:
+            at = _search_angles(low, high)
+            reached = self._square(at) > 0.0
+            changes = np.flatnonzero(reached[1:] != reached[:-1])
+            return tuple(
+                float(brentq(lambda x: float(self._square(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14))
+                for i in changes
+            )
+        parts = mobility.ranges(self.parameters, repeating)
+        ends = {end for part in parts if not part.full(repeating.span) for end in (part.low, part.high)}
+        moved = (end + more for more in _whole_spans(low, high, repeating.span) for end in ends)
+        return tuple(sorted(end for end in moved if low <= end <= high))
+
+    def _zeros(self, low: float, high: float, *, held: bool) -> tuple[DeadCentre, ...]:
+        """Find the zeros of the slider's velocity along the law, or with the shift held."""
+        repeating = self.law.repeating(self.parameters)
+        if repeating is None:
+            return self._sign_changes(low, high, 0.0 if held else 1.0)
+        find = mobility.singularities if held else mobility.dead_centres
+        found = find(self.parameters, repeating)
+        moved = (
+            c._replace(crank_angle=c.crank_angle + more)
+            for more in _whole_spans(low, high, repeating.span)
+            for c in found
+        )
+        return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
+
+    def _sign_changes(self, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
+        """Find zeros of kth + ``pitch`` S1' ks by its signs at `_PIECES` places of the turn."""
+        f, p = plant_functions(), self.parameters.constants()
+
+        def slope(angle: FloatArray) -> FloatArray:
+            moving = self._shift(angle)
+            k = f.coefficients(f.position(angle, moving.shift, p), p)
+            return np.asarray(k.kth + pitch * moving.velocity / (self.speed or 1.0) * k.ks)
+
+        at = _search_angles(low, high)
+        reached = self._square(at) > (LIMIT_SINE * p.a2) ** 2
+        values = np.zeros(at.shape)
+        values[reached] = slope(at[reached])
+        positive = values > 0.0
+        found = []
+        for i in np.flatnonzero((positive[1:] != positive[:-1]) & reached[1:] & reached[:-1]):
+            angle = brentq(lambda x: float(slope(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14)
+            moving = self._shift(np.array([angle]))
+            q = f.position(np.array([angle]), moving.shift, p)
+            outer = bool(positive[i]) == (p.branch > 0.0)
+            found.append(DeadCentre(float(angle), float(moving.shift[0]), float(q.s4[0]), outer))
+        return tuple(found)
+
+    def _shift(self, angle: FloatArray) -> ShiftMotion:
+        return self.law.at(angle, np.full(angle.shape, self.speed or 1.0), np.zeros(angle.shape))
+
+    def _square(self, angle: FloatArray) -> FloatArray:
+        """Return rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
+        return np.asarray(
+            plant_functions().assembly_square(angle, self._shift(angle).shift, self.parameters.constants())
+        )
+
+
+def _whole_spans(low: float, high: float, span: float) -> list[float]:
+    """Return the shifts by whole spans that bring angles in [0, 2 span] between ``low`` and ``high``."""
+    return [span * n for n in range(ceil(low / span) - 2, ceil(high / span) + 1)]
+
+
+def _search_angles(low: float, high: float) -> FloatArray:
+    """Return the angles between which signs are compared."""
+    return np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)

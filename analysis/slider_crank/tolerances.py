@@ -1,28 +1,248 @@
-"""What manufacturing tolerances do to the slider-crank, estimated without samples.
+"""Effect of manufacturing tolerances on the slider-crank without samples: exact sensitivities and estimates of the spread.
 
-The linear estimate adds the variances of independent errors, each times the square of its derivative (`derivatives`). It
-fails where the derivatives vanish: at the ideal mechanism (S1 = a4 = 0, alpha4 = 270 deg) the slider's position is of the
-second order in S1 and alpha4 at every angle, and in a4 at 90 and 270 deg. So the estimate to second order stands beside it,
-and a Monte Carlo (`sampling`) says where the linear one is off.
+The nominal mechanism and its motion are a `ForceTurn`; an error adds to one of its dimensions, masses or settings while all the
+others, and the motion of the crank, stay. The derivatives are exact: the plant's own equations on dual numbers
+(`analysis.numerics.dual`).
+
+The linear estimate adds the variances of independent errors, each times the square of its derivative. It fails where the
+derivatives vanish: at the ideal mechanism (S1 = a4 = 0, alpha4 = 270 deg) the slider's position is of the second order in S1
+and alpha4 at every angle, and in a4 at 90 and 270 deg. So the estimate to second order stands beside it, and a Monte Carlo
+(`sampling`), the same equations on arrays of random samples, says where the linear one is off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, fields
 from math import isfinite, sqrt
-from typing import cast
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
+from linkwork.parameters import field_name
+from linkwork.slider_crank import parameters, variables
+from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
-from ..numerics.dual import dual
+from ..files import unknown_name
+from ..numerics.dual import Dual, dual
+from ..numerics.dual import variables as independent
+from ..numerics.tracing import rebound
 from ..units import Amount, si
-from .derivatives import ERRORS, FREE_OF_LOAD, check_names, error_variables, sensitivities, vary
-from .forces import SLIDER_FORCE, ForceTurn
-from .quantities import FloatArray, MaskedArray, masked_array
+from .forces import SLIDER_FORCE, ForceTurn, solve
+from .quantities import JOINTS, FloatArray, MaskedArray, masked_array
+from .shifts import ShiftMotion, has_shaft_groove, plant_functions, with_groove
+
+#: What is in error besides the mechanism's parameters: the crank angle and the axial shift, by the names of their outputs.
+ANGLE, SHIFT = "crank.angle", "shift.position"
+#: The errors for which sensitivities are computed by default: theta1, S1, a1, a2, a4, alpha4.
+DIMENSIONS = (ANGLE, SHIFT, "crank.length", "rod.length", "guide.offset", "guide.twist")
+_ERRORS = {
+    v.name: v
+    for v in variables.VARIABLES
+    if v.name in (ANGLE, SHIFT)
+    or (
+        v.kind == "Real"
+        and field_name(v.name) in SliderCrankParameters.__dataclass_fields__
+        and not v.name.startswith("groove.")
+    )
+}
+#: Everything that may be in error, with its unit, and the symbols of the thesis.
+ERRORS: Mapping[str, str] = MappingProxyType({name: v.unit for name, v in _ERRORS.items()})
+SYMBOLS: Mapping[str, str] = MappingProxyType({name: v.symbol for name, v in _ERRORS.items() if v.symbol})
+
+#: Quantities that no force takes part in.
+KINEMATIC = ("slider.position", "slider.velocity", "slider.acceleration")
+#: Field of `Reactions` and its component by the name of the FMI interface.
+_COMPONENTS = {
+    f"{vector.removesuffix('_moment')}.{'m' if vector.endswith('_moment') else 'f'}{axis}": (vector, axis)
+    for vector in JOINTS
+    for axis in "xyz"
+}
+#: Everything that sensitivities are given of, by the names of the FMI interface, with its unit. Vectors are in the ground
+#: frame, the moment of the bearing about O; bearing.fz is the axial force. In the thesis's problem, where the torque is given,
+#: drive.applied_torque has no sensitivity and slider.load is the force that is sought.
+QUANTITIES: Mapping[str, str] = MappingProxyType(
+    {
+        v.name: v.unit
+        for v in variables.VARIABLES
+        if v.name in (*KINEMATIC, *_COMPONENTS, "drive.applied_torque", "slider.load")
+    }
+)
+#: What does not depend on the load where that is sought, and so is determined at a dead centre too.
+FREE_OF_LOAD = (*KINEMATIC, "drive.applied_torque", "guide.mx", "guide.my", "guide.mz")
+
+#: The constants of the equations for arrays or dual numbers in the place of the parameters.
+_CONSTANTS: Callable[[Any], Constants] = rebound((parameters,), {"cos": np.cos, "sin": np.sin}).of(
+    SliderCrankParameters.constants
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sensitivities:
+    """Exact first derivatives over the turn.
+
+    Attributes
+    ----------
+    turn : ForceTurn
+        The nominal mechanism and its motion.
+    names : tuple of str
+        The m errors of the derivatives.
+    values : mapping
+        Quantity to its nominal values, masked array (n,).
+    derivatives : mapping
+        Quantity to masked array (m, n): the quantity's unit over the error's. If the load is unknown, quantities that depend on
+        it are masked at the dead centres.
+    """
+
+    turn: ForceTurn
+    names: tuple[str, ...]
+    values: Mapping[str, MaskedArray]
+    derivatives: Mapping[str, MaskedArray]
+
+    def derivative(self, quantity: str, error: str) -> MaskedArray:
+        """Return the derivative (n,) of a quantity by an error.
+
+        Raises
+        ------
+        ParameterError
+            If it is not among them.
+        """
+        check_names((quantity,), self.derivatives, "quantity")
+        check_names((error,), self.names, "error")
+        return cast(MaskedArray, self.derivatives[quantity][self.names.index(error)])
+
+
+def sensitivities(
+    turn: ForceTurn, errors: Sequence[str] = DIMENSIONS, quantities: Sequence[str] = tuple(QUANTITIES)
+) -> Sensitivities:
+    """Compute derivatives of motion, torque and joint forces by dimensions, masses and settings over the turn.
+
+    Parameters
+    ----------
+    turn : ForceTurn
+        The nominal mechanism. The motion of the crank, the rates of the shift, and the given load or torque are held constant.
+        An error of the crank angle does not change the shift, unless a groove in the shaft makes it; an error of a length does
+        not change masses, centres of mass or moments of inertia.
+    errors : sequence of str
+        Of `ERRORS`; by default `DIMENSIONS`.
+    quantities : sequence of str
+        Of `QUANTITIES`; by default all.
+
+    Raises
+    ------
+    ParameterError
+        If an error or a quantity does not exist.
+    """
+    check_names(errors, ERRORS, "error")
+    check_names(quantities, QUANTITIES, "quantity")
+    n, m = len(turn), len(errors)
+    found, _ = vary(turn, np.arange(n), error_variables(errors, n)).evaluate(quantities)
+    values, derivatives = {}, {}
+    for name in quantities:
+        x, dead = dual(found[name]), undetermined(turn, name)
+        values[name] = masked_array(np.broadcast_to(x.real, (n,)), dead)
+        derivatives[name] = masked_array(np.broadcast_to(x.dual, (m, n)), dead)
+    return Sensitivities(
+        turn=turn,
+        names=tuple(errors),
+        values=MappingProxyType(values),
+        derivatives=MappingProxyType(derivatives),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Varied:
+    """Mechanism and motion with errors, at the points ``at`` of a turn: constants, crank angle and shift."""
+
+    turn: ForceTurn
+    at: Any
+    p: Constants
+    angle: Any
+    moving: ShiftMotion
+
+    @property
+    def square(self) -> Any:
+        """Rod length squared less distance squared of crank pin and guide (m2): positive if it can be assembled."""
+        return plant_functions().assembly_square(self.angle, self.moving.shift, self.p)
+
+    def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
+        """Compute the quantities, and the lever of the slider's force.
+
+        Only the needed parts are computed; the lever is zero if no force is asked for.
+        """
+        turn, p, moving = self.turn, self.p, self.moving
+        w, e = turn.speed[self.at], turn.acceleration[self.at]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            if set(quantities) <= set(KINEMATIC):
+                return self._motion(quantities, w, e), 0.0
+            sought = turn.sought == SLIDER_FORCE
+            given = (turn.torque if sought else turn.slider_force).data[self.at]
+            s = solve(p, self.angle, moving, w, e, given=given, torque=sought, groove=has_shaft_groove(turn.law))
+        found = {
+            "slider.position": s.position.s4,
+            "slider.velocity": s.motion.slider_velocity,
+            "slider.acceleration": s.motion.slider_acceleration,
+            "drive.applied_torque": given if sought else s.motion.torque,
+            "slider.load": s.load,
+        }
+        found |= {name: getattr(getattr(s.reactions, vector), axis) for name, (vector, axis) in _COMPONENTS.items()}
+        found["bearing.fz"] = s.reactions.axial
+        return {name: found[name] for name in quantities}, s.ratio
+
+    def _motion(self, quantities: Collection[str], w: Any, e: Any) -> dict[str, Any]:
+        f, p, moving = plant_functions(), self.p, self.moving
+        q = f.position(self.angle, moving.shift, p)
+        found = {"slider.position": q.s4}
+        if set(quantities) != {"slider.position"}:
+            k = f.coefficients(q, p)
+            found["slider.velocity"] = k.kth * w + k.ks * moving.velocity
+            centripetal = f.centripetal(q, k, w, moving.velocity, p)
+            found["slider.acceleration"] = k.kth * e + k.ks * moving.acceleration + centripetal
+        return {name: found[name] for name in quantities}
+
+
+def vary(turn: ForceTurn, at: Any, errors: Mapping[str, Any]) -> Varied:
+    """Return the mechanism with errors, arrays or dual numbers by name, at the points ``at`` of the turn."""
+    nominal = {field.name: getattr(turn.parameters, field.name) for field in fields(turn.parameters)}
+    changed = {
+        field_name(name): nominal[field_name(name)] + x for name, x in errors.items() if name not in (ANGLE, SHIFT)
+    }
+    p = with_groove(_CONSTANTS(SimpleNamespace(**nominal | changed)), turn.law)
+    angle = turn.angle[at] + errors.get(ANGLE, 0.0)
+    if has_shaft_groove(turn.law):
+        moving = turn.law.at(angle, turn.speed[at], turn.acceleration[at])
+    else:
+        moving = ShiftMotion(turn.shift[at], turn.shift_velocity[at], turn.shift_acceleration[at])
+    return Varied(turn, at, p, angle, moving._replace(shift=moving.shift + errors.get(SHIFT, 0.0)))
+
+
+def error_variables(names: Sequence[str], n: int, moved: int = 0, step: float = 0.0) -> dict[str, Dual]:
+    """Return errors at n points as independent variables, all zero but one, which is moved by a step."""
+    values = np.zeros((len(names), n))
+    values[moved] = step
+    return dict(zip(names, independent(*values)))
+
+
+def undetermined(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
+    """Return where a quantity of the nominal mechanism is undetermined at a dead centre."""
+    dead = np.ma.getmaskarray(turn.slider_force)
+    return np.zeros(len(turn), dtype=bool) if quantity in FREE_OF_LOAD else dead
+
+
+def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
+    """Make sure that quantities or errors of these names exist.
+
+    Raises UnknownNameError if one does not.
+    """
+    for name in names:
+        if name not in known:
+            raise unknown_name(name, known, f"{kind} {name!r}")
+
+
+# Estimates without samples
 
 #: Standard deviations in the half width of a normal tolerance.
 NORMAL_EXTENT = 3.0
@@ -32,14 +252,14 @@ _DISTRIBUTIONS = {"normal": (NORMAL_EXTENT, 3.0), "uniform": (sqrt(3.0), 1.8), "
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """A random error of one dimension, independent of the others and with the mean zero.
+    """A random error of one dimension, independent of the others, with zero mean.
 
     Parameters
     ----------
     name : str
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
     half_width : float or str, optional
-        Half the width of the tolerance, in the SI unit of what is in error or with its unit, such as "0.1 mm". A normal
+        Half the width of the tolerance, in the SI unit of the erroneous quantity or with a unit, such as "0.1 mm". A normal
         distribution has three standard deviations in it and is not cut off there.
     standard_deviation : float, optional
         In place of the half width.
@@ -49,7 +269,7 @@ class Tolerance:
     Raises
     ------
     ParameterError
-        If there is nothing of that name to be in error.
+        If there is no such error.
     InputError
         If not one of half width and standard deviation is given, if it is not a finite number above zero, or if the
         distribution is none of the three.
@@ -90,7 +310,7 @@ class Tolerance:
         return self.deviation * _DISTRIBUTIONS[self.distribution][0]
 
     def draw(self, generator: np.random.Generator, samples: int) -> FloatArray:
-        """Random errors (samples,)."""
+        """Draw random errors (samples,)."""
         if self.distribution == "normal":
             return generator.normal(0.0, self.deviation, samples)
         if self.distribution == "uniform":
@@ -100,7 +320,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Estimate:
-    """What the tolerances do to one quantity over the turn, without samples; masked arrays.
+    """Effect of the tolerances on one quantity over the turn, without samples; masked arrays.
 
     Attributes
     ----------
@@ -110,12 +330,12 @@ class Estimate:
     worst : masked array, shape (n,)
         Greatest departure to first order: every error at its extent, with the sign that makes it worse.
     shares : masked array, shape (m, n)
-        Of each tolerance in the variance to first order; masked where that is zero but for rounding.
+        Share of each tolerance in the variance to first order; masked where the variance is zero but for rounding.
     second_mean, second_deviation : masked array, shape (n,)
         Mean and standard deviation to second order, from exact derivatives and their differences over one standard
         deviation; masked where the mechanism cannot be assembled there.
     second_shares : masked array, shape (m, n)
-        As ``shares``, to second order; what two errors do together counts half for each.
+        As ``shares``, to second order; the joint effect of two errors counts half for each.
 
     Where the slider's force is sought and the errors, all at their extents, reach a dead centre, everything but ``nominal``
     is masked: the quantity has a pole there, and neither mean nor variance.
@@ -130,10 +350,10 @@ class Estimate:
     second_shares: MaskedArray
 
 
-def estimate(
+def tolerance_effects(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str] = ("slider.position",)
 ) -> dict[str, Estimate]:
-    """The effect of tolerances to first and second order over the turn, by quantity.
+    """Compute the effect of tolerances to first and second order over the turn, by quantity.
 
     Raises
     ------
@@ -187,12 +407,8 @@ def estimate(
     return result
 
 
-#: The name of `estimate` at the top of the package.
-tolerance_effects = estimate
-
-
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
-    """Names of the tolerances; raises InputError if there is none, or two of the same name."""
+    """Return the names of the tolerances; raises InputError if there is none, or two of the same name."""
     names = tuple(t.name for t in tolerances)
     if not names:
         raise InputError("there is no tolerance: give at least one")
@@ -205,7 +421,7 @@ def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
 def _curvatures(
     turn: ForceTurn, tolerances: Sequence[Tolerance], quantities: Sequence[str]
 ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-    """Second derivatives (m, m, n) times both standard deviations, and where the mechanism is assembled for all of them.
+    """Return second derivatives (m, m, n) times both standard deviations, and where all their configurations assemble.
 
     They are half the differences of the first derivatives over one standard deviation to either side.
     """
@@ -226,7 +442,7 @@ def _curvatures(
 
 
 def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> NDArray[np.bool_]:
-    """Where errors at their extents make nothing of the lever of the slider's force, if that is sought (n,)."""
+    """Return where errors at their extents reach a zero of the slider force's lever, if that force is unknown (n,)."""
     n = len(turn)
     if turn.sought != SLIDER_FORCE:
         return np.zeros(n, dtype=bool)
@@ -236,7 +452,7 @@ def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> 
 
 
 def _share(parts: MaskedArray, whole: MaskedArray, none: NDArray[np.bool_]) -> MaskedArray:
-    """Parts (m, n) of a whole (n,), masked where there is none."""
+    """Return parts (m, n) divided by a whole (n,), masked where ``none`` is true."""
     shares = np.ma.masked_where(np.broadcast_to(none, parts.shape), parts) / np.ma.masked_where(none, whole)
     shares.fill_value = np.nan
     return cast(MaskedArray, shares)

@@ -36,17 +36,17 @@ STUDIES: Mapping[str, str] = MappingProxyType({**YOUSSEF, **RAHMAN})
 
 
 def is_figure(number: str) -> bool:
-    """Whether a study is a figure of a thesis; the others are ours."""
+    """Return whether a study reproduces a figure of a thesis, rather than being one of our own."""
     return number.removeprefix("R")[0].isdigit()
 
 
 def file_stem(number: str) -> str:
-    """Name of a study's files without their endings."""
+    """Return the name of a study's files without suffix."""
     return f"fig_{number.replace('.', '_')}" if is_figure(number) else number
 
 
 def load(number: str) -> Study:
-    """The study of a figure.
+    """Import the study of a figure.
 
     Raises
     ------
@@ -60,5 +60,5 @@ def load(number: str) -> Study:
 
 
 def make(number: str, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
-    """Run a study and write its plot and CSV (of the linkage an animation too) into a folder; returns the paths."""
+    """Run a study and write its plot and table, and an animation if it has one, into a folder; returns result and paths."""
     return load(number).make(out)

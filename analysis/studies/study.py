@@ -1,10 +1,11 @@
-"""What every study is: a claim, what we compute, the picture, the verdict; and how one is run."""
+"""The parts of a study (claim, computed columns, picture, verdicts) and how one is run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,35 +14,52 @@ from ..figures import Curve, Figure
 from ..files import save_figure, write_csv
 from . import STUDIES, file_stem, is_figure
 
-#: Where a statement comes from: the thesis's text, its program when it is run, or our own derivations and checks.
-TEXT, LISTING, OURS = "text", "listing", "ours"
+#: Kinds of sources: the thesis's text, and its program when run.
+TEXT, LISTING = "text", "listing"
 #: What a verdict may be.
 HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
 
 
+class Source(NamedTuple):
+    """Source of a statement: its kind, and its place in the thesis (section, lines L of the scanned text)."""
+
+    kind: str
+    place: str = ""
+
+
+#: Our own derivations and checks.
+OURS = Source("ours")
+
+
+def text(place: str) -> Source:
+    """Return a place in the thesis's text as a source."""
+    return Source(TEXT, place)
+
+
+def listing(place: str) -> Source:
+    """Return the thesis's program when run as a source."""
+    return Source(LISTING, place)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """A stated result beside ours: it holds if ``computed`` lies from ``lower`` to ``upper``.
+    """Stated result beside the computed one; it holds if ``computed`` lies from ``lower`` to ``upper``.
 
     Attributes
     ----------
     statement : str
-        What is said, as a sentence without its number.
-    source : str
-        Who says so: `TEXT`, `LISTING` or `OURS`.
-    place : str
-        Where: the section, and the lines (L) of the scanned text; empty for ours.
+        The statement in words, without its number.
+    source : Source
     stated, computed : float or None
         The two values in ``unit``; None where the statement cannot be judged.
     lower, upper : float
         Range that the source supports.
     why : str
-        Why the statement cannot be judged, or, in a few words, why it fails.
+        Reason why the statement cannot be judged, or why it fails.
     """
 
     statement: str
-    source: str
-    place: str = ""
+    source: Source
     stated: float | None = None
     computed: float | None = None
     lower: float = -np.inf
@@ -50,7 +68,7 @@ class Verdict:
     why: str = ""
 
     def __str__(self) -> str:
-        source = f"{self.source}, {self.place}" if self.place else self.source
+        source = ", ".join(part for part in self.source if part)
         if self.computed is None:
             return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
         outcome = HOLDS if self.holds else f"{FAILS.upper()}{self.why and f': {self.why}'}"
@@ -81,67 +99,52 @@ class Verdict:
 
 
 def near(
-    statement: str,
-    source: str,
-    stated: float,
-    computed: float,
-    tolerance: float,
-    unit: str = "",
-    *,
-    place: str = "",
-    why: str = "",
+    statement: str, source: Source, stated: float, computed: float, tolerance: float, unit: str = "", *, why: str = ""
 ) -> Verdict:
-    """A verdict on a value that is stated to within a tolerance."""
+    """Judge a value that is stated to within a tolerance."""
     bounds = {"lower": stated - tolerance, "upper": stated + tolerance}
-    return _judged(statement, source, stated, computed, unit, place, why, **bounds)
+    return _judged(statement, source, stated, computed, unit, why, **bounds)
 
 
 def at_least(
-    statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
+    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
 ) -> Verdict:
-    """A verdict on a value that is stated to reach another."""
-    return _judged(statement, source, stated, computed, unit, place, why, lower=stated)
+    """Judge a value that is stated as a lower bound."""
+    return _judged(statement, source, stated, computed, unit, why, lower=stated)
 
 
 def at_most(
-    statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
+    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
 ) -> Verdict:
-    """A verdict on a value that is stated not to exceed another."""
-    return _judged(statement, source, stated, computed, unit, place, why, upper=stated)
+    """Judge a value that is stated as an upper bound."""
+    return _judged(statement, source, stated, computed, unit, why, upper=stated)
 
 
 def _judged(
-    statement: str, source: str, stated: float, computed: float, unit: str, place: str, why: str, **bounds: float
+    statement: str, source: Source, stated: float, computed: float, unit: str, why: str, **bounds: float
 ) -> Verdict:
     return Verdict(
-        statement=statement,
-        source=source,
-        place=place,
-        stated=stated,
-        computed=float(computed),
-        unit=unit,
-        why=why,
-        **bounds,
+        statement=statement, source=source, stated=stated, computed=float(computed), unit=unit, why=why, **bounds
     )
 
 
-def unjudged(statement: str, source: str, why: str, *, place: str) -> Verdict:
-    """A statement that cannot be judged, with the reason."""
-    return Verdict(statement=statement, source=source, place=place, why=why)
+def unjudged(statement: str, source: Source, why: str) -> Verdict:
+    """Record a statement that cannot be judged, with the reason."""
+    return Verdict(statement=statement, source=source, why=why)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyResult:
-    """What a study found.
+    """Result of a study: what is claimed, the data of the plot, and the verdicts.
 
     Attributes
     ----------
     number : str
-        Of the thesis's figure, or the name of a picture.
+        Number of the thesis's figure, or name of a picture.
     claim : str
-        What the thesis claims or shows, as far as its text tells.
+        Claim or content of the figure, as far as the thesis's text tells.
     assignment : str
-        What in the figure is our choice, because the caption is lost; empty where nothing is.
+        Our choices in the figure, because the caption is lost; empty if there are none.
     columns : mapping
         Data of the plot by name with unit; all of one length, padded with NaN.
     verdicts : tuple of Verdict
@@ -160,13 +163,13 @@ class StudyResult:
 
     @property
     def heading(self) -> str:
-        """What stands above the plot: the figure's number and title."""
+        """Heading of the plot: the figure's number and title."""
         return f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A figure of the thesis: how it is computed, how it is drawn, and how it is animated, if it is."""
+    """Figure of a thesis: functions that compute, draw and, for some, animate it."""
 
     number: str
     compute: Callable[[], StudyResult]
@@ -187,12 +190,12 @@ class Study:
 
 
 def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
-    """Columns brought to the length of the longest with NaN."""
+    """Pad columns with NaN to the length of the longest."""
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     length = max(len(values) for values in arrays.values())
     return {name: np.append(v, np.full(length - len(v), np.nan)) for name, v in arrays.items()}
 
 
 def curves_of(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
-    """Columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
+    """Return columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
     return [Curve(x=result.columns[x], y=result.columns[name], label=label) for name, label in names.items()]

@@ -8,6 +8,7 @@ from typing import Any
 
 from linkwork.errors import InputError
 
+from ..libraries import MissingLibraryError
 from ..mechanisms import PUBLISHED
 from ..run import Case, case_from
 from .page import page_of
@@ -16,8 +17,8 @@ from .state import case_of, opening_state, state_of
 try:
     import anywidget
     import traitlets
-except ImportError:
-    raise ImportError("anywidget is not installed: python -m pip install 'linkwork[notebook]'") from None
+except ImportError as error:
+    raise MissingLibraryError("anywidget") from error
 
 
 class Widget(anywidget.AnyWidget):

@@ -1,4 +1,4 @@
-"""A wish from the tables of a TOML or JSON file, every quantity with its unit; see `docs/tuning.md`."""
+"""Case files of a tuning: TOML or JSON tables, every quantity with its unit; see `docs/tuning.md`."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import Drive, drive_of, unit_of
 from ..run import Case, case_from
 from ..units import with_unit
-from .tuned import Tuned
-from .wish import Limit, Wish
+from .result import Tuned
+from .wishes import Limit, Wish
 
 #: The objective where none is given, and how the other begins.
 _LEAST_CHANGE, _LEAST = "least change", "least "
 
 
 def _objective(value: Any, name: str) -> str:
-    """What is made least."""
+    """Read the objective: least change, or the least value of a parameter."""
     words = text(value, name)
     if words != _LEAST_CHANGE and not words.startswith(_LEAST):
         raise ParameterError(
@@ -40,11 +40,11 @@ class TuneTable:
     Attributes
     ----------
     change : mapping
-        What may be changed, and how far: "5 %", "10 N/m", or ["1 kg", "3 kg"]
+        Parameters that may be changed, and how far: "5 %", "10 N/m", or ["1 kg", "3 kg"]
     peak : tuple of Limit
         Limits of outputs: { output = "pin.C", below = "14 N" }
     objective : str
-        What is made least: the changes, or a parameter, as in "least slider.damping"
+        Quantity to be minimised: "least change", or a parameter, as in "least slider.damping"
     """
 
     change: Mapping[str, Any] = entry(table_of)
@@ -53,6 +53,7 @@ class TuneTable:
     between: tuple[Any, Any] | None = entry(Many(as_it_is, length=2), None)
     turns: int = entry(Whole(least=1), 1)
     no_resonance: bool = entry(flag, False)
+    resonance_margin: float = entry(Quantity("1", least=0.0), 0.02)
     no_jump: bool = entry(flag, False)
     no_unstable: bool = entry(flag, False)
     least_margin: float = entry(Quantity("1", least=0.0), 0.0)
@@ -62,14 +63,14 @@ class TuneTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TuningCase:
-    """What a case file asks for.
+    """A case file of a tuning.
 
     Attributes
     ----------
     title : str
     wish : Wish
     tables : mapping
-        The file without what is wished: the mechanism, and what acts on it.
+        The file without the wish: the mechanism and its inputs.
     """
 
     title: str
@@ -77,7 +78,7 @@ class TuningCase:
     tables: Mapping[str, Any]
 
     def tuned_tables(self, tuned: Tuned) -> dict[str, Any]:
-        """The tables of a case with what was changed."""
+        """Return the tables of a case with the tuned values."""
         mechanism = mechanism_of(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
@@ -86,7 +87,7 @@ class TuningCase:
 
 
 def _start(case: Case, drive: Drive) -> list[float] | None:
-    """At rest but for the crank's speed at the start, where it is needed and given: see `find_orbit`."""
+    """Return a guess of the motion: rest but for the initial crank speed; None where no guess is needed."""
     mechanism = mechanism_of(case.parameters)
     flow, state = drive.flow(mechanism), mechanism.state(case.initial)
     if not (flow.torque and drive.motor is None):
@@ -104,7 +105,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or what it says is not usable.
+        If the file cannot be read, or an entry is not usable.
     """
     path = Path(path)
     return tuning_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
@@ -113,7 +114,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
 def tuning_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> TuningCase:
-    """A case from the tables of a case file; ``folder`` is where its files are looked for."""
+    """Build a case from the tables of a case file; its files are looked for in ``folder``."""
     tables = overridden({"title": title} | dict(data), overrides or {})
     if "tune" not in tables:
         raise MissingParameterError("tune")
@@ -138,6 +139,7 @@ def tuning_case_from(
         turns=wanted.turns,
         change=wanted.change,
         no_resonance=wanted.no_resonance,
+        resonance_margin=wanted.resonance_margin,
         no_jump=wanted.no_jump,
         no_unstable=wanted.no_unstable,
         least_margin=wanted.least_margin,

@@ -1,36 +1,381 @@
-"""Conditions on the changes: functions that must not be negative, each at one place of the response."""
+"""Conditions on the changes: functions that must not be negative, each at one motion of the response.
+
+The motion, y at crank angle 0 and the level, which is the speed or the other quantity of the range, is picked from its branch
+by one further equation: a plane across the branch, or the loss of stability. As the parameters change it is found again from
+its last place, and so keeps to its branch.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import reduce
-from typing import Any, Protocol
+from dataclasses import dataclass
+from functools import cached_property, partial, reduce
+from itertools import combinations
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ..periodic import Crossing, Gradient, Turn, extremum_gradient
-from .places import (
-    Across,
-    FloatArray,
-    Found,
-    LostError,
-    Place,
-    Spot,
-    centre_of,
-    margin_of,
-    margin_slopes,
-    sampled,
-    spot_of,
+from ..periodic import (
+    Crossing,
+    Family,
+    Gradient,
+    OrbitEquations,
+    PeriodicOrbit,
+    Turn,
+    Variations,
+    extremum_gradient,
+    motion_gradient,
+    scale_of,
 )
-from .wish import AMPLITUDE, Limit, Wish
+from .wishes import AMPLITUDE, Limit, Wish
 
 #: Step in which the level is sought at which an output is greatest, relative to the range's size, and steps at most.
 _STEP, _CLIMB = 1e-3, 12
 #: Samples that the crank angle of a greatest value may be away from where it was.
 _UPHILL = 256
+FloatArray = NDArray[np.float64]
+
+#: Newton's method: iterations at most, and the correction relative to the scale at which a place is found.
+ITERATIONS, FOUND = 12, 1e-9
+#: Change of a parameter, relative to it and to its tolerance, that is made in one step; and the correction that a step may
+#: take, relative to the scale.
+STRIDE, REACH = 0.05, 0.3
+#: Halvings of a step, over all steps, after which a place counts as lost.
+_HALVINGS = 3
+#: Samples of a turn.
+_SAMPLES = 256
+
+
+class LostError(LinkworkError):
+    """A motion was not found again after the parameters changed."""
+
+
+class Expansion(NamedTuple):
+    """Derivatives of y(T) - y(0) and the monodromy matrix at a place, by y, the level and the k changes.
+
+    Attributes
+    ----------
+    gaps : ndarray, shape (n, n + 1 + k)
+        Derivatives of y(T) - y(0).
+    monodromy : ndarray, shape (n, n)
+    monodromies : ndarray, shape (n + 1 + k, n, n)
+        Its derivatives.
+    variations : Variations
+        The variational equations they come from.
+    ways : ndarray, shape (panels, nodes, n, n + 1 + k)
+        Derivatives of the motion over the turn.
+    constants : ndarray, shape (c, n + 1 + k)
+        Derivatives of the numbers of the drive and the constants of the equations.
+    """
+
+    gaps: FloatArray
+    monodromy: FloatArray
+    monodromies: FloatArray
+    variations: Variations
+    ways: FloatArray
+    constants: FloatArray
+
+
+def family(wish: Wish, x: FloatArray) -> Family:
+    """Return the periodic motions over the level for changes in their tolerances."""
+    parameters, drive = wish.operation(x, wish.span[0])
+    return Family(parameters=parameters, drive=drive, vary=wish.over)
+
+
+class Spot(NamedTuple):
+    """A motion on the response: the changes, y, the level, and the turns of the period."""
+
+    x: FloatArray
+    y: FloatArray
+    level: float
+    turns: int = 1
+
+
+def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
+    """Return the changes, start and level of a motion."""
+    return Spot(x, orbit.start, wish.level(orbit), orbit.turns)
+
+
+def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
+    """Return the motion that begins at a spot, as far as it closes."""
+    orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    return orbit
+
+
+def sampled(orbit: PeriodicOrbit) -> Turn:
+    """Return the outputs over the period, each turn with the same number of samples."""
+    return orbit.turn(_SAMPLES * orbit.turns)
+
+
+def expansion(wish: Wish, spot: Spot) -> Expansion:
+    """Compute the derivatives at a spot by the variational equations to second order; the motion need not close."""
+    along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
+    v, n = along.variations, len(spot.y)
+    unit = np.append(1.0, wish.tolerance)
+    forcing, constants = v.forcing * unit, along.along * unit
+    gaps = np.column_stack([v.monodromy - np.eye(n), v.after(forcing)])
+    ways = np.concatenate([v.fundamental, v.from_start(np.zeros((n, len(unit))), forcing)], axis=-1)
+    constants = np.column_stack([np.zeros((len(constants), n)), constants])
+    monodromies = np.empty((n + len(unit), n, n))
+    for column in range(n):
+        by_y, by_constant = v.second(v.fundamental[..., column])
+        monodromies[:, :, column] = v.after(by_y @ ways + by_constant @ constants).T
+    return Expansion(gaps, v.monodromy, monodromies, v, ways, constants)
+
+
+def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
+    """Return the matrix A with det(I - A) zero where multipliers cross a circle in this way, positive within."""
+    if kind is not Crossing.TORUS:
+        return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
+    # the minors of order 2, whose eigenvalues are the products of two multipliers
+    pairs = list(combinations(range(len(monodromy)), 2))
+    minors = [
+        [monodromy[a, c] * monodromy[b, d] - monodromy[a, d] * monodromy[b, c] for c, d in pairs] for a, b in pairs
+    ]
+    return np.array(minors) / radius**2
+
+
+def crossing_margin(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
+    """Return det(I - A) of `margin_matrix`."""
+    matrix = margin_matrix(monodromy, kind, radius)
+    return float(np.linalg.det(np.eye(len(matrix)) - matrix))
+
+
+def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
+    """Return the derivatives of `crossing_margin` by y, the level and the parameters, by exact complex steps."""
+    step = 1e-30
+    matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
+    return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
+
+
+class Row(Protocol):
+    """Equation that picks a motion from its branch."""
+
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        """Return the residual of the equation."""
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        """Return its derivatives by y, the level and the changes."""
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        """Return its derivatives by y and the level alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Across:
+    """Plane across the branch: normal . (y, level) = offset; a fixed level if the normal is along it."""
+
+    normal: FloatArray
+    offset: float
+
+    @classmethod
+    def level_plane(cls, wish: Wish, spot: Spot, level: float) -> Across:
+        """Return the plane of a fixed level, for motions like the one at a spot."""
+        return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
+
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        return float(self.normal[:-1] @ y + self.normal[-1] * level - self.offset)
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        return np.append(self.normal, np.zeros(len(found.monodromies) - len(self.normal)))
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        return self.normal
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Equation of lost stability: a multiplier crosses the unit circle."""
+
+    kind: Crossing
+
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        return crossing_margin(monodromy, self.kind)
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        return margin_slopes(found, self.kind)
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        there = found()
+        return self.slopes(there)[: len(there.monodromy) + 1]
+
+
+class Found:
+    """A motion picked from its branch at some parameters, and its derivatives by them."""
+
+    def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
+        self.spot = spot
+        self._wish, self._row = wish, row
+
+    @cached_property
+    def expansion(self) -> Expansion:
+        """Derivatives by the variational equations."""
+        return expansion(self._wish, self.spot)
+
+    @cached_property
+    def orbit(self) -> PeriodicOrbit:
+        """The periodic motion."""
+        return motion(self._wish, self.spot)
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Derivatives of y and the level by the changes, shape (n + 1, k)."""
+        gaps, n = self.expansion.gaps, len(self.spot.y) + 1
+        rows = np.vstack([gaps, self._row.slopes(self.expansion)])
+        return -np.linalg.solve(rows[:, :n], rows[:, n:])
+
+    def along(self, slopes: FloatArray) -> FloatArray:
+        """Return derivatives by the changes from derivatives by y, the level and the changes, shape (..., n + 1 + k)."""
+        n = len(self.spot.y) + 1
+        found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
+        return found
+
+    def output_slopes(self, number: int, angle: float) -> FloatArray:
+        """Return the derivatives of an output by the changes, by its number, at a crank angle; shape (k,)."""
+        found = self.expansion
+        v = found.variations
+        angle = float(angle % (self.spot.turns * v.flow.period))
+        panel = int(np.searchsorted(np.cumsum(v.h), angle).clip(0, len(v.h) - 1))
+        by_y, by_constant = v.output_derivatives(panel, number)
+        nodes = self.along(np.einsum("sn,snm->sm", by_y, found.ways[panel]) + by_constant @ found.constants)
+        # the polynomial through the panel's nodes, by Lagrange
+        away = v.angles[panel] - v.angles[panel][:, None]
+        np.fill_diagonal(away, 1.0)
+        ahead = np.tile(v.angles[panel] - angle, (len(away), 1))
+        np.fill_diagonal(ahead, 1.0)
+        weights: FloatArray = np.prod(ahead / away, axis=1)
+        return weights @ nodes
+
+
+class Place:
+    """A motion that one equation picks from its branch, found again as the parameters change.
+
+    Parameters
+    ----------
+    wish : Wish
+    row : Row
+    spot : Spot
+        A known motion to start from.
+    """
+
+    def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
+        self.wish, self.row = wish, row
+        self._last = spot
+        self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
+
+    def at(self, x: FloatArray) -> Found:
+        """Find the motion for changes in their tolerances; raises LostError if it is not found again."""
+        last = self._last
+        moved = np.abs(x - last.x) * self.wish.tolerance
+        size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
+        steps = max(1, int(np.ceil(float((moved / size).max()) / STRIDE)))
+        done, step, way, halvings = 0.0, 1.0 / steps, x - last.x, 0
+        spot, slope = last, None
+        while done < 1.0:
+            share = min(done + step, 1.0)
+            target = x if share == 1.0 else last.x + share * way
+            try:
+                there = self._newton(target, spot, slope, share - done)
+            except LinkworkError as error:
+                step, halvings = 0.5 * step, halvings + 1
+                if halvings > _HALVINGS:
+                    raise LostError(f"a motion near {self.wish.say(spot.level)} is not found again: {error}") from error
+                continue
+            slope = np.append(there.y - spot.y, there.level - spot.level) / (share - done)
+            spot, done = there, share
+        self._last = spot
+        return Found(self.wish, self.row, spot)
+
+    def _newton(self, x: FloatArray, begin: Spot, slope: FloatArray | None, ahead: float) -> Spot:
+        z = np.append(begin.y, begin.level)
+        first = z = z if slope is None else z + ahead * slope
+        n = len(begin.y)
+        evaluate = OrbitEquations(family(self.wish, x), begin.turns, *self.wish.span)
+        size = np.inf
+        for count in range(ITERATIONS):
+            here = evaluate(z[:n], float(z[n]))
+            top = np.column_stack([here.jacobian, here.slope])
+            below = self.row.across(partial(expansion, self.wish, begin._replace(x=x, y=z[:n], level=float(z[n]))))
+            value = self.row.value(z[:n], float(z[n]), here.jacobian + np.eye(n))
+            try:
+                step = np.linalg.solve(np.vstack([top, below]), np.append(here.residual, value))
+            except np.linalg.LinAlgError:
+                raise LostError("its equations are singular there") from None
+            z, before, size = z - step, size, float(np.abs(step / self._scale).max())
+            # the second correction may still be the greater one
+            if not np.abs((z - first) / self._scale).max() < REACH or (count > 2 and size > 0.5 * before > FOUND):
+                break
+            if size < FOUND:
+                return begin._replace(x=x, y=z[:n], level=float(z[n]))
+        raise LostError(f"Newton's method does not settle: last correction {size:.1e}")
+
+
+# Outputs over a turn
+
+
+def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
+    """Return samples over a turn as a Fourier series, a function of the crank angle."""
+    n = len(samples)
+    c = np.fft.rfft(samples) / n
+    c[1:] *= 2.0
+    if n % 2 == 0:
+        c[-1] *= 0.5
+    k, way = np.arange(len(c)), n * (turn.angle[1] - turn.angle[0])
+    return lambda angle: (c * np.exp(2j * np.pi / way * np.multiply.outer(angle, k))).real.sum(axis=-1)
+
+
+def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
+    """Return the limited quantity as a function of the crank angle: of a joint the magnitude of the force."""
+    # of its components, which are smooth where the magnitude is not
+    parts = [series(turn, turn[part]) for part in limit.parts]
+    return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
+
+
+def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
+    """Return the limited quantity from its values at its crank angles: see `greatest`."""
+    values = curve(turn, limit)(np.array(angles))
+    return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
+
+
+def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
+    """Return the limited quantity over a turn and its crank angles: one, or those of greatest and least value."""
+    samples = reduce(np.hypot, (turn[part] for part in limit.parts))
+    places = [np.abs(samples).argmax()]
+    if limit.output.startswith(AMPLITUDE):
+        places = [samples.argmax(), samples.argmin()]
+    angles = peak_angles(turn, limit, [float(turn.angle[place]) for place in places])
+    return reading(turn, limit, angles), angles
+
+
+def peak_angles(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
+    """Return the crank angles near given ones at which the limited quantity is greatest."""
+    value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
+    signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
+    return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
+
+
+def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) -> float:
+    """Find the maximum (sign +1) or minimum of a function of the crank angle near an angle."""
+    for _ in range(_UPHILL):
+        a, b, c = sign * value(angle + step * np.array([-1.0, 0.0, 1.0]))
+        if b >= max(a, c):
+            break
+        angle += step if c > a else -step
+    for _ in range(4):
+        # the top of the parabola through three values
+        a, b, c = value(angle + step * np.array([-1.0, 0.0, 1.0]))
+        bend = a - 2.0 * b + c
+        if bend == 0.0:
+            break
+        angle += float(np.clip(0.5 * (a - c) / bend, -1.0, 1.0)) * step
+        step *= 0.1
+    return angle
+
+
+# Conditions
 
 
 class Condition(Protocol):
@@ -41,17 +386,17 @@ class Condition(Protocol):
 
     @property
     def group(self) -> str:
-        """The requirement that it belongs to."""
+        """Name of its requirement."""
 
     def value(self, x: FloatArray) -> float:
-        """The function; raises LostError if the place is not found."""
+        """Return the function; raises LostError if the motion is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """Its derivatives by the changes, shape (k,)."""
+        """Return its derivatives by the changes, shape (k,)."""
 
 
 class Inside:
-    """No multiplier has crossed a circle in a way at a place: `margin_of` is not negative."""
+    """Condition that no multiplier has crossed a circle in a way: `crossing_margin` is not negative."""
 
     slack = 1e-9
 
@@ -59,7 +404,7 @@ class Inside:
         self.group, self.place, self.kind, self.radius = group, place, kind, radius
 
     def value(self, x: FloatArray) -> float:
-        return margin_of(self.place.at(x).orbit.monodromy, self.kind, self.radius)
+        return crossing_margin(self.place.at(x).orbit.monodromy, self.kind, self.radius)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         found = self.place.at(x)
@@ -67,7 +412,7 @@ class Inside:
 
 
 class Beyond:
-    """A point where stability is lost is above a level (side +1) or below it (-1)."""
+    """Condition that a point of lost stability is above a level (side +1) or below it (-1)."""
 
     slack = 1e-9
 
@@ -82,34 +427,8 @@ class Beyond:
         return slopes
 
 
-class Gone:
-    """A closed branch has shrunk to a point, and vanished."""
-
-    slack = 1e-9
-
-    def __init__(self, group: str, wish: Wish, folds: Sequence[Spot]) -> None:
-        self.group, self.centre = group, centre_of(wish, folds)
-        #: Changes at which the centre is known.
-        self.begin, self._there = self.centre.found.x, folds[0].x
-        self._sign = -np.sign(self.centre.miss(self.centre.found))
-
-    def value(self, x: FloatArray) -> float:
-        try:
-            spot = self.centre.at(x).spot
-        except LinkworkError:
-            if np.array_equal(x, self._there):
-                return -1.0  # where the branch is, and too large to have a centre
-            raise
-        # to be gone for certain it has to be a little beyond the point
-        return float(self._sign * self.centre.miss(spot)) - 2.0 * self.slack
-
-    def slopes(self, x: FloatArray) -> FloatArray:
-        slopes: FloatArray = self._sign * self.centre.miss_slopes(self.centre.at(x))
-        return slopes
-
-
 class PeakBeyond:
-    """A resonance, a maximum of the amplitude over the level, is above a level (side +1) or below it (-1)."""
+    """Condition that a resonance, a maximum of the amplitude, is above a level (side +1) or below it (-1)."""
 
     slack = 1e-8
 
@@ -118,7 +437,7 @@ class PeakBeyond:
         self._wish, self._last = wish, spot
 
     def _at(self, x: FloatArray) -> Gradient:
-        place, spot = peak(self._wish, x, self._last)
+        place, spot = find_resonance(self._wish, x, self._last)
         self._last = spot
         return place
 
@@ -129,18 +448,18 @@ class PeakBeyond:
         return self._share * self._at(x).by * self._wish.tolerance
 
 
-def peak(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
-    """The level of a resonance, with its derivatives by the parameters that may be changed, and the motion there.
+def find_resonance(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
+    """Find the level of a resonance, its derivatives by the parameters that may be changed, and the motion there.
 
     Raises LinkworkError if there is none near.
     """
-    orbit = Place(wish, Across.at_level(wish, near, near.level), near).at(x).orbit
+    orbit = Place(wish, Across.level_plane(wish, near, near.level), near).at(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)
-    return found.place, spot_of(wish, x, found.orbit)
+    return found.place, known_spot(wish, x, found.orbit)
 
 
 class Below:
-    """An output is below its limit where it is greatest: at a level of the range and crank angles that go with the changes."""
+    """Condition that an output is below its limit at its maximum over the range and the crank angle."""
 
     slack = 1e-7
 
@@ -150,7 +469,7 @@ class Below:
         self._known: tuple[bytes, Found, Turn] | None = None
 
     def _at(self, x: FloatArray) -> tuple[Found, Turn]:
-        """The motion there, found by parabolas through the output at three levels."""
+        """Find the motion with the greatest output by parabolas through the output at three levels."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
         found, value = self._reading(x, self._last.level)
@@ -158,12 +477,12 @@ class Below:
         for step in (_STEP, 0.1 * _STEP):
             found, value = self._uphill(x, found, value, step * self._wish.size)
         turn = sampled(found.orbit)
-        self._last, self.angles = found.spot, climbed(turn, self.limit, self.angles)
+        self._last, self.angles = found.spot, peak_angles(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
 
     def _uphill(self, x: FloatArray, found: Found, value: float, step: float) -> tuple[Found, float]:
-        """The motion from which no parabola leads to a greater output."""
+        """Return the motion from which no parabola leads to a greater output."""
         for _ in range(_CLIMB):
             level = found.spot.level
             try:
@@ -182,16 +501,16 @@ class Below:
         return found, value
 
     def _reading(self, x: FloatArray, level: float) -> tuple[Found, float]:
-        found = Place(self._wish, Across.at_level(self._wish, self._last, level), self._last).at(x)
+        found = Place(self._wish, Across.level_plane(self._wish, self._last, level), self._last).at(x)
         turn = sampled(found.orbit)
-        return found, reading(turn, self.limit, climbed(turn, self.limit, self.angles))
+        return found, reading(turn, self.limit, peak_angles(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:
         return 1.0 - reading(self._at(x)[1], self.limit, self.angles) / float(self.limit.below)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         (found, turn), names = self._at(x), self._wish.mechanism.output_names
-        total, parts = np.zeros(len(x)), parts_of(turn, self.limit)
+        total, parts = np.zeros(len(x)), self.limit.parts
         for angle, sign in zip(self.angles, (1.0, -1.0)):
             values = [float(series(turn, turn[part])(angle)) for part in parts]
             slopes = [found.output_slopes(names.index(part), angle) for part in parts]
@@ -201,71 +520,3 @@ class Below:
                 # of the magnitude
                 total += np.array(values) @ np.array(slopes) / np.linalg.norm(values)
         return np.asarray(-total / self.limit.below)
-
-
-# Outputs over a turn
-
-
-def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
-    """What was sampled over a turn, as its Fourier series at any crank angle."""
-    n = len(samples)
-    c = np.fft.rfft(samples) / n
-    c[1:] *= 2.0
-    if n % 2 == 0:
-        c[-1] *= 0.5
-    k, way = np.arange(len(c)), n * (turn.angle[1] - turn.angle[0])
-    return lambda angle: (c * np.exp(2j * np.pi / way * np.multiply.outer(angle, k))).real.sum(axis=-1)
-
-
-def parts_of(turn: Turn, limit: Limit) -> list[str]:
-    """The outputs that a limit is about: of a joint the components of its force."""
-    name = limit.output.removeprefix(AMPLITUDE)
-    return [name] if name in turn.names else [p for axis in "xyz" if (p := f"{name}.f{axis}") in turn.names]
-
-
-def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
-    """What a limit is about at any crank angle: of a joint the magnitude of the force."""
-    # of its components, which are smooth where the magnitude is not
-    parts = [series(turn, turn[part]) for part in parts_of(turn, limit)]
-    return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
-
-
-def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
-    """What a limit bounds, from the values at its crank angles: see `greatest`."""
-    values = curve(turn, limit)(np.array(angles))
-    return float(abs(values[0])) if len(angles) == 1 else 0.5 * float(values[0] - values[1])
-
-
-def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
-    """What a limit bounds over a turn, and the crank angles of it: one, or those of the greatest and the least value."""
-    samples = reduce(np.hypot, (turn[part] for part in parts_of(turn, limit)))
-    places = [np.abs(samples).argmax()]
-    if limit.output.startswith(AMPLITUDE):
-        places = [samples.argmax(), samples.argmin()]
-    angles = climbed(turn, limit, [float(turn.angle[place]) for place in places])
-    return reading(turn, limit, angles), angles
-
-
-def climbed(turn: Turn, limit: Limit, angles: Sequence[float]) -> tuple[float, ...]:
-    """The crank angles about these at which what a limit bounds is greatest."""
-    value, step = curve(turn, limit), float(turn.angle[1] - turn.angle[0])
-    signs = (1.0, -1.0) if len(angles) > 1 else (float(np.sign(value(angles[0])) or 1.0),)
-    return tuple(_climb(value, angle, step, sign) for angle, sign in zip(angles, signs))
-
-
-def _climb(value: Callable[[Any], Any], angle: float, step: float, sign: float) -> float:
-    """Where a function of the crank angle is greatest (sign +1) or least about an angle."""
-    for _ in range(_UPHILL):
-        a, b, c = sign * value(angle + step * np.array([-1.0, 0.0, 1.0]))
-        if b >= max(a, c):
-            break
-        angle += step if c > a else -step
-    for _ in range(4):
-        # the top of the parabola through three values
-        a, b, c = value(angle + step * np.array([-1.0, 0.0, 1.0]))
-        bend = a - 2.0 * b + c
-        if bend == 0.0:
-            break
-        angle += float(np.clip(0.5 * (a - c) / bend, -1.0, 1.0)) * step
-        step *= 0.1
-    return angle

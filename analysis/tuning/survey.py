@@ -1,4 +1,4 @@
-"""What lies in a range of speeds: the response followed anew, and on it resonances, lost stability and greatest outputs."""
+"""Survey of a range of speeds: resonances, lost stability and greatest outputs on the response followed over it."""
 
 from __future__ import annotations
 
@@ -30,13 +30,23 @@ from ..periodic import (
     scale_of,
     speed_name,
 )
-from .conditions import greatest
-from .places import Across, FloatArray, LostError, Place, Spot, margin_of, motion, sampled, spot_of
-from .wish import Limit, Wish
+from .conditions import (
+    Across,
+    FloatArray,
+    LostError,
+    Place,
+    Spot,
+    crossing_margin,
+    greatest,
+    known_spot,
+    motion,
+    sampled,
+)
+from .wishes import Limit, Wish
 
 #: Greatest step along the response, in scaled arc length, and how far it is followed beside the range, relative to its width.
 STEP, BESIDE = 2e-2, 0.4
-#: The same of a branch that the response does not meet: whether it is closed decides what can be done with it.
+#: The same of a branch that the response does not meet.
 FAR = 4.0
 #: Least values of a test function along a branch, and greatest ones of an output, that are looked at more closely, at most.
 _LEAST, _MOST = 3, 4
@@ -44,7 +54,9 @@ _LEAST, _MOST = 3, 4
 _NEAR = 0.5
 #: Distance in level and in multipliers that counts as none: of the range's ends, and of the unit circle.
 AT_THE_END, MARGINAL = 1e-7, 1e-6
-#: Speeds of the range at which all motions are sought, and those of the chart.
+#: Width of a part of the range without a stable motion that counts as none, relative to the range's middle.
+NO_GAP = 1e-6
+#: Numbers of speeds: of the search for all motions, and of the row of a chart.
 SOUGHT, _CHARTED = 5, 201
 #: Distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
 NEXT = 0.05
@@ -58,17 +70,15 @@ class Region:
     ----------
     kind : Crossing
     low, high : float
-        Least and greatest level of it, as far as it was followed.
+        Its least and greatest level, as far as it was followed.
     first, last : SpecialPoint or None
-        At these, where they were met.
+        Special points at its ends, if they were met.
     worst : Spot
-        Where the test function is least, on the way.
+        Motion with the least test function.
     across : Across
-        What picks that place.
+        Equation that picks that motion.
     value : float
-        The test function there.
-    closed : bool
-        Whether the branch is: then it can shrink to a point.
+        Its test function.
     """
 
     kind: Crossing
@@ -79,12 +89,11 @@ class Region:
     worst: Spot
     across: Across
     value: float
-    closed: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Least:
-    """Where a test function is least along a branch inside the range, at a fixed level; see `places.margin_of`."""
+    """Minimum of a test function along a branch inside the range, at a fixed level; see `conditions.crossing_margin`."""
 
     kind: Crossing
     spot: Spot
@@ -93,7 +102,7 @@ class Least:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Greatest:
-    """The greatest value of an output in the range, at a level and crank angles."""
+    """Maximum of an output in the range, at a level and crank angles."""
 
     limit: Limit
     value: float
@@ -103,7 +112,7 @@ class Greatest:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Survey:
-    """What lies in the range of a wish with some changes.
+    """Survey of the range of a wish with some changes.
 
     Attributes
     ----------
@@ -111,16 +120,18 @@ class Survey:
     x : ndarray, shape (k,)
         The changes in their tolerances.
     response : Response
-        Of the range and of what is beside it.
+        Response over the range and beside it.
     regions : tuple of Region
-        That reach into the range.
+        Regions of lost stability that reach into the range.
     peaks : tuple of Spot
-        Resonances in it.
+        Resonances in the range or its margin.
     least : tuple of Least
     greatest : tuple of Greatest
-        For each limit the greatest ones, and where.
+        Greatest values of each limited output.
     largest : (float, float)
         The largest Floquet multiplier in the range, and its level.
+    unstable : tuple of (float, float)
+        Parts of the range without a stable motion.
     """
 
     wish: Wish
@@ -131,15 +142,16 @@ class Survey:
     least: tuple[Least, ...]
     greatest: tuple[Greatest, ...]
     largest: tuple[float, float]
+    unstable: tuple[tuple[float, float], ...]
 
     @property
     def folds(self) -> tuple[Region, ...]:
-        """Where the response jumps."""
+        """Regions between folds, where the response jumps."""
         return tuple(region for region in self.regions if region.kind is Crossing.FOLD)
 
 
 def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Survey:
-    """Follow the response with some changes and look at what lies in the range.
+    """Follow the response with some changes and survey the range.
 
     Parameters
     ----------
@@ -147,7 +159,7 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     x : ndarray, shape (k,)
         Changes in their tolerances.
     more : sequence of PeriodicOrbit
-        Motions on branches of their own, which are followed too.
+        Motions on other branches, which are followed too.
 
     Raises
     ------
@@ -155,9 +167,13 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         If there is no motion to begin with.
     """
     parameters, drive = wish.operation(x, wish.span[0])
+    low, high = _ends(wish, BESIDE)
+    if wish.no_resonance:
+        low, high = min(low, wish.without_resonance[0]), max(high, wish.without_resonance[1])
     response = frequency_response(
         parameters,
-        *_ends(wish, BESIDE),
+        low,
+        high,
         drive=drive,
         vary=wish.over,
         start=wish.start,
@@ -165,12 +181,19 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         greatest_step=STEP,
     )
     for orbit in more:
-        response = _with(wish, response, orbit)
+        response = _add_branch(wish, response, orbit)
     branches = response.branches
     regions = [region for branch in branches for region in _regions(wish, x, branch, response)]
-    inside = [(branch, np.flatnonzero(_in(wish, branch.parameter))) for branch in branches]
+    inside = [(branch, np.flatnonzero(_inside(wish, branch.parameter))) for branch in branches]
     motions = [[(float(b.parameter[i]), b.orbits[i]) for i in places] for b, places in inside]
-    least = tuple(found for branch in branches for found in _least(wish, x, branch)) if wish.judged else ()
+    unstable = tuple(_without_stable_motion(wish, branches))
+    least: tuple[Least, ...] = ()
+    if wish.judged or unstable:
+        least = tuple(found for branch in branches for found in _least(wish, x, branch))
+    if not wish.judged:
+        # a motion beside a stable one may be unstable
+        without = [found for found in least if any(low <= found.spot.level <= high for low, high in unstable)]
+        least = tuple(found for found in without if found.value < 0.0)
     # that at the least test functions is there to the last digit
     brought = [(found.spot.level, motion(wish, found.spot)) for found in least]
     largest = max((orbit.largest, level) for branch in [*motions, brought] for level, orbit in branch)
@@ -183,16 +206,40 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
         least=least,
         greatest=tuple(top for limit in wish.limits for top in _greatest(wish, x, limit, motions)),
         largest=largest,
+        unstable=unstable,
     )
 
 
-def _in(wish: Wish, level: Any) -> Any:
+def _without_stable_motion(wish: Wish, branches: Sequence[Branch]) -> Iterator[tuple[float, float]]:
+    """Yield the parts of the range that no stable stretch of a branch covers."""
+    covered = sorted(stretch for branch in branches for stretch in _stable_stretches(branch))
+    low, end = wish.span
+    for first, last in [*covered, (end, end)]:
+        if reaches(wish, low, min(first, end)) and first - low > NO_GAP * wish.size:
+            yield low, min(first, end)
+        low = max(low, last)
+
+
+def _stable_stretches(branch: Branch) -> Iterator[tuple[float, float]]:
+    """Yield the least and greatest level of each pair of neighbouring points, of their stable part."""
+    stable = [orbit.largest <= 1.0 + MARGINAL for orbit in branch.orbits]
+    lost = {special.after: special.parameter for special in branch.special}
+    for i in range(len(branch) - 1):
+        ends = [float(branch.parameter[i]), float(branch.parameter[i + 1])]
+        if not all(stable[i : i + 2]) and any(stable[i : i + 2]) and i in lost:
+            ends[stable[i]] = float(lost[i])
+        elif not all(stable[i : i + 2]):
+            continue
+        yield min(ends), max(ends)
+
+
+def _inside(wish: Wish, level: Any) -> Any:
     low, high = wish.span
     return (level >= low) & (level <= high)
 
 
 def _ends(wish: Wish, beside: float) -> tuple[float, float]:
-    """The range with so much beside it, relative to its width, on the same side of zero."""
+    """Return the range widened by a share of its width, on the same side of zero."""
     low, high = wish.span
     wide = beside * (high - low)
     return max(low - wide, 0.5 * low) if low > 0.0 else low - wide, min(
@@ -201,16 +248,20 @@ def _ends(wish: Wish, beside: float) -> tuple[float, float]:
 
 
 def reaches(wish: Wish, low: float, high: float) -> bool:
-    """Whether an interval of levels has more than a point in common with the inside of the range."""
+    """Return whether an interval of levels overlaps the inside of the range."""
+    return _overlap(wish, low, high, wish.span)
+
+
+def _overlap(wish: Wish, low: float, high: float, span: tuple[float, float]) -> bool:
     slack = AT_THE_END * wish.size
-    return bool(high > wish.span[0] + slack and low < wish.span[1] - slack)
+    return bool(high > span[0] + slack and low < span[1] - slack)
 
 
-def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
-    """The response with the branch of a motion that it does not meet, followed both ways."""
+def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
+    """Return the response with the branch of a motion on no other branch, followed both ways."""
     if _meets(wish, response, orbit):
         return response
-    level, (low, high) = wish.level_of(orbit), _ends(wish, FAR)
+    level, (low, high) = wish.level(orbit), _ends(wish, FAR)
     try:
         branch = follow_both(response.family, orbit, level, low=low, high=high, greatest=STEP)
     except ContinuationError:
@@ -220,8 +271,8 @@ def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
 
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
-    """Whether a motion is on one of the branches; one of several turns may have begun at any of them."""
-    level, width = wish.level_of(orbit), response.high - response.low
+    """Return whether a motion is on one of the branches; one of several turns may begin at any of them."""
+    level, width = wish.level(orbit), response.high - response.low
     starts = [orbit.start]
     for _ in range(orbit.turns - 1):
         starts.append(starts[-1] + period_from(orbit.parameters, orbit.drive, starts[-1], 1).shift)
@@ -233,11 +284,11 @@ def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
 
 
 def _tests(branch: Branch, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    return np.array([margin_of(orbit.monodromy, kind, radius) for orbit in branch.orbits])
+    return np.array([crossing_margin(orbit.monodromy, kind, radius) for orbit in branch.orbits])
 
 
 def _kinds(branch: Branch) -> Iterator[Crossing]:
-    """The ways in which multipliers can cross: with one multiplier there is no pair."""
+    """Yield the ways in which multipliers can cross: a pair needs two multipliers."""
     for kind in Crossing:
         if kind is not Crossing.TORUS or len(branch.orbits[0].start) > 1:
             yield kind
@@ -246,7 +297,7 @@ def _kinds(branch: Branch) -> Iterator[Crossing]:
 def _parts(
     wish: Wish, branch: Branch, kind: Crossing, response: Response
 ) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
-    """The parts of a branch without a point where a test function changes its sign, each with the points at its ends."""
+    """Yield the parts of a branch between sign changes of a test function, with the points at their ends."""
     special = [s for s in branch.special if s.kind is kind]
     ends = [-1, *(s.after for s in special), len(branch) - 1]
     points: list[SpecialPoint | None] = [None, *special, None]
@@ -263,19 +314,19 @@ def _parts(
 
 
 def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
-    """The period doubling next to a motion at which its branch begins; None where it is none."""
+    """Return the period doubling near a motion, from which its branch begins; None if there is none."""
     for branch in response.branches:
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
             there = point.orbit
             away = np.abs((there.start - orbit.start) / scale_of(there.parameters, there.drive, there.start)).max()
-            near = abs(wish.level_of(there) - wish.level_of(orbit)) < NEXT * (response.high - response.low)
+            near = abs(wish.level(there) - wish.level(orbit)) < NEXT * (response.high - response.low)
             if point.kind is Crossing.PERIOD_DOUBLING and near and away < NEXT:
                 return point
     return None
 
 
 def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> Iterator[Region]:
-    """Where the test functions are negative along a branch."""
+    """Yield the regions of negative test functions along a branch."""
     for kind in _kinds(branch):
         tests = _tests(branch, kind)
         for first, part, last in _parts(wish, branch, kind, response):
@@ -293,16 +344,15 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
                 worst=worst,
                 across=across,
                 value=value,
-                closed=branch.closed,
             )
 
 
 def _lowest(
     wish: Wish, x: FloatArray, branch: Branch, kind: Crossing, i: int, radius: float, *, at_level: bool
 ) -> tuple[Spot, Across, float]:
-    """The least value of a test function about a point of a branch: at fixed levels of the range, or across it."""
+    """Find the minimum of a test function near a point of a branch: at fixed levels of the range, or across it."""
     orbit, before, after = branch.orbits[i], max(i - 1, 0), min(i + 1, len(branch) - 1)
-    spot = spot_of(wish, x, orbit)
+    spot = known_spot(wish, x, orbit)
     scale = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), wish.size)
     ends = [np.append(branch.orbits[j].start, branch.parameter[j]) / scale for j in (before, after)]
     normal = np.append(np.zeros(len(orbit.start)), 1.0)
@@ -318,10 +368,10 @@ def _lowest(
 
     def test(offset: float) -> float:
         place = Place(wish, across(offset), spot)
-        return margin_of(place.at(x).orbit.monodromy, kind, radius)
+        return crossing_margin(place.at(x).orbit.monodromy, kind, radius)
 
     offset = float(normal @ np.append(spot.y, spot.level))
-    value = margin_of(orbit.monodromy, kind, radius)
+    value = crossing_margin(orbit.monodromy, kind, radius)
     if low < high:
         try:
             best = minimize_scalar(test, bounds=(low, high), method="bounded", options={"xatol": 1e-7 * (high - low)})
@@ -334,23 +384,23 @@ def _lowest(
 
 
 def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
-    """The least values of the test functions along a branch in the range, at fixed levels."""
-    inside = np.flatnonzero(_in(wish, branch.parameter))
+    """Yield the minima of the test functions along a branch in the range, at fixed levels."""
+    inside = np.flatnonzero(_inside(wish, branch.parameter))
     if not len(inside):
         return
     for kind in _kinds(branch):
         tests = _tests(branch, kind, wish.radius)
         if kind is Crossing.FOLD:
-            # what lies between two folds is a region of its own
+            # the part between two folds is a region of its own
             tests = np.where(_tests(branch, kind) < 0.0, np.inf, tests)
         found = []
-        within = np.where(_in(wish, branch.parameter), tests, np.inf)
+        within = np.where(_inside(wish, branch.parameter), tests, np.inf)
         for i in inside.tolist():
             around = slice(max(i - 1, 0), i + 2)
             if tests[i] < _NEAR and tests[i] <= within[around].min():
                 found.append((float(tests[i]), np.isfinite(tests[around]).all(), i))
         for value, smooth, i in sorted(found)[:_LEAST]:
-            spot = spot_of(wish, x, branch.orbits[i])
+            spot = known_spot(wish, x, branch.orbits[i])
             if smooth:
                 spot, _, value = _lowest(wish, x, branch, kind, i, wish.radius, at_level=True)
             yield Least(kind=kind, spot=spot, value=value)
@@ -360,16 +410,16 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
 
 
 def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
-    """The resonances in the range."""
+    """Yield the resonances in the range and within the margin beside it."""
     for top in response.maxima():
-        if reaches(wish, top.parameter, top.parameter):
-            yield spot_of(wish, x, top.orbit)
+        if _overlap(wish, top.parameter, top.parameter, wish.without_resonance):
+            yield known_spot(wish, x, top.orbit)
 
 
 def _greatest(
     wish: Wish, x: FloatArray, limit: Limit, motions: Sequence[Sequence[tuple[float, PeriodicOrbit]]]
 ) -> Iterator[Greatest]:
-    """The greatest values of an output in the range: of each branch those that are greatest about them, brought to rest."""
+    """Yield the local maxima of an output in the range, refined over the level."""
     found = []
     for branch in motions:
         values = [greatest(sampled(orbit), limit)[0] for _, orbit in branch]
@@ -378,18 +428,18 @@ def _greatest(
                 found.append((value, branch[i][1]))
     found.sort(key=lambda entry: -entry[0])
     for _, orbit in found[:_MOST]:
-        yield _at_rest(wish, limit, spot_of(wish, x, orbit))
+        yield _refine_maximum(wish, limit, known_spot(wish, x, orbit))
 
 
-def _at_rest(wish: Wish, limit: Limit, near: Spot) -> Greatest:
-    """The greatest value of an output next to a motion, over the level."""
+def _refine_maximum(wish: Wish, limit: Limit, near: Spot) -> Greatest:
+    """Find the maximum of an output over the level near a motion."""
     step = 2.0 * STEP * (wish.span[1] - wish.span[0])
     low, high = max(wish.span[0], near.level - step), min(wish.span[1], near.level + step)
     found: list[Greatest] = []
 
     def value(level: float) -> float:
         try:
-            there = Place(wish, Across.at_level(wish, near, level), near).at(near.x)
+            there = Place(wish, Across.level_plane(wish, near, level), near).at(near.x)
         except LostError:
             return 0.0  # beyond a fold
         size, angles = greatest(sampled(there.orbit), limit)
@@ -405,14 +455,14 @@ def _at_rest(wish: Wish, limit: Limit, near: Spot) -> Greatest:
 # Beside the response
 
 
-def others(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]:
-    """Of all motions at `SOUGHT` levels of the range those on no branch, and the levels with two stable ones."""
+def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]:
+    """Search all motions at `SOUGHT` levels: return those on no branch, and the levels with two stable ones."""
     wish = found.wish
     new: list[PeriodicOrbit] = []
     several: list[float] = []
     for level in np.linspace(*wish.span, SOUGHT).tolist():
         parameters, drive = wish.operation(found.x, level)
-        start, stable = _start_near(wish, found.response, level), 0
+        start, stable = _nearest_start(wish, found.response, level), 0
         for turns in range(1, wish.turns + 1):
             there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
             new += [o for o in there.orbits if not _meets(wish, found.response, o)]
@@ -422,16 +472,16 @@ def others(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]
     return tuple(new), tuple(several)
 
 
-def _start_near(wish: Wish, response: Response, level: float) -> FloatArray | None:
-    """The start of the motion of one turn next to a level: under a torque the crank speed has to be guessed."""
+def _nearest_start(wish: Wish, response: Response, level: float) -> FloatArray | None:
+    """Return the start of the one-turn motion nearest to a level; None at a prescribed speed, which needs no guess."""
     if wish.over == speed_name(wish.mechanism):
         return None
     known = [orbit for branch in response.branches if branch.turns == 1 for orbit in branch.orbits]
-    return min(known, key=lambda orbit: abs(wish.level_of(orbit) - level)).start
+    return min(known, key=lambda orbit: abs(wish.level(orbit) - level)).start
 
 
 def charted(found: Survey) -> tuple[float, float, int]:
-    """The largest multiplier in a row of a chart over the range, infinite where no motion is found, its level, and how many."""
+    """Compute a row of a chart over the range: largest multiplier (infinite without a motion), its level, point count."""
     wish = found.wish
     levels = np.linspace(*wish.span, _CHARTED)
     rows: list[Any] = []
@@ -440,7 +490,7 @@ def charted(found: Survey) -> tuple[float, float, int]:
         parameters, drive = wish.operation(found.x, level)
         rows.append(parameters)
         drives.append(drive)
-    guess = _start_near(wish, found.response, wish.span[0])
+    guess = _nearest_start(wish, found.response, wish.span[0])
     values = np.nan_to_num(largest_multipliers(rows, drives, guess)[0], nan=np.inf)
     i = int(values.argmax())
     return float(values[i]), float(levels[i]), len(levels)

@@ -1,4 +1,4 @@
-"""Youssef's theory of the five-bar slider: linear equation, harmonic balance, Hill, workspace.
+"""Youssef's theory of the five-bar slider: linear equation, harmonic balance, Hill's regions, accessible area.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

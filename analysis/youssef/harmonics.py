@@ -1,13 +1,14 @@
 """Periodic motions of the slider at constant crank speed by harmonic balance (Youssef, chapter IV).
 
-The thesis puts zeta = a0 + a1 cos + b1 sin + a2 cos 2 + b2 sin 2 into the linear equation and balances what has the same
-harmonics, eqs (4.30)-(4.35). `harmonic_balance` does this with any number of harmonics, `nonlinear_harmonic_balance` with
-the plant's own equations: from the harmonics to samples over a turn, there the force, and back to its harmonics, with
-exact derivatives. A balance finds unstable motions as readily as stable ones: it says nothing about stability.
+The thesis puts zeta = a0 + a1 cos + b1 sin + a2 cos 2 + b2 sin 2 into the linear equation and balances each harmonic, eqs
+(4.30)-(4.35). `harmonic_balance` does this with any number of harmonics. `nonlinear_harmonic_balance` balances the
+plant's equations: it samples the motion over a turn, evaluates the force at the samples, and returns to harmonics, with
+exact derivatives. A balance finds stable and unstable motions alike and does not tell them apart.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Any, NamedTuple
@@ -16,14 +17,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
-from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
 from ..numerics.fourier import FourierSeries
+from ..periodic import Response
 from ..run import takes_published
 from ..units import Amount, in_si
-from .equation import NO_LOAD, Balance, Load, SliderEquation, Variant, balance, require_speed, slider_equation
+from .hill import operator
+from .linear_stability import constant_load
+from .linearisation import NO_LOAD, Balance, Load, SliderEquation, Variant, balance, require_speed, slider_equation
 
-#: Orders that the nonlinear balance goes through where none is given.
+#: Orders that the nonlinear balance tries in turn by default.
 ORDERS = (8, 16, 32, 64, 128, 256)
 #: Samples of a turn per harmonic of the nonlinear balance.
 SAMPLES_PER_HARMONIC = 8
@@ -32,7 +36,7 @@ MOST_ITERATIONS, MOST_HALVINGS = 40, 12
 
 
 class HarmonicBalanceError(LinkworkError):
-    """The harmonics could not be balanced: the message says at which speed and order, with residual and iterations."""
+    """The harmonic balance failed; the message tells speed, order, residual and iterations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +48,7 @@ class HarmonicMotion:
     series : FourierSeries
         zeta = u/l4 of a linear equation.
     residual : float
-        Greatest force that is left unbalanced over the turn, relative to (m4 + m5) l4 omega^2.
+        Greatest unbalanced force over the turn, relative to (m4 + m5) l4 omega^2.
     """
 
     series: FourierSeries
@@ -61,11 +65,11 @@ class HarmonicMotion:
         return float(_swings(self.series.cos[None, :], self.series.sin[None, :])[0])
 
     def harmonic(self, n: int) -> float:
-        """Amplitude of the n-th harmonic; 0 beyond the order; the mean, with its sign, for n = 0."""
+        """Return the amplitude of the n-th harmonic, the mean with its sign for n = 0, and 0 beyond the order."""
         return float(self.series.amplitudes[n]) if n <= self.order else 0.0
 
     def position(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """Position at crank angles (rad), of their shape."""
+        """Return the position at crank angles (rad), an array of their shape."""
         return self.series(angle)
 
 
@@ -80,7 +84,7 @@ class SliderMotion(HarmonicMotion):
     residual : float
         Greatest harmonic of the unbalanced force up to the order of the series, relative to l4 ((m4 + m5) omega^2 + k).
     iterations : int
-        Newton steps, of all orders gone through.
+        Newton steps of all orders together.
     speed : float
         Crank speed (rad/s).
     torque : FourierSeries
@@ -92,28 +96,28 @@ class SliderMotion(HarmonicMotion):
     torque: FourierSeries
 
     def velocity(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """u' at crank angles (m/s)."""
+        """Return u' (m/s) at crank angles (rad)."""
         return self.speed * self.series.derivative()(angle)
 
     def acceleration(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """u'' at crank angles (m/s2)."""
+        """Return u'' (m/s2) at crank angles (rad)."""
         return self.speed**2 * self.series.derivative().derivative()(angle)
 
 
 def two_harmonics(equation: SliderEquation) -> HarmonicMotion:
-    """The thesis's form, eqs (4.30)-(4.35): five linear equations for a0, a1, b1, a2, b2."""
+    """Solve the thesis's five linear equations (4.30)-(4.35) for a0, a1, b1, a2, b2."""
     return harmonic_balance(equation, 2)
 
 
 def harmonic_balance(equation: SliderEquation, order: int) -> HarmonicMotion:
-    """Periodic solution of a linear slider equation with harmonics up to an order.
+    """Return the periodic solution of a linear slider equation with harmonics up to an order.
 
     Raises
     ------
     InputError
         If the order is negative.
     HarmonicBalanceError
-        If the equations are singular: an undamped resonance.
+        If the equations are singular, at an undamped resonance.
     """
     _require_order(order)
     try:
@@ -140,13 +144,12 @@ def amplitudes_over(
     variant: Variant = Variant.EXACT,
     load: Load = NO_LOAD,
 ) -> NDArray[np.float64]:
-    """Amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), of their shape.
+    """Return the amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), an array of their shape.
 
-    All parts of a linear slider equation but its damping are constants and multiples of the inverse square of the speed, so
-    that two speeds give them at all others.
+    Except for its damping, a linear slider equation consists of constants and multiples of the inverse square of the speed.
+    Two speeds therefore determine it at all others.
 
-    Raises InputError as `slider_equation` does; it takes the equation from samples, or in powers of the crank's length;
-    HarmonicBalanceError if the equations are singular at one of the speeds.
+    Raises InputError as `slider_equation` does, and HarmonicBalanceError if the equations are singular at one of the speeds.
     """
     _require_order(order)
     w = np.ravel(np.asarray(speeds, dtype=float))[:, None]
@@ -173,7 +176,7 @@ def amplitudes_over(
 
 
 def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Cosines and sines, shape (..., n + 1), of the coefficients of exp(i n theta), (..., 2 n + 1)."""
+    """Convert coefficients of exp(i n theta), shape (..., 2 n + 1), to cosines and sines, (..., n + 1)."""
     half = z[..., z.shape[-1] // 2 :]
     cos = 2.0 * np.real(half)
     cos[..., 0] *= 0.5
@@ -181,14 +184,14 @@ def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _swings(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Half the distance between the least and the greatest value of each of some Fourier series, shape (m, n + 1)."""
+    """Return half the range of each of m Fourier series, shape (m,), from cosines and sines of shape (m, n + 1)."""
     n = np.arange(cos.shape[-1])
     angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)
     phase = np.multiply.outer(n, angle)
     samples = cos @ np.cos(phase) + sin @ np.sin(phase)
     ends = angle[np.stack([samples.argmin(axis=1), samples.argmax(axis=1)], axis=1)]
     cos, sin = cos[:, None], sin[:, None]
-    # the samples are close enough for Newton steps to the places where the slider rests
+    # the extreme samples are close enough to the extremes for Newton's method
     for _ in range(4):
         c, s = np.cos(ends[..., None] * n), np.sin(ends[..., None] * n)
         rate, bend = (n * (sin * c - cos * s)).sum(axis=2), (-(n**2) * (cos * c + sin * s)).sum(axis=2)
@@ -204,12 +207,8 @@ def _require_order(order: int) -> None:
 
 
 def _operator(equation: SliderEquation, order: int) -> NDArray[np.complex128]:
-    """Matrix of a zeta'' + b zeta' + c zeta between the coefficients of exp(i n theta), n = -order ... order."""
-    n = np.arange(-order, order + 1)
-    apart = np.subtract.outer(n, n) + 2 * order
-    a, b, c = (series.to_order(2 * order).exponential[apart] for series in equation.coefficients())
-    matrix: NDArray[np.complex128] = -a * n**2 + 1j * b * n + c
-    return matrix
+    """Return the matrix of a zeta'' + b zeta' + c zeta on exp(i n theta), n = -order ... order."""
+    return operator(equation.homogeneous().stiffened(equation.spring), np.arange(-order, order + 1.0))
 
 
 @takes_published()
@@ -221,18 +220,18 @@ def resonance(
     order: int = 2,
     load: Load = NO_LOAD,
 ) -> tuple[float, float]:
-    """Crank speeds at which the undamped balance of the linear equation has no solution (rad/s), the lower first.
+    """Return the two crank speeds (rad/s) at which the undamped linear balance is singular, the lower first.
 
-    The determinant vanishes at two speeds near each other for every harmonic, because the mechanism's periodic mass and
-    stiffness split what would be one; the thesis's resonance is the lower one with ``harmonic=1`` and ``order=2``.
+    For every harmonic the determinant vanishes at two neighbouring speeds, because the periodic mass and stiffness split
+    one resonance into two. The thesis's resonance is the lower one with ``harmonic=1`` and ``order=2``.
 
     Parameters
     ----------
     parameters : FiveBarParameters
-        Its damping is left out.
+        Their damping is ignored.
     variant : Variant
     harmonic : int
-        That resonates: 1 at the natural frequency, 2 near half of it; at most ``order``.
+        Resonating harmonic: 1 at the natural frequency, 2 near half of it; at most ``order``.
     order : int
         Highest harmonic of the balance.
     load : Load
@@ -253,7 +252,7 @@ def resonance(
         _operator(slider_equation(replace(parameters, slider_damping=0.0), w, variant=variant, load=load), order)
         for w in (natural, 2.0 * natural)
     )
-    # the matrix is S (natural/omega)^2 + D: spring, gravity, load and preload in S, inertia in D
+    # the matrix is S (natural/omega)^2 + D with spring, gravity, load and preload in S and inertia in D
     static = (once - twice) * 4.0 / 3.0
     squares = np.linalg.eigvals(np.linalg.solve(static, static - once))
     pair = squares[np.argsort(squares.real)][2 * harmonic - 1 : 2 * harmonic + 1]
@@ -265,8 +264,73 @@ def resonance(
     return float(lower), float(upper)
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Approximations:
+    """Amplitudes over the speed by approximations from the linear equation about u = 0.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+        Without Coulomb friction, which has no linear form.
+    load : Load
+        Constant forces.
+    speed : ndarray, shape (m,)
+        rad/s.
+    amplitudes : mapping
+        Half the range of u (m), shape (m,), by the name of the approximation.
+    """
+
+    parameters: FiveBarParameters
+    load: Load
+    speed: NDArray[np.float64]
+    amplitudes: Mapping[str, NDArray[np.float64]]
+
+    def at(self, speed: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """Return the amplitudes (m) computed at given speeds (rad/s), arrays of their shape."""
+        return _approximate(self.parameters, speed, self.load)
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return the columns of a table by name with unit."""
+        return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
+
+
+def approximations(response: Response, points: int = 160) -> Approximations:
+    """Approximate a response over its range of speeds by two and by ten harmonics of the corrected equation (4.21).
+
+    Raises
+    ------
+    InputError
+        If another parameter than the speed varies.
+    """
+    if response.family.vary != "drive.speed":
+        raise InputError(f"{response.family.name} varies: the approximations are over the speed")
+    parameters = without_friction(response.family.parameters)
+    load = constant_load(response.family.drive)
+    speeds = np.linspace(response.low, response.high, points)
+    return Approximations(
+        parameters=parameters,
+        load=load,
+        speed=speeds,
+        amplitudes=_approximate(parameters, speeds, load),
+    )
+
+
+#: Approximations by name: variant of the linear equation and harmonics balanced.
+_APPROXIMATIONS = {
+    "two harmonics": (Variant.SECOND_ORDER, 2),
+    "ten harmonics": (Variant.EXACT, 10),
+}
+
+
+def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) -> dict[str, NDArray[np.float64]]:
+    return {
+        name: amplitudes_over(parameters, speed, order, variant=variant, load=load)
+        for name, (variant, order) in _APPROXIMATIONS.items()
+    }
+
+
 class _Basis(NamedTuple):
-    """Values of 1, cos k x, sin k x and their derivatives at the samples, shape (samples, 2 order + 1), and projection."""
+    """Values and derivatives of 1, cos k x, sin k x at the samples, shape (samples, 2 order + 1), and their projection."""
 
     angle: NDArray[np.float64]
     value: NDArray[np.float64]
@@ -305,7 +369,7 @@ def nonlinear_harmonic_balance(
     tolerance: float = 1e-12,
     load: Load = NO_LOAD,
 ) -> SliderMotion:
-    """Periodic motion of the plant at a crank speed by Newton's method on its harmonics.
+    """Find a periodic motion of the plant at a crank speed by Newton's method on its harmonics.
 
     Parameters
     ----------
@@ -313,13 +377,11 @@ def nonlinear_harmonic_balance(
     speed : float
         Crank speed (rad/s), greater than zero.
     order : int, optional
-        Highest harmonic. Without it `ORDERS` are gone through until the last two harmonics are below ``tolerance`` times the
-        greatest.
+        Highest harmonic; by default the first of `ORDERS` whose last two harmonics are below ``tolerance`` times the greatest.
     start : FourierSeries, optional
-        Slider position (m) to start from; without it the solution of the linear equation, made smaller if the links
-        cannot follow it.
+        Initial slider position (m); by default the solution of the linear equation, reduced until the links can follow it.
     tolerance : float
-        Last Newton step relative to the rocker's length.
+        Greatest last Newton step, relative to the rocker's length.
     load : Load
 
     Raises
@@ -353,7 +415,7 @@ def nonlinear_harmonic_balance(
 
 
 def _linear_start(parameters: FiveBarParameters, speed: float, order: int, load: Load) -> FourierSeries:
-    """Slider position (m) by the linear equation, halved until the links can follow it, as they can u = 0."""
+    """Return the slider position (m) by the linear equation, halved until the links can follow it."""
     equation = slider_equation(replace(parameters, slider_coulomb_friction=0.0), speed, load=load)
     start = parameters.rocker_length * harmonic_balance(equation, order).series
     angle = np.linspace(0.0, 2.0 * pi, 256, endpoint=False)
@@ -368,13 +430,13 @@ def _linear_start(parameters: FiveBarParameters, speed: float, order: int, load:
 def _newton(
     parameters: FiveBarParameters, speed: float, order: int, start: FourierSeries, tolerance: float, load: Load
 ) -> SliderMotion:
-    """The balance of one order."""
+    """Solve the nonlinear balance of one order."""
     p = parameters.constants()
     basis = _basis(order)
     scale = p.l4 * (p.m45 * speed**2 + p.k)
 
     def at(x: NDArray[np.float64]) -> tuple[Balance, NDArray[np.float64]]:
-        """The plant at the samples, and the harmonics of the unbalanced force."""
+        """Evaluate the plant at the samples, and the harmonics of the unbalanced force."""
         u, v, a = basis.value @ x, speed * (basis.rate @ x), speed**2 * (basis.curvature @ x)
         plant = balance(basis.angle, u, v, a, speed, p, load)
         return plant, basis.projection @ plant.force
@@ -400,7 +462,7 @@ def _newton(
                 tried = at(x + 0.5**halving * step)
             except AssemblyError:
                 continue
-            # rounding is all that the last step may make worse
+            # the last step may only increase the residual by rounding
             if last or np.linalg.norm(tried[1]) < np.linalg.norm(unbalanced):
                 break
         else:

@@ -1,7 +1,7 @@
 """Linear equations with periodic coefficients, a y'' + b y' + (c + lambda s) y = 0 with period 2 pi (Youssef, chapter V).
 
-Three ways to their stability that share nothing but the coefficients: the monodromy matrix by integration (`monodromies`),
-Hill's infinite determinant cut off at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
+Three methods determine their stability and share only the coefficients: integration of the monodromy matrix (`monodromies`),
+Hill's infinite determinant truncated at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
 perturbation for small harmonics (`perturbed_boundary`, `perturbed_region`).
 
 A region of parametric instability is numbered by N: it starts, as the harmonics vanish, from the stiffness at which the
@@ -27,27 +27,27 @@ from ..periodic import liouville, require_sign
 
 #: Gauss points of a step: the method is of order 12.
 STAGES = 6
-#: Greatest product of step (rad) and rate of the equation, at which the error of a turn is still rounding.
+#: Greatest product of step (rad) and rate of the equation at which the error of a turn is still at rounding.
 STEP_BY_RATE = 0.5
-#: Fewest samples of the coefficients over a turn from which their rates are judged.
+#: Fewest samples of the coefficients over a turn that estimate the rate of the equation.
 JUDGED = 64
-#: Harmonics beyond the coefficients' own that Hill's determinant takes in by default.
+#: Harmonics of Hill's determinant beyond twice the order of the coefficients, by default.
 MORE_HARMONICS = 16
-#: Imaginary part, relative to the size of the boundaries, up to which one is real. Two that are about to meet are computed
-#: only to the square root of the rounding errors.
+#: Imaginary part, relative to its size, up to which a boundary counts as real. Two boundaries that nearly coincide are only
+#: computed to the square root of the rounding errors.
 REAL = 1e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PeriodicEquation:
-    """a y'' + b y' + c y = 0, ' = d/dx, with coefficients of period 2 pi.
+    """The equation a y'' + b y' + c y = 0, ' = d/dx, with coefficients of period 2 pi.
 
     Attributes
     ----------
     a, b, c : FourierSeries
         ``a`` must not pass zero.
     factor : FourierSeries
-        s, what multiplies the stiffness lambda that `stiffened` adds: 1, but periodic in the thesis's equation.
+        s, the factor of the stiffness lambda that `stiffened` adds: 1, but periodic in the thesis's equation.
     """
 
     a: FourierSeries
@@ -57,7 +57,7 @@ class PeriodicEquation:
 
     @classmethod
     def mathieu(cls, p: float, q: float, damping: float = 0.0) -> PeriodicEquation:
-        """Mathieu's y'' + damping y' + (p - 2 q cos 2 t) y = 0 with x = 2 t, so that the period pi becomes 2 pi."""
+        """Return Mathieu's equation y'' + damping y' + (p - 2 q cos 2 t) y = 0 in x = 2 t, which has period 2 pi."""
         return cls(
             a=FourierSeries.constant(4.0),
             b=FourierSeries.constant(2.0 * damping),
@@ -70,12 +70,12 @@ class PeriodicEquation:
         return max(series.order for series in (self.a, self.b, self.c, self.factor))
 
     def stiffened(self, stiffness: float) -> PeriodicEquation:
-        """The equation with a stiffness added: c + lambda s in the place of c."""
+        """Return the equation with a stiffness added: c + lambda s replaces c."""
         return replace(self, c=self.c + stiffness * self.factor)
 
 
 class SingularEquationError(InputError):
-    """The coefficient of y'' passes zero, where the equation loses its order."""
+    """The coefficient of y'' passes zero, so that the equation is not of second order throughout."""
 
 
 # Floquet
@@ -83,13 +83,13 @@ class SingularEquationError(InputError):
 
 @lru_cache(maxsize=32)
 def _waves(points: tuple[float, ...], order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """cos(k x) and sin(k x) for k up to an order, shape (order + 1, points)."""
+    """Return cos(k x) and sin(k x) for k up to an order, shape (order + 1, points)."""
     phase = np.multiply.outer(np.arange(order + 1), np.array(points))
     return np.cos(phase), np.sin(phase)
 
 
 def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
-    """Coefficients of many series filled up to an order, shape (2, n, order + 1): cosines, sines."""
+    """Stack the cosines and sines of many series, zero-padded to one order, shape (2, n, order + 1)."""
     table = np.zeros((2, len(series), order + 1))
     for i, one in enumerate(series):
         table[0, i, : one.order + 1], table[1, i, : one.order + 1] = one.cos, one.sin
@@ -97,20 +97,20 @@ def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
 
 
 def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The table of the derivatives."""
+    """Return the table of the derivatives of the series of a table."""
     k = np.arange(table.shape[2])
     return np.array([k * table[1], -k * table[0]])
 
 
 def _sampled(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
-    """Values at the same points, shape (n, points)."""
+    """Evaluate the series of a table at the same points, shape (n, points)."""
     cos, sin = _waves(points, table.shape[2] - 1)
     values: NDArray[np.float64] = table[0] @ cos + table[1] @ sin
     return values
 
 
 def _tables(equations: Sequence[PeriodicEquation]) -> list[NDArray[np.float64]]:
-    """Tables of a, a', b, c."""
+    """Return the tables of a, a', b and c."""
     order = max(e.order for e in equations)
     a, b, c = (_table([getattr(e, name) for e in equations], order) for name in "abc")
     return [a, _slope(a), b, c]
@@ -121,7 +121,7 @@ def _even(count: int) -> tuple[float, ...]:
 
 
 def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
-    """Steps of a turn that keep the error at rounding."""
+    """Return the number of steps a turn that keeps the error at rounding."""
     k = np.arange(tables[0].shape[2])
     points = _even(max(JUDGED, 4 * len(k)))
     a, slope, b, c = (_sampled(table, points) for table in tables)
@@ -139,15 +139,15 @@ def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
 
 
 def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = None) -> NDArray[np.float64]:
-    """Monodromy matrices of many equations at once: (y, y') after a turn from x = 0 is the matrix times (y, y') at x = 0.
+    """Return the monodromy matrices of many equations, which map (y, y') at x = 0 to (y, y') at x = 2 pi.
 
-    Gauss-Legendre collocation of order 12 on (y, a y'): of a self-adjoint equation, b = a', it keeps the determinant 1.
+    Gauss-Legendre collocation of order 12 on (y, a y') preserves the determinant 1 of a self-adjoint equation, b = a'.
 
     Parameters
     ----------
     equations : sequence of PeriodicEquation
     steps : int, optional
-        Of a turn; by default as many as bring the error down to rounding.
+        Steps a turn; by default enough to reduce the error to rounding.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
     system[..., 0, 1] = 1.0 / a
     system[..., 1, 0] = -c
     system[..., 1, 1] = (slope - b) / a
-    # stages Y_i = 1 + h sum_j a_ij A_j Y_j, all of a step at once
+    # stages Y_i = 1 + h sum_j a_ij A_j Y_j of a step, solved together
     turned = np.moveaxis(system, 2, 3)[:, :, None]
     blocks = np.eye(2 * STAGES).reshape(STAGES, 2, STAGES, 2) - h * matrix[:, None, :, None] * turned
     right = np.broadcast_to(np.tile(np.eye(2), (STAGES, 1)), (*shape[:2], 2 * STAGES, 2))
@@ -195,13 +195,13 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
 
 
 def monodromy(equation: PeriodicEquation, *, steps: int | None = None) -> NDArray[np.float64]:
-    """Monodromy matrix of one equation, shape (2, 2); see `monodromies`."""
+    """Return the monodromy matrix of one equation, shape (2, 2); see `monodromies`."""
     matrix: NDArray[np.float64] = monodromies([equation], steps=steps)[0]
     return matrix
 
 
 def determinant(equation: PeriodicEquation) -> float:
-    """Determinant of the monodromy matrix by Liouville's formula, exp of minus the integral of b/a."""
+    """Return the determinant of the monodromy matrix by Liouville's formula, exp(-integral of b/a)."""
     points = _even(max(4 * JUDGED, 16 * equation.order))
     a, b = _sampled(_table([equation.a, equation.b], equation.order), points)
     return liouville(-b / a)
@@ -211,19 +211,20 @@ def determinant(equation: PeriodicEquation) -> float:
 
 
 def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
-    """Matrix of the product with a series in terms of exp(i k x): entry (n, k) is its coefficient n - k."""
+    """Return the matrix of multiplication by a series in terms of exp(i k x): entry (n, k) is its coefficient n - k."""
     coefficients = series.to_order(size).exponential[size:]
     return np.asarray(scipy.linalg.toeplitz(coefficients[:size], coefficients[:size].conj()))
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
-    """Harmonics of a motion of period 2 pi (multiplier +1) or 4 pi (-1), symmetric about zero."""
+    """Return the harmonics of a motion of period 2 pi (multiplier +1) or 4 pi (-1), symmetric about zero."""
     count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
     k: NDArray[np.float64] = first + np.arange(count, dtype=float)
     return k
 
 
 def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
+    """Return the order given, or the default of the equation increased by ``more``."""
     if order is None:
         return 2 * equation.order + MORE_HARMONICS + more
     if order < 1:
@@ -231,51 +232,51 @@ def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
     return order
 
 
-def _operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """a D^2 + b D + c on exp(i k x)."""
+def operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return the matrix of a D^2 + b D + c on exp(i k x), for evenly spaced k; shape (len(k), len(k))."""
     a, b, c = (_toeplitz(series, len(k)) for series in (equation.a, equation.b, equation.c))
     matrix: NDArray[np.complex128] = -a * k**2 + 1j * b * k + c
     return matrix
 
 
 def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int | None = None) -> float:
-    """Hill's determinant for a multiplier, in exponential form; zero where the equation has that multiplier.
+    """Return Hill's determinant in exponential form, which is zero if the equation has the given multiplier.
 
-    Row k is divided by -a0 (k^2 + 1). At one order, only sign and ratios mean something: those between equations that differ
-    by a constant in c tend to those of det(Phi - multiplier I) as the order grows.
+    Row k is divided by -a0 (k^2 + 1). Only signs, and ratios at the same order, are meaningful: for equations that differ by a
+    constant in c, the ratios tend to the ratios of det(Phi - multiplier I) as the order grows.
 
     Parameters
     ----------
     equation : PeriodicEquation
-        Damping is allowed.
+        It may have damping.
     multiplier : int
-        +1 for motions of period 2 pi, -1 for those of period 4 pi.
+        +1 for motions of period 2 pi, -1 for motions of period 4 pi.
     order : int, optional
-        Highest harmonic taken in.
+        Highest harmonic.
 
     Raises
     ------
     InputError
-        If the multiplier is neither, or the order is not positive.
+        If the multiplier is neither +1 nor -1, or the order is not positive.
     """
     require_sign(multiplier)
     k = _harmonics(multiplier, _order(equation, order))
-    scaled = _operator(equation, k) / (-equation.a.mean * (k**2 + 1.0))[:, None]
+    scaled = operator(equation, k) / (-equation.a.mean * (k**2 + 1.0))[:, None]
     # real: the matrix turned about its middle is its complex conjugate
     return float(np.linalg.det(scaled).real)
 
 
 def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) -> NDArray[np.complex128]:
-    """The two Floquet multipliers from Hill's quadratic eigenvalue problem, the larger modulus first.
+    """Return both Floquet multipliers from Hill's quadratic eigenvalue problem, the larger modulus first.
 
-    y = exp(s x) sum over k of y_k exp(i k x) gives (s^2 A + s B + C) y_k = 0. In the untruncated problem s comes with all
-    s + i n, which have the same multiplier exp(2 pi s); the truncation spoils those whose harmonics it cuts.
+    y = exp(s x) sum over k of y_k exp(i k x) gives (s^2 A + s B + C) y_k = 0. The infinite problem has with s all eigenvalues
+    s + i n, of the same multiplier exp(2 pi s); truncation falsifies the eigenvectors that reach its ends.
 
     Parameters
     ----------
     equation : PeriodicEquation
     order : int, optional
-        Highest harmonic taken in.
+        Highest harmonic.
 
     Returns
     -------
@@ -288,7 +289,7 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
     companion = np.block(
         [
             [np.zeros_like(mass), np.eye(len(k))],
-            [-np.linalg.solve(mass, _operator(equation, k)), -np.linalg.solve(mass, linear)],
+            [-np.linalg.solve(mass, operator(equation, k)), -np.linalg.solve(mass, linear)],
         ]
     )
     exponents, vectors = np.linalg.eig(companion)
@@ -297,7 +298,7 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
     order_of_centres = np.argsort(centres)
     values = np.exp(2.0 * pi * exponents)
     first = values[order_of_centres[0]]
-    # the other one among those in the middle, where only two different ones are
+    # the eigenvectors in the middle have only two different multipliers
     middle = values[centres <= max(0.25 * n, np.sort(centres)[3])]
     second = middle[np.argmax(np.abs(middle - first))]
     pair = np.array([first, second])
@@ -308,36 +309,34 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
 def boundary_stiffnesses(
     equation: PeriodicEquation, multiplier: int, *, count: int, order: int | None = None
 ) -> NDArray[np.complex128]:
-    """Stiffnesses that give the equation the multiplier +1 or -1: all boundaries at once, as eigenvalues; eq (5.35).
+    """Return the stiffnesses at which the equation has the multiplier +1 or -1, as eigenvalues; eq (5.35).
 
     Parameters
     ----------
     equation : PeriodicEquation
-        With a > 0. Damping is allowed: two boundaries that have met become a complex pair, and their region is gone.
+        With a > 0. Damping that removes a region turns its two boundaries into a complex pair.
     multiplier : int
         +1 or -1.
     count : int
-        How many, from the least real part on.
+        Number of boundaries, from the least real part on.
     order : int, optional
-        Highest harmonic taken in.
+        Highest harmonic.
 
     Returns
     -------
     ndarray of complex, shape (count,)
-        In the order of their real parts.
+        Sorted by their real parts.
 
     Raises
     ------
     InputError
-        If the multiplier is neither, or the order does not give so many.
+        If the multiplier is neither +1 nor -1, or the order is too low for the count.
     """
     require_sign(multiplier)
     k = _harmonics(multiplier, _order(equation, order, count))
     if not 1 <= count <= len(k):
-        raise InputError(
-            f"{count} boundaries from {len(k)} harmonics: ask for no more than those, and for one at least"
-        )
-    matrix = -_operator(equation, k)
+        raise InputError(f"count is {count}: {len(k)} harmonics give 1 to {len(k)} boundaries")
+    matrix = -operator(equation, k)
     if equation.factor.order:
         found = scipy.linalg.eigvals(matrix, _toeplitz(equation.factor, len(k)))
     else:
@@ -355,9 +354,9 @@ class Region:
     Attributes
     ----------
     number : int
-        N; the multiplier on its boundaries is (-1)^N.
+        N; the multiplier on the boundaries is (-1)^N.
     low, high : float
-        Its boundaries.
+        Stiffnesses of the boundaries.
     """
 
     number: int
@@ -366,12 +365,12 @@ class Region:
 
     @property
     def width(self) -> float:
-        """Distance of the boundaries."""
+        """Distance between the boundaries."""
         return self.high - self.low
 
 
 def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = None) -> Mapping[int, Region]:
-    """The first ``count`` regions of instability by their number; one that damping has removed is not there.
+    """Return those of the first ``count`` regions of instability that damping has not removed, by their number.
 
     Parameters
     ----------
@@ -379,11 +378,11 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
         With a > 0.
     count : int
     order : int, optional
-        Highest harmonic taken in.
+        Highest harmonic.
     """
     found = {}
     for multiplier in (1, -1):
-        # of the multiplier +1 the least boundary has no partner: below it the motion falls away
+        # the least boundary of the multiplier +1 is single: below it the motion diverges
         alone = 1 if multiplier == 1 else 0
         values = boundary_stiffnesses(equation, multiplier, count=count + 2 + alone, order=order)[alone:]
         for pair in range((count + 1) // 2 if multiplier == -1 else count // 2):
@@ -398,11 +397,11 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
 
 
 def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[np.complex128]:
-    """Stiffnesses on the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed it.
+    """Return the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed the region.
 
-    On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count; the
-    others act on them through the sum over q of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), at the
-    lambda without any harmonics, which is of second order.
+    On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count. To
+    second order the others add the sum over q of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), with the
+    lambda of constant coefficients.
     """
     if order not in (1, 2):
         raise InputError(f"region {number} to order {order}: the order is 1 or 2")
@@ -412,13 +411,13 @@ def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[n
         )
     n, size = 0.5 * number, equation.order
     k = np.arange(-(size + number), size + 1.0) + n
-    v, s = -_operator(equation, k), _toeplitz(equation.factor, len(k))
+    v, s = -operator(equation, k), _toeplitz(equation.factor, len(k))
     k0, s0 = equation.a.mean, equation.factor.mean
     start = (k0 * n * n - equation.c.mean) / s0
     inside = np.abs(k) == n
     left = v - start * s
     if order == 1:
-        # lambda where it multiplies a harmonic is the one without any
+        # a harmonic of S is multiplied by the lambda of constant coefficients
         near, weight = left[np.ix_(inside, inside)] / s0 + start * np.eye(inside.sum()), None
     else:
         others = ~inside
@@ -429,7 +428,7 @@ def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[n
 
 
 def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
-    """The zeroth boundary for small harmonics, eq (5.13) to second order: below it the motion falls away.
+    """Return the zeroth boundary for small harmonics, eq (5.13) to second order; below it the motion diverges.
 
     Raises
     ------
@@ -440,7 +439,7 @@ def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
 
 
 def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2) -> Region | None:
-    """Boundaries of the region N in the stiffness lambda for small harmonics.
+    """Return the boundaries of the region N in the stiffness lambda for small harmonics.
 
     For (M y')' + lambda_c y' + (lambda + K) y = 0 to first order::
 
@@ -453,7 +452,7 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
     Parameters
     ----------
     equation : PeriodicEquation
-        Damping counts as of the order of the half width.
+        Damping is taken to be of the order of the half width.
     number : int
         N, from 1; for N = 0 see `perturbed_boundary`.
     order : int
@@ -478,9 +477,9 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
 
 
 def perturbed_removing_damping(equation: PeriodicEquation, number: int, *, order: int = 2) -> float:
-    """lambda_c at which damping removes the region N of an undamped equation: twice the half width over N.
+    """Return the lambda_c that removes the region N of an undamped equation: twice the half width over N.
 
-    It multiplies a factor of the mean of s, as the stiffness does.
+    Its factor in the equation is assumed to have the mean of s, the factor of the stiffness.
     """
     region = perturbed_region(equation, number, order=order)
     return region.width / number if region else 0.0

@@ -1,19 +1,18 @@
-"""Where the coupler point P can go: coupler curves at a held slider, and the area they sweep (Youssef, Fig 7.2).
+"""Coupler curves at a held slider, and the area that the coupler point P can reach (Youssef, Fig 7.2).
 
-P has two freedoms, the crank angle th2 and the slider position u. At a fixed u it draws a coupler curve, closed where
-the crank turns fully and a pair of ends where the links part; over a range of u the curves fill the accessible area.
+P has two freedoms, the crank angle th2 and the slider position u. At a fixed u it traces a coupler curve, which is closed if
+the crank turns fully and else consists of open arcs. Over a range of u the curves fill the accessible area.
 
-The curves go forwards, through the plant's own kinematics. The area goes backwards: a point (x, y) is accessible if one
-of its at most four configurations is there,
+The curves come from the plant's kinematics. The area comes from inverse kinematics: a point (x, y) is accessible if one of
+its at most four configurations exists,
 
     |B - A| = l2 and |P - B| = r             two crank pins B, hence two couplers and two pins C
     D on the guide and |C - D| = l4          two slider positions u for each
     sin(th4 - th3) of the assembly's sign    and u in its range
 
-which is a test in closed form. It is laid over a square grid, the boundary is located between the grid's points by
-bisection, and the grid is halved until the area no longer changes. Nothing has to be known of the boundary's kind
-(coupler curves of the two ends of the range, limits of assembly, folds where P's two velocities are parallel), and holes
-come out by themselves.
+This test has a closed form. It is applied to a square grid, the boundary is located between neighbouring points by
+bisection, and the grid is refined until the area no longer changes. The method works for every kind of boundary (coupler
+curves of the ends of the range, limits of assembly, folds where the two partial velocities of P are parallel) and for holes.
 """
 
 from __future__ import annotations
@@ -36,17 +35,17 @@ from ..run import takes_published
 from ..units import Amount, in_si
 from .premises import require_five_bar
 
-#: Cells across the area in the first and in the finest grid.
+#: Cells across the area in the coarsest and in the finest grid.
 COARSEST, FINEST = 128, 4096
 #: Halvings of a cell's edge that locate the boundary on it.
 BISECTIONS = 40
-#: Share of the sampled configurations that a grid may leave outside before it is taken as too coarse.
+#: Greatest share of sampled configurations outside the boundaries of a fine enough grid.
 MISSED = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
-    """A stretch of a coupler curve along which the links stay joined: crank angle (rad) and P (m), shapes (n,)."""
+    """Arc of a coupler curve along which the linkage can be assembled: crank angle (rad) and P (m), shapes (n,)."""
 
     crank_angle: NDArray[np.float64]
     x: NDArray[np.float64]
@@ -55,15 +54,15 @@ class Arc:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CouplerCurve:
-    """The path of P over a turn of the crank at a held slider.
+    """Path of P over a turn of the crank at a held slider.
 
     Attributes
     ----------
     slider_position : float
         m.
     arcs : tuple of Arc
-        One if the crank turns fully, its last point then its first; else one per stretch between limits of assembly;
-        none if the links cannot be joined at any crank angle.
+        One closed arc if the crank turns fully, its last point equal to its first; else one per range between limits of
+        assembly; none if the links cannot be joined at any crank angle.
     closed : bool
         Whether the crank turns fully.
     """
@@ -75,22 +74,22 @@ class CouplerCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AccessibleArea:
-    """The area that P reaches.
+    """Area that P can reach.
 
     Attributes
     ----------
     outer, holes : tuple of ndarray, shape (n, 2)
         Boundaries (m), closed without repeating the first point; outer ones counter-clockwise, holes clockwise.
     area : float
-        m2, holes taken out.
+        Area without the holes (m2).
     error : float
-        Change of the area at the last halving of the cells (m2); the area itself is about three times better.
+        Change of the area at the last refinement (m2), about three times its error.
     missed : float
-        Share of configurations sampled over (th2, u) whose P lies outside by more than a cell: zero on a grid fine enough.
+        Share of configurations sampled over (th2, u) whose P lies outside by more than a cell: zero on a fine enough grid.
     cells : int
         Cells across the area in the last grid.
     converged : bool
-        Whether ``error`` and ``missed`` are as small as was asked.
+        Whether ``error`` and ``missed`` are within their tolerances.
     """
 
     outer: tuple[NDArray[np.float64], ...]
@@ -102,7 +101,7 @@ class AccessibleArea:
     converged: bool
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points (m), each of shape (k,), lie inside the boundaries."""
+        """Return whether points with coordinates x and y (m), of shape (k,), lie inside the boundaries."""
         x, y = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
         inside = np.zeros(x.shape, dtype=bool)
         for ring in (*self.outer, *self.holes):
@@ -113,7 +112,7 @@ class AccessibleArea:
 @takes_published()
 @in_si(slider_position="m")
 def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int = 720) -> CouplerCurve:
-    """Path of P over a turn of the crank with the slider held.
+    """Return the path of P over a turn of the crank with the slider held.
 
     Parameters
     ----------
@@ -122,7 +121,7 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
     slider_position : float
         m.
     n : int
-        Points of each arc less one. Along an open arc they crowd towards its ends, where P moves as the square root.
+        Intervals of each arc. In an open arc they shorten towards the ends, where P varies as the square root.
 
     Raises
     ------
@@ -133,9 +132,9 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
     if not isfinite(slider_position):
         raise InputError(f"slider position is {slider_position}: it must be a finite number of m")
     if n < 2:
-        raise InputError(f"a coupler curve of {n} pieces: it needs at least 2")
+        raise InputError(f"n is {n}: a coupler curve needs at least 2 intervals")
     p = parameters.constants()
-    spans = joined_spans(slider_position, p)
+    spans = assembly_ranges(slider_position, p)
     closed = len(spans) == 1 and spans[0][1] - spans[0][0] >= 2.0 * pi
     arcs = []
     for start, end in spans:
@@ -152,22 +151,22 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
 @takes_published()
 @in_si(slider_positions="m")
 def coupler_curves(parameters: FiveBarParameters, slider_positions: Amount, n: int = 720) -> tuple[CouplerCurve, ...]:
-    """The family of coupler curves at several slider positions (m); see `coupler_curve`."""
+    """Return the family of coupler curves at several slider positions (m); see `coupler_curve`."""
     return tuple(coupler_curve(parameters, float(u), n) for u in slider_positions)
 
 
-def joined_spans(u: float, p: Constants) -> list[tuple[float, float]]:
-    """Crank angles between which the links can be joined at slider position u: (start, end) in rad, end > start.
+def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
+    """Return the ranges of crank angles (rad), end > start, in which the links can be joined at slider position u.
 
-    With e = |AD|, BD^2 = e^2 + l2^2 - 2 l2 e cos(th2 - phi) must lie between (l3 - l4)^2 and (l3 + l4)^2. Seen from the
-    direction phi of D the limits are symmetric.
+    With e = |AD|, BD^2 = e^2 + l2^2 - 2 l2 e cos(th2 - phi) must lie between (l3 - l4)^2 and (l3 + l4)^2. The limits are
+    symmetric about the direction phi of D.
     """
     dx, dy = p.l1 + u * p.ca, u * p.sa
     e = hypot(dx, dy)
     phi = atan2(dy, dx)
 
     def angle(distance: float) -> float:
-        """|th2 - phi| at which BD has that length; 0 if it is always longer, pi if always shorter."""
+        """Return |th2 - phi| at which BD has that length, 0 if BD is always longer, pi if it is always shorter."""
         if e == 0.0:
             return 0.0 if p.l2 > distance else pi
         return acos(min(1.0, max(-1.0, (e * e + p.l2 * p.l2 - distance * distance) / (2.0 * e * p.l2))))
@@ -187,7 +186,7 @@ def joined_spans(u: float, p: Constants) -> list[tuple[float, float]]:
 
 
 def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[float, float]:
-    """P at a configuration, which at the limit of assembly gives way towards the middle of its span by rounding errors."""
+    """Return P at a crank angle, moved towards the middle of its range if rounding puts it beyond a limit of assembly."""
     share = 1e-16
     angle = th2
     while True:
@@ -203,7 +202,7 @@ def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[f
 @takes_published()
 @in_si(slider_range="m", x="m", y="m")
 def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y: Amount) -> NDArray[np.bool_]:
-    """Whether P can be at points with the slider in its range, in closed form.
+    """Return whether P can reach given points with the slider in a range, in closed form.
 
     Parameters
     ----------
@@ -215,12 +214,12 @@ def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y
     Returns
     -------
     ndarray of bool
-        All False where P is the crank pin B itself: it then has a circle to move on and no area.
+        All False if P is the crank pin B, whose path is a circle.
     """
     p = parameters.constants()
     low, high = slider_range
     r = hypot(p.xp, p.yp)
-    # points as complex numbers, directions as complex numbers of length one
+    # complex numbers are points, those of length one directions
     q = np.asarray(x, float) + 1j * np.asarray(y, float)
     result = np.zeros(q.shape, dtype=bool)
     if r == 0.0:
@@ -257,18 +256,18 @@ def accessible_area(
     tolerance: float = 1e-4,
     finest: int = FINEST,
 ) -> AccessibleArea:
-    """The area that the coupler point P reaches as crank and slider move independently.
+    """Return the area that the coupler point P reaches as crank and slider move independently.
 
     Parameters
     ----------
     parameters : FiveBarParameters
-        Any, assembled everywhere, in part or nowhere; ``assembly_branch`` chooses the assembly.
+        Any linkage, even one whose crank cannot turn fully; ``assembly_branch`` chooses the assembly.
     slider_range : (float, float)
         Least and greatest slider position (m).
     tolerance : float
-        Change of the area, relative to it, at which the halving of the cells stops.
+        Relative change of the area at which refinement stops.
     finest : int
-        Cells across the area at which it stops in any case.
+        Cells across the area at which refinement stops in any case.
 
     Raises
     ------
@@ -308,7 +307,7 @@ def accessible_area(
 
 
 def _sampled(parameters: FiveBarParameters, low: float, high: float) -> NDArray[np.float64]:
-    """P at configurations spread over crank angle and slider position, shape (k, 2)."""
+    """Return P at configurations spread over crank angle and slider position, shape (k, 2)."""
     curves = coupler_curves(parameters, np.linspace(low, high, 33).tolist(), n=120)
     arcs = [np.column_stack([arc.x, arc.y]) for curve in curves for arc in curve.arcs]
     return np.concatenate(arcs) if arcs else np.empty((0, 2))
@@ -317,12 +316,12 @@ def _sampled(parameters: FiveBarParameters, low: float, high: float) -> NDArray[
 def _trace(
     parameters: FiveBarParameters, slider_range: tuple[float, float], sample: NDArray[np.float64], cells: int
 ) -> tuple[list[NDArray[np.float64]], float]:
-    """Boundaries on a grid with that many cells across, and the share of the sample that no cell of the area holds."""
+    """Return the boundaries on a grid with that many cells across, and the share of the sample outside of them."""
     least, most = sample.min(axis=0), sample.max(axis=0)
     size = float((most - least).max()) / cells
     margin = 0.02
     while True:
-        # an odd offset, so that a symmetric mechanism does not put its axis on a row of points
+        # the odd offset keeps the axis of a symmetric mechanism off the rows of points
         origin = least - margin * (most - least) - 2.37 * size
         count = np.ceil((most + margin * (most - least) + 2.37 * size - origin) / size).astype(int) + 1
         xs = origin[0] + size * np.arange(count[0])
@@ -343,9 +342,9 @@ def _rings(
     xs: NDArray[np.float64],
     ys: NDArray[np.float64],
 ) -> list[NDArray[np.float64]]:
-    """Closed boundaries of the grid's inside, each vertex bisected onto the boundary along its edge of the grid."""
+    """Return the closed boundaries, their vertices located on the edges of the grid by bisection."""
     heights = inside.astype(float)
-    # where two corners across a cell are inside, its centre says whether they belong together: the contour takes the mean
+    # if two diagonal corners of a cell are inside, its centre decides whether they connect: the contour uses their mean
     lower, upper = inside[:-1], inside[1:]
     across = (lower[:, :-1] == upper[:, 1:]) & (lower[:, 1:] == upper[:, :-1]) & (lower[:, :-1] != lower[:, 1:])
     j, i = np.nonzero(across)
@@ -355,7 +354,7 @@ def _rings(
         corner = j + k // 2, i + k % 2
         own = inside[corner] == joined
         np.add.at(heights, tuple(place[own] for place in corner), np.where(joined[own], 0.5, -0.5))
-    # on an edge of the grid one of the two numbers of a place is whole, but for rounding
+    # a vertex lies on an edge of the grid: one of its two indices is a whole number up to rounding
     contours: Sequence[Any] = contour_generator(z=heights).lines(0.5)
     lines = [np.round(line, 6)[:-1] for line in contours]
     if not lines:
@@ -373,7 +372,7 @@ def _crossings(
     ys: NDArray[np.float64],
     between: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Where the area ends between two neighbours of the grid, in whose numbers ``between`` has places; shape (k, 2)."""
+    """Return the points of the boundary between neighbours of the grid; ``between`` has fractional indices, (k, 2)."""
     (i, j), (far_i, far_j) = np.floor(between).astype(int).T, np.ceil(between).astype(int).T
     first = np.column_stack([xs[i], ys[j]])
     second = np.column_stack([xs[far_i], ys[far_j]])
@@ -387,6 +386,6 @@ def _crossings(
 
 
 def _signed_area(ring: NDArray[np.float64]) -> float:
-    """Area within a closed ring (m2), negative if it runs clockwise; taken about its first point."""
+    """Return the area within a closed ring (m2), negative if the ring runs clockwise."""
     x, y = (ring - ring[0]).T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))

@@ -15,9 +15,10 @@ from matplotlib.text import Text
 from analysis import cli, figures
 from analysis.cli import slider_crank
 from analysis.run import save_parameters
-from analysis.slider_crank import ConstantShift, comparison, force_turn
+from analysis.slider_crank import ConstantShift, dual_dynamics, force_turn
+from analysis.units import INCH
 from linkwork.five_bar.published import TABLE_3_1
-from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, parameters
 from tests import published_rahman as rahman
 
 from .conftest import csv
@@ -336,13 +337,13 @@ class TestDual:
         assert max(float(closed[1]), float(closed[2])) < 1e-12
 
     def test_a_disagreement_is_a_failed_check(self, linkwork, monkeypatch):
-        right = comparison.joint_loads
+        right = dual_dynamics.joint_loads
 
         def wrong(*arguments, **options):
             loads = right(*arguments, **options)
             return replace(loads, slider_pin=1.000001 * loads.slider_pin)
 
-        monkeypatch.setattr(comparison, "joint_loads", wrong)
+        monkeypatch.setattr(dual_dynamics, "joint_loads", wrong)
         result = linkwork("dual", "--points", 37)
         assert result.exit_code == cli.CHECK_FAILED
         assert rows(result.output)["force of the slider on the rod"][-1] == "FAIL"

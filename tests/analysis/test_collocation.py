@@ -11,7 +11,7 @@ import pytest
 from analysis import find_orbit
 from analysis.periodic import Drive, orbit_of
 from analysis.periodic.chart.grid import largest_multipliers
-from analysis.periodic.motion.discretisation import PeriodPath, pieces_from
+from analysis.periodic.motion.discretisation import Discretisation, collocation_serves
 from analysis.periodic.motion.variables import Family
 from linkwork.five_bar.published import SETS
 
@@ -22,16 +22,17 @@ def test_a_neighbour_followed_by_collocation_is_the_integrator_s() -> None:
     """Ends, their derivatives by the beginnings and by the speed, from one speed to the next, in two pieces."""
     family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
     angles = np.array([0.0, pi, 2.0 * pi])
-    path = PeriodPath(angles, True)
+    path = Discretisation(angles, True)
     used = 0
     for speed in np.linspace(30.0, 31.0, 6):
         parameters, drive = family.at(float(speed))
         orbit = orbit_of(parameters, drive)
-        starts = np.vstack([orbit.start, pieces_from(parameters, drive, angles[:2], orbit.start[None, :])[0]])
+        point = orbit.point
+        starts = np.vstack([orbit.start, point.shoot(angles[:2], orbit.start[None, :]).y])
         direction = family.direction(float(speed), 30.0, 31.0)
-        found = path.follow(parameters, drive, starts, float(speed), direction, 1.0)
+        found = path.ends(point, starts, float(speed), direction, 1.0)
         used += found.clearance is not None
-        ends, matrices, slopes = pieces_from(parameters, drive, angles, starts, direction, 1.0)
+        ends, matrices, slopes, _ = point.shoot(angles, starts, direction, 1.0)
         scale = np.abs(matrices).max(axis=(0, 1))
         assert found.y == pytest.approx(ends, abs=1e-9)
         assert np.abs(found.matrices - matrices).max() < 1e-8 * scale.max()
@@ -42,20 +43,18 @@ def test_a_neighbour_followed_by_collocation_is_the_integrator_s() -> None:
 def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() -> None:
     orbit = find_orbit(SMOOTH, speed=30.0)
     family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
-    path = PeriodPath(np.array([0.0, 2.0 * pi]), True)
+    path = Discretisation(np.array([0.0, 2.0 * pi]), True)
     direction = family.direction(30.0, 30.0, 31.0)
-    found = path.follow(orbit.parameters, orbit.drive, orbit.start[None, :], 30.0, direction, 1.0)
+    found = path.ends(orbit.point, orbit.start[None, :], 30.0, direction, 1.0)
     assert found.clearance == pytest.approx(orbit.clearance(), rel=1e-2)
 
 
-def test_friction_is_left_to_the_integrator() -> None:
-    """The kink of Coulomb friction has no polynomial."""
-    rough = replace(SMOOTH, slider_coulomb_friction=0.2)
-    family = Family(parameters=rough, drive=Drive(speed=30.0))
-    orbit = orbit_of(rough, Drive(speed=30.0))
-    path = PeriodPath(np.array([0.0, 2.0 * pi]), False)
-    direction = family.direction(30.0, 30.0, 31.0)
-    assert path.follow(rough, orbit.drive, orbit.start[None, :], 30.0, direction, 1.0).clearance is None
+def test_friction_and_torques_are_left_to_the_integrator() -> None:
+    """The kink of Coulomb friction has no polynomial; under a torque the crank's rate is unknown too."""
+    rough, drive = replace(SMOOTH, slider_coulomb_friction=0.2), Drive(speed=30.0)
+    assert collocation_serves([drive], [SMOOTH])
+    assert not collocation_serves([drive], [SMOOTH, rough])
+    assert not collocation_serves([drive, Drive(torque=1.0)], [SMOOTH])
 
 
 def test_a_row_by_collocation_is_its_orbits_one_by_one() -> None:

@@ -11,9 +11,10 @@ import pytest
 from analysis import Inputs, find_orbit, simulate, simulate_many
 from analysis.periodic import Drive, OrbitError, Stability
 from analysis.periodic.chart.grid import largest_multipliers
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.limits import JAMMING
 from tests.strategies import PINS
 

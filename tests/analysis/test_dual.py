@@ -26,7 +26,7 @@ from analysis.numerics.dual import (
     variables,
 )
 from analysis.numerics.tracing import rebound
-from analysis.slider_crank.shifts import on_arrays
+from analysis.slider_crank.shifts import plant_functions
 from linkwork import friction
 from linkwork.slider_crank import dynamics, kinematics, vectors
 from tests.slider_cranks import DRIVES, seeded
@@ -278,10 +278,10 @@ def test_the_plant_differentiated_through_tracing(seed: int) -> None:
         return [q.s4, k.kth, k.ks, motion.torque, motion.crank_acceleration, motion.force, *reactions.guide]
 
     x = [*case.state[:4], *(getattr(case.p, name) for name in names)]
-    exact = outputs(on_arrays(), variables(*x))
+    exact = outputs(plant_functions(), variables(*x))
     complex_step = np.array(
         [
-            [np.imag(y) / 1e-30 for y in outputs(on_arrays(), [v + 1e-30j * (j == i) for j, v in enumerate(x)])]
+            [np.imag(y) / 1e-30 for y in outputs(plant_functions(), [v + 1e-30j * (j == i) for j, v in enumerate(x)])]
             for i in range(len(x))
         ]
     )
@@ -297,8 +297,8 @@ def test_the_plant_differentiated_through_tracing(seed: int) -> None:
 def test_every_drive_of_the_plant_takes_dual_numbers() -> None:
     case = seeded(3)
     for drive in DRIVES:
-        x = on_arrays().grooved((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
-        rate = on_arrays().derivative(x, case.inputs(drive), case.p)
+        x = plant_functions().grooved((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
+        rate = plant_functions().derivative(x, case.inputs(drive), case.p)
         h = 1e-6
 
         def at(angle: float, drive: str = drive) -> np.ndarray:

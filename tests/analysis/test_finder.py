@@ -10,8 +10,9 @@ import pytest
 
 from analysis import find_orbit, find_orbits
 from analysis.periodic import Drive, OrbitError, Stability, confirm, orbit_of, sweep
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 RIG_1_B = SETS["rig-1-spring-b"].parameters
 TABLE_3_1 = SETS["table-3.1"].parameters

@@ -38,12 +38,13 @@ from analysis.periodic import (
     orbit_of,
     special_gradient,
 )
-from analysis.periodic.motion.discretisation import period_from, pieces_from
+from analysis.periodic.motion.discretisation import operating_point, period_from
 from analysis.periodic.motion.drive import scale_of
 from analysis.periodic.motion.variables import unit_of, value_of, with_values
 from analysis.periodic.stability import sensitivity as gradients
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.slider_crank import published as rahman
 from tests.mechanisms import rotor_on_cart
 from tests.strategies import seeded
@@ -374,7 +375,7 @@ def in_pieces(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
     angles, starts = orbit.stations.angles, orbit.stations.starts.copy()
     k, n = starts.shape
     for _ in range(6):
-        ends, matrices, _ = pieces_from(parameters, drive, angles, starts)
+        ends, matrices, *_ = operating_point(parameters, drive).shoot(angles, starts)
         jacobian = np.zeros((k, n, k, n))
         for piece in range(k):
             jacobian[piece, :, piece] = matrices[piece]

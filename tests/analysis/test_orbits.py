@@ -21,10 +21,11 @@ from analysis.periodic import (
     largest_multipliers,
     orbit_of,
 )
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState, without_friction
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 from tests import published
 
 SPEED = SETS["table-3.1"].crank_speed

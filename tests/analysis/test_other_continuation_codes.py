@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.periodic import Drive, Family, SpecialPoint, follow, orbit_of, switch
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from analysis.units import RAD_S_PER_RPM
+from linkwork.five_bar.published import SETS
 from tests.mechanisms import torsion
 from tests.oracles import continued
 from tests.published import CONTINUED

@@ -16,6 +16,7 @@ from matplotlib.text import Annotation
 from analysis import figures
 from analysis.figures import Curve, HeatMap, Panel, Picture, html
 from analysis.figures.curves import Arrow, Label, Shade
+from analysis.libraries import MissingLibraryError
 from analysis.periodic import Basins, Crossing, Response, Risk
 
 from .periodic_branches import branch, hysteresis, response
@@ -226,8 +227,8 @@ def test_page_has_all_that_a_panel_may_have() -> None:
 
 
 def test_without_plotly_there_is_a_sentence(folded: Response, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(html, "find_spec", lambda name: None)
-    with pytest.raises(figures.PlotlyMissingError, match=r"pip install 'linkwork\[html\]'"):
+    monkeypatch.setattr("analysis.libraries.find_spec", lambda name: None)
+    with pytest.raises(MissingLibraryError, match="pip install 'plotly"):
         figures.to_html(folded)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.numerics.dual import Dual
 from analysis.slider_crank import close, joint_loads, rates
-from analysis.slider_crank.two_rotations import chain, equations, planar, settle
+from analysis.slider_crank.closure import chain, equations, planar, settle
 from analysis.studies.rahman import method, printed
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 from tests.published_rahman import CRANK_IN, INCH, MASSES_LB_S2_IN, POUND_FORCE, ROD_IN, TORQUE_LB_IN
@@ -46,7 +46,7 @@ SHOWN = (
     [row if row[1] == "rahman-forces" else pytest.param(*row, marks=pytest.mark.slow) for row in SHOWN],
 )
 def test_what_fails_by_an_erratum(erratum: str, study: str, statement: str, size: float) -> None:
-    (verdict,) = (v for v in result(study).verdicts if v.statement.startswith(statement) and v.source == "text")
+    (verdict,) = (v for v in result(study).verdicts if v.statement.startswith(statement) and v.source.kind == "text")
     assert not verdict.holds
     assert verdict.why.startswith(f"erratum {erratum}")
     assert verdict.computed == pytest.approx(abs(size), rel=4e-4)

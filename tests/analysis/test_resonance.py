@@ -26,9 +26,10 @@ from analysis.periodic import (
     sweep,
 )
 from analysis.periodic.response import frequency as resonance
+from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import approximations
 from linkwork.errors import AssemblyError, InputError, ParameterError
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.five_bar.published import SETS, TABLE_3_1
 from tests.published import LOCAL_MAXIMUM_RPM, MINIMUM_RPM
 
 RPM = RAD_S_PER_RPM

@@ -423,7 +423,7 @@ def test_a_browser_is_opened_where_there_is_a_screen(
 def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str, everywhere: bool) -> None:
     from fmpy import simulate_fmu
 
-    pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
+    pytest.importorskip("ziglang", reason="there is no Zig here: pip install ziglang")
     state = opening_state()
     state["values"] = state["values"] | {"crank.length": 0.047, "drive.speed": 31.0, "initial.crank_angle": 0.4}
     heard: set[str] = set()
@@ -452,7 +452,7 @@ def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str, ev
 @pytest.mark.slow
 @pytest.mark.fmu
 def test_the_fmu_runs_with_the_motor_of_the_page() -> None:
-    pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
+    pytest.importorskip("ziglang", reason="there is no Zig here: pip install ziglang")
     motor = {"breakdown_torque": 3.0, "breakdown_slip": 0.2, "synchronous_speed": 40.0}
     state = opening_state() | {"duration": 0.2}
     state["values"] = state["values"] | {"drive.mode": 0.0, "initial.crank_speed": 35.0}
@@ -716,7 +716,7 @@ def test_a_job_of_another_tab_is_followed_and_cancelled(browser: Browser, page: 
 
 @pytest.mark.slow
 def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -> None:
-    pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
+    pytest.importorskip("ziglang", reason="there is no Zig here: pip install ziglang")
     _part(page, "The FMU")
     page.click("text=Run it beside the page")
     page.wait_for_selector("#python [data-relative]")
@@ -731,7 +731,7 @@ def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -
 
 @pytest.mark.slow
 def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> None:
-    # a resonance of rig 2 with spring C lies in the range; a stiffer spring leads it to the upper end
+    # a resonance of rig 2 with spring C lies in the range; a stiffer spring leads it 2 % above the upper end
     state = state_of(case_from({"published": "rig-2-spring-c"}, folder=Path()))
     page.evaluate("state => window.studio.restore(state)", state)
     _part(page, "A range of speeds")
@@ -747,7 +747,7 @@ def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> Non
     _wait(page, "window.studio.state.title.endsWith('tuned')")
     # as a search for the stiffness at which the maximum is there finds it, in the tests of the tuning
     assert before == 4000.0
-    assert 4100.0 < _values(page)["slider.stiffness"] < 4300.0
+    assert 4200.0 < _values(page)["slider.stiffness"] < 4400.0
     changed = {name for name, value in _values(page).items() if value != state["values"][name]}
     assert changed == {"slider.stiffness"}
 

@@ -36,17 +36,12 @@ from analysis.run import Event, compiled, prepared
 from analysis.run.inputs import encode
 from analysis.run.sampling import sample
 from analysis.run.simulation import SCIPY_METHODS
+from analysis.units import CM_PER_METRE
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.published import (
-    CM_PER_METRE,
-    DYN_CM_PER_NEWTON_METRE,
-    DYN_PER_NEWTON,
-    SETS,
-    TABLE_3_1,
-)
+from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, DYN_PER_NEWTON, SETS, TABLE_3_1
 from linkwork.limits import LIMIT_SINE
 from tests import published
 from tests.fmu.runner import run_in_process

@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from analysis.numerics.dual import Dual, about_i, about_j, about_k
 from analysis.slider_crank import ClosureError, close, follow, shortage
 from analysis.slider_crank import closure as C
-from analysis.slider_crank.closure import estimate, loop, residuals
+from analysis.slider_crank.closure import planar_loops, residuals
+from analysis.units import INCH
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH, parameters
+from linkwork.slider_crank.published import parameters
 from tests.published_rahman import GREATEST_SHIFTS_IN, OFFSETS_IN, SHIFTS_IN, TWISTS_DEG
 from tests.slider_cranks import Case, cases
 
@@ -93,11 +94,11 @@ def test_continuation_turns_the_rod_without_spin() -> None:
 def test_the_estimate_is_the_closed_loop_of_the_planar_mechanism() -> None:
     p = parameters(20.0)
     th = TURN[:-1]
-    assert np.max(residuals(loop(p, th, 0.0 * th, *estimate(p, th, 0.0 * th)))) < 1e-14
+    assert np.max(residuals(planar_loops(p, th, 0.0 * th).product)) < 1e-14
     # section 2.6.2: with a1 cos th + a4 across, the planar slider is at a1 sin th + sqrt(a2^2 - across^2)
     across = p.crank_length * np.cos(th) + p.guide_offset
     planar = p.crank_length * np.sin(th) + np.sqrt(p.rod_length**2 - across**2)
-    np.testing.assert_allclose(estimate(p, th, 0.0 * th)[2], planar, atol=1e-14)
+    np.testing.assert_allclose(planar_loops(p, th, 0.0 * th).slider_position, planar, atol=1e-14)
     assert close(p, th, 0.0).iterations == 1
 
 
@@ -114,12 +115,17 @@ def test_newtons_method_converges_quadratically_from_open_loops(monkeypatch: pyt
         errors.append(float(max(rotation.max(), distance.max() / p.rod_length)))
         return rotation, distance
 
-    def disturbed(p: SliderCrankParameters, th: np.ndarray, s1: np.ndarray) -> tuple[np.ndarray, ...]:
-        crank_ball, slider_ball, s4 = estimate(p, th, s1)
-        return crank_ball @ about_k(0.3).real @ about_i(0.2).real, about_j(-0.3).real @ slider_ball, s4 * 1.1
+    def disturbed(p: SliderCrankParameters, th: np.ndarray, s1: np.ndarray) -> C.Loops:
+        start = planar_loops(p, th, s1)
+        return replace(
+            start,
+            crank_ball=start.crank_ball @ about_k(0.3).real @ about_i(0.2).real,
+            slider_ball=about_j(-0.3).real @ start.slider_ball,
+            slider_position=1.1 * start.slider_position,
+        )
 
     monkeypatch.setattr(C, "residuals", recorded)
-    monkeypatch.setattr(C, "estimate", disturbed)
+    monkeypatch.setattr(C, "planar_loops", disturbed)
     found = close(p, 0.7, 9.0 * INCH)
     assert found.slider_position[0] == pytest.approx(
         kinematics.position(0.7, 9.0 * INCH, p.constants()).s4, rel=0.0, abs=1e-13

@@ -30,7 +30,6 @@ from analysis.periodic import (
     orbit_test,
     plane,
     removing_damping,
-    removing_damping_over,
 )
 from analysis.periodic.chart import grid as grids
 from analysis.periodic.motion import kernels as orbit_kernels
@@ -117,9 +116,8 @@ def test_a_small_margin_is_given_more_turns() -> None:
 # Lines
 
 
-@pytest.mark.parametrize("width", [0.3, 1e-3, 1e-6])
-def test_scan_finds_both_sides_of_a_region_however_narrow(width: float) -> None:
-    centre = 0.4137
+@pytest.mark.parametrize(("centre", "width"), [(0.4137, 0.3), (0.4137, 1e-3), (0.4137, 1e-6), (0.003, 2e-4)])
+def test_scan_finds_both_sides_of_a_region_however_narrow(centre: float, width: float) -> None:
     line = scan(lambda x: (x - centre) ** 2 - (0.5 * width) ** 2, 0.0, 1.0, samples=30)
     assert line.roots == pytest.approx([centre - 0.5 * width, centre + 0.5 * width], abs=1e-10)
     assert np.array(line.intervals) == pytest.approx(np.array([(line.roots[0], line.roots[1])]))
@@ -144,11 +142,6 @@ def test_a_gap_between_the_samples_is_reported() -> None:
     assert any("just before: no value here" in message for _, message in line.gaps)
     assert line.intervals == (pytest.approx((0.6, 1.0)),)
     assert len(line.roots) == 0
-
-
-def test_scan_finds_a_narrow_region_beside_its_ends() -> None:
-    line = scan(lambda x: (x - 0.003) ** 2 - 1e-8, 0.0, 1.0, samples=30)
-    assert line.roots == pytest.approx([0.0029, 0.0031], abs=1e-10)
 
 
 def test_scan_from_inside_a_region_and_narrow_stable_strips() -> None:
@@ -270,7 +263,6 @@ def test_chart_finds_every_boundary_once() -> None:
     assert len(found.boundaries) == 3
     assert sorted(boundary.closed for boundary in found.boundaries) == [False, True, True]
     assert found.gaps == ()
-    assert chart(test, UNIT, lines=(0, 0), seeds=[(0.4, 0.5)]).boundaries[0].closed
 
 
 # Charts of equations and mechanisms
@@ -359,13 +351,16 @@ def test_removing_damping_is_where_hills_boundaries_meet() -> None:
 def test_removing_damping_of_the_first_region() -> None:
     """Up to I4 = 1.5: 0.167 1/s, and not the thesis's 0.45."""
 
-    def test(x: float, omega_c: float, inertia_ratio: float) -> float:
-        return orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
+    def removing(inertia_ratio: float) -> float:
+        def test(x: float, omega_c: float) -> float:
+            return orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
 
-    worst = removing_damping_over(test, lambda _: (0.26, 0.285), (0.0, 0.5), (1.1, 1.5), samples=3, tolerance=1e-5)
-    assert worst.damping == pytest.approx(REMOVING_DAMPING, abs=5e-4)
-    assert worst.other == 1.5
-    assert REMOVING_DAMPING_READ_OFF / worst.damping > 2.5
+        return removing_damping(test, (0.26, 0.285), (0.0, 0.5), tolerance=1e-5).damping
+
+    worst = removing(1.5)
+    assert worst == pytest.approx(REMOVING_DAMPING, abs=5e-4)
+    assert removing(1.1) < removing(1.3) < worst
+    assert REMOVING_DAMPING_READ_OFF / worst > 2.5
     assert pytest.approx(REMOVING_DAMPING_THESIS, rel=0.03) == REMOVING_DAMPING_READ_OFF
 
 
@@ -454,14 +449,8 @@ def test_rows_of_other_code_are_not_taken(tmp_path: Path, monkeypatch: pytest.Mo
     else:
         # whatever module of the package it is in
         read = Path.read_text
-        monkeypatch.setattr(Path, "read_text", lambda p, **how: read(p, **how) + "# changed" * (p.name == "starts.py"))
+        monkeypatch.setattr(Path, "read_text", lambda p, **how: read(p, **how) + "# changed" * (p.name == "drive.py"))
     assert (computed(), computed()) == (2, 0)
-
-
-def test_grid_in_processes(tmp_path: Path) -> None:
-    apart = grid(first_region_plane(), XS, YS, folder=tmp_path / "apart", n_jobs=2)
-    here = grid(first_region_plane(), XS, YS, folder=tmp_path / "here")
-    assert (apart.largest == here.largest).all()
 
 
 def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> None:

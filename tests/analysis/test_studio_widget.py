@@ -15,7 +15,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from .test_studio import in_browser
 
-pytest.importorskip("anywidget", reason="anywidget is not installed: pip install 'linkwork[notebook]'")
+pytest.importorskip("anywidget", reason="anywidget is not installed")
 from analysis.studio import widget as widget_module
 from analysis.studio.widget import Widget
 

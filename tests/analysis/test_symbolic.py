@@ -18,46 +18,19 @@ casadi = pytest.importorskip("casadi")
 
 
 @cache
-def functions() -> dict[str, Any]:
-    """CasADi functions of state, inputs and constants."""
-    plant = traced(FIVE_BAR)
+def jacobian() -> Any:
+    """CasADi's derivative of the accelerations with respect to the state, of state, inputs and constants."""
     x, u = casadi.SX.sym("x", 6), casadi.SX.sym("u", 6)
     p, k = constants(FIVE_BAR)
-    state, inputs = tuple(casadi.vertsplit(x)), dynamics.Inputs(*casadi.vertsplit(u))
-    derivative = casadi.vertcat(*plant.derivative(state, inputs, k))
-    outputs = casadi.vertcat(*plant.outputs(state, inputs, 0.25, k))
-    jumped = casadi.vertcat(*plant.jump_speed(state, u[0], k))
-    jacobian = casadi.densify(casadi.jacobian(derivative, x))
-    return {
-        "derivative": casadi.Function("derivative", [x, u, p], [derivative]),
-        "outputs": casadi.Function("outputs", [x, u, p], [outputs]),
-        "jump": casadi.Function("jump", [x, u, p], [jumped]),
-        "jacobian": casadi.Function("jacobian", [x, u, p], [jacobian]),
-    }
-
-
-def numbers(function: str, *arguments: Any) -> np.ndarray:
-    return np.asarray(functions()[function](*(casadi.DM(list(a)) for a in arguments))).squeeze()
-
-
-@pytest.mark.parametrize("seed", range(25))
-def test_traced_functions_have_the_values_of_the_plain_ones(seed: int) -> None:
-    case = seeded(seed)
-    p = case.parameters.constants()
-    for inputs in (case.torque_inputs, case.speed_inputs):
-        plain = dynamics.derivative(case.state, inputs, p)
-        assert numbers("derivative", case.state, inputs, p) == pytest.approx(plain, rel=1e-11)
-        outputs = dynamics.outputs(case.state, inputs, 0.25, p)
-        assert numbers("outputs", case.state, inputs, p) == pytest.approx(outputs, rel=1e-11, abs=1e-13)
-        jumped = dynamics.jump_speed(case.state, inputs[0], p)
-        assert numbers("jump", case.state, inputs, p) == pytest.approx(jumped, rel=1e-11)
+    derivative = traced(FIVE_BAR).derivative(tuple(casadi.vertsplit(x)), dynamics.Inputs(*casadi.vertsplit(u)), k)
+    return casadi.Function("jacobian", [x, u, p], [casadi.densify(casadi.jacobian(casadi.vertcat(*derivative), x))])
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_jacobian_is_that_of_differences(seed: int) -> None:
     case = seeded(seed)
     p = case.parameters.constants()
-    exact = numbers("jacobian", case.state, case.torque_inputs, p)
+    exact = np.asarray(jacobian()(*(casadi.DM(list(a)) for a in (case.state, case.torque_inputs, p))))
     differences = np.empty((6, 6))
     for j, scale in enumerate((1e-5, 1e-6, 1e-3, 1e-6, 1.0, 1.0)):
         sides = []
@@ -74,10 +47,3 @@ def test_nothing_of_the_plain_modules_is_changed() -> None:
     traced(FIVE_BAR)
     assert kinematics.sin.__module__ == friction.tanh.__module__ == "math"
     assert dynamics.position is kinematics.position
-
-
-def test_traced_function_becomes_c_code(tmp_path: Any) -> None:
-    generator = casadi.CodeGenerator("five_bar.c")
-    generator.add(functions()["derivative"])
-    generator.generate(f"{tmp_path}/")
-    assert "derivative" in (tmp_path / "five_bar.c").read_text(encoding="utf-8")

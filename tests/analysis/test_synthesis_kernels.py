@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics import symbolic
 from analysis.run import traced
-from analysis.synthesis.kernels import (
+from analysis.synthesis.linkage.kernels import (
     COLUMNS,
     PLACES,
     coupler_path,

@@ -14,8 +14,8 @@ from scipy.special import ellipe
 
 from analysis.files import read_points, write_csv
 from analysis.synthesis import TargetPath, distance_to, function_from_formula, path_from_formula
-from analysis.synthesis.formulas import formula
-from analysis.synthesis.targets import even_odd_area
+from analysis.synthesis.task.formula import formula
+from analysis.synthesis.task.target import even_odd_area
 from linkwork.errors import InputError, ParameterError, UnknownNameError
 
 T = np.linspace(0.0, 2.0 * pi, 400, endpoint=False)
@@ -256,7 +256,7 @@ def test_natural_smoothing_is_scipys() -> None:
     """At equal chord lengths and a given lambda both minimise the same integral."""
     from scipy.interpolate import make_smoothing_spline
 
-    from analysis.synthesis.targets import _bending
+    from analysis.synthesis.task.target import _bending
 
     rng = np.random.default_rng(5)
     u = np.cumsum(rng.uniform(0.5, 1.5, 25))
@@ -268,7 +268,7 @@ def test_natural_smoothing_is_scipys() -> None:
 def test_periodic_bending_is_the_integral_over_the_spline() -> None:
     from scipy.interpolate import CubicSpline
 
-    from analysis.synthesis.targets import _bending
+    from analysis.synthesis.task.target import _bending
 
     rng = np.random.default_rng(6)
     u = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 12))])

@@ -11,8 +11,9 @@ from scipy.optimize import least_squares
 
 from analysis.numerics.dual import skew
 from analysis.slider_crank import close, settle
-from analysis.slider_crank.two_rotations import chain, freedoms, planar
-from linkwork.slider_crank.published import INCH, parameters
+from analysis.slider_crank.closure import chain, freedoms, planar
+from analysis.units import INCH
+from linkwork.slider_crank.published import parameters
 from tests.published_rahman import GREATEST_SHIFTS_IN, OFFSETS_IN
 
 TURN = np.radians(np.arange(0.0, 360.0, 10.0))

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+from analysis.units import RAD_S_PER_RPM
+from linkwork.five_bar.published import SETS
 
 from . import multipliers
 

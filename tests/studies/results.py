@@ -29,9 +29,9 @@ def result(number: str) -> StudyResult:
     return studies.load(number).compute()
 
 
-def computed(number: str, statement: str, source: str = OURS) -> float:
+def computed(number: str, statement: str, source: str = OURS.kind) -> float:
     """The computed value beside a statement."""
-    (verdict,) = (v for v in result(number).verdicts if v.statement == statement and v.source == source)
+    (verdict,) = (v for v in result(number).verdicts if v.statement == statement and v.source.kind == source)
     return verdict.computed
 
 
@@ -62,8 +62,8 @@ def check_verdicts(number: str) -> None:
     assert all(v.why for v in unjudged)
     failed = [v for v in verdicts if not v.holds and v not in unjudged]
     assert {v.statement for v in failed} == stated("refuted", number)
-    assert all(v.source in (TEXT, LISTING) for v in (*failed, *unjudged))
-    assert all(v.source in (TEXT, LISTING, OURS) for v in verdicts)
+    assert all(v.source.kind in (TEXT, LISTING) for v in (*failed, *unjudged))
+    assert all(v.source == OURS or v.source.kind in (TEXT, LISTING) for v in verdicts)
     assert all(np.isfinite(v.computed) for v in verdicts if v not in unjudged)
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from analysis.studies.youssef.chapter_6 import pairing_area
 from analysis.studies.youssef.packaging import nineteen_points
+from analysis.studies.youssef.problems import PROBLEMS, packaging_path
 from analysis.studies.youssef.quality import both, linkages
 from analysis.synthesis import distance_to
-from analysis.synthesis.published import PROBLEMS, packaging_path
 
 from .results import check, every
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.studies.youssef import chapter_7 as series_1
+from analysis.studies.youssef.problems import PROBLEMS
 from analysis.studies.youssef.series_2 import (
     PATH,
     ROCKER,
@@ -21,7 +22,6 @@ from analysis.studies.youssef.series_2 import (
     slider,
 )
 from analysis.synthesis import Linkage, SliderMotion
-from analysis.synthesis.published import PROBLEMS
 from linkwork.five_bar import kinematics
 
 from .results import check, computed, every

@@ -43,8 +43,8 @@ def test_verdicts_plot_and_data(number: str) -> None:
 @every("R", "rahman-")
 def test_statements_have_a_place_and_are_unique(number: str) -> None:
     verdicts = result(number).verdicts
-    assert all((v.source == TEXT) == bool(v.place) for v in verdicts)
-    assert all(re.search(r"L\d", v.place) for v in verdicts if v.source == TEXT)
+    assert all((v.source.kind == TEXT) == bool(v.source.place) for v in verdicts)
+    assert all(re.search(r"L\d", v.source.place) for v in verdicts if v.source.kind == TEXT)
     assert len({v.statement for v in verdicts}) == len(verdicts)
 
 
@@ -290,7 +290,9 @@ class TestStatements:
         assert left_out == pytest.approx(stated, abs=0.5)
         number = CONSTANT if case in TWISTS else {"i": "R14", "j": "R16"}[axis]
         beginning = f"greatest magnitude of 1T1{axis}" + (", where" if case in TWISTS else " - (")
-        (verdict,) = (v for v in verdicts(number, beginning) if v.source == TEXT and v.statement.endswith(case.name))
+        (verdict,) = (
+            v for v in verdicts(number, beginning) if v.source.kind == TEXT and v.statement.endswith(case.name)
+        )
         assert verdict.computed == pytest.approx(left_out, rel=1e-5)
 
     @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -324,7 +326,7 @@ class TestStatements:
 
     def test_the_offset_raises_the_forces_with_the_load_given_and_not_with_the_torque_given(self) -> None:
         gains = [v for n in FIGURES for v in result(n).verdicts if "least gain" in v.statement]
-        load, torque = ([v for v in gains if v.source == source] for source in (OURS, TEXT))
+        load, torque = ([v for v in gains if v.source.kind == kind] for kind in (OURS.kind, TEXT))
         assert (len(load), len(torque)) == (10, 11)
         assert {v.statement.split()[3].rstrip(",") for v in torque if v.holds} == {"3F3j", "3F3k", "4F4i"}
         peaks = [np.abs(curve("R11", "1F1j", case)[clear(case)]).max() for case in (IDEAL, *OFFSETS)]

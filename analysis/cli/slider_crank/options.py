@@ -15,10 +15,11 @@ import numpy as np
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
+from linkwork.slider_crank.published import SETS
 
 from ... import slider_crank as sc
 from ...mechanisms import SLIDER_CRANK
+from ...units import RAD_S_PER_RPM
 from .. import common
 from ..common import PARAMETERS, changes, check_kind, handled, number_or_text, print_error, quantity
 

@@ -164,11 +164,11 @@ def _slopes(
     for name in exact.derivatives:
         si = sc.QUANTITIES[name]
         clear = turn.clear(poles=si in ("N", "N.m"))
-        effect = max(float(np.ma.abs(exact.of(name, t.name)).max()) * t.extent for t in allowed)
+        effect = max(float(np.ma.abs(exact.derivative(name, t.name)).max()) * t.extent for t in allowed)
         for t in allowed:
             below = sc.ERRORS[t.name]
             unit, scale = _ratio(units.name(si), units.name(below)), units.per(si) / units.per(below)
-            values = exact.of(name, t.name) * scale
+            values = exact.derivative(name, t.name) * scale
             columns[f"d {name} / d {t.name} [{unit}]"] = values.filled(np.nan)
             greatest = np.where(clear, np.ma.abs(values).filled(-1.0), -1.0)
             top = int(np.argmax(greatest))

@@ -1,4 +1,14 @@
-"""Boundaries of instability over two parameters: test functions, curves, branches on lines, damping that removes a region."""
+"""Boundaries of instability over two parameters: curves, test functions, and the damping that removes a region.
+
+A fold, a period doubling or a torus point of a branch moves along a curve when one more parameter is set free: the boundary of
+the speeds at which a machine jumps, say, over the damping. `follow_crossing` follows it by arclength in orbit and both
+parameters together, so that it continues through the cusp where two folds meet and vanish; `line_branches` finds the
+branches on a line of a chart, isolas among them, from which such curves begin.
+
+A test function of a point of a plane is negative in a region of instability and zero on its boundary, where a Floquet
+multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces where it is zero,
+`removing_damping` finds where a region ends.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import LinkworkError
 
 from ...numerics.boundaries import Test, lowest
-from ...numerics.continuation import ContinuationError, Curve, End, Evaluate, Evaluation, Follower, Settings
-from ..motion.discretisation import OrbitError, period_from
-from ..motion.drive import scale_of
+from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
+from ..motion.discretisation import OrbitError, operating_point
 from ..motion.floquet import Crossing, crossing_test
-from ..motion.orbit import PeriodicOrbit, orbit_from, orbit_of
+from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
 from ..motion.variables import Family, Plane
 from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_leave
 from .coexistence import Coexistence, coexistence
@@ -59,7 +68,7 @@ def follow_crossing(
     greatest: float = 4e-2,
     most_points: int = 300,
 ) -> CrossingCurve:
-    """Follow a crossing of the unit circle through a plane, to both sides, to the edges of a box.
+    """Follow a crossing of the unit circle through a plane, to both sides, up to the edges of a box.
 
     Parameters
     ----------
@@ -84,37 +93,28 @@ def follow_crossing(
     """
     n = len(orbit.start)
     settings = Settings(low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, most_points=most_points)
-    unknowns = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), x[1] - x[0])
+    unknowns = np.append(orbit.scale, x[1] - x[0])
     follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)
     begin = follower.start(np.append(orbit.start, place[0]), place[1], 1)
-
-    up = follower.follow(begin, leave=reason_to_leave)
-    down = up if up.closed else follower.follow(begin.turned(), leave=reason_to_leave)
-    points = [*up.points] if up.closed else [*reversed(down.points[1:]), *up.points]
+    points, *curves = follower.follow_both(begin, leave=reason_to_leave)
+    first_end, last_end = (curve.plane_end("" if curve.reached else curve.reason) for curve in curves)
     return CrossingCurve(
         kind=kind,
         points=np.array([[p.y[-1], p.parameter] for p in points]),
         orbits=tuple(p.data for p in points),
-        ends=(_end(down), _end(up)),
+        ends=(first_end, last_end),
     )
 
 
-def _end(curve: Curve) -> End:
-    last = curve.points[-1]
-    message = "" if curve.reached else curve.reason
-    return End(reason=curve.end, point=(float(last.y[-1]), last.parameter), message=message)
-
-
 def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
-    """G = (y(T) - y(0), test) in the unknowns (y(0), x) and the parameter y, with its derivatives."""
+    """Return G = (y(T) - y(0), test) of the unknowns (y(0), x) and the parameter y, with its derivatives."""
     n = len(scale) - 1
 
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
-        parameters, drive = at(float(z[n]), float(z[n + 1]))
-        period = period_from(parameters, drive, z[:n], turns)
-        orbit = orbit_from(parameters, drive, z[:n], turns, period)
-        # the test has no dimension; it is given that of x, whose row it stands in
-        return np.append(period.shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
+        point = operating_point(*at(float(z[n]), float(z[n + 1])))
+        orbit, shift = trial_orbit(point, z[:n], turns)
+        # the test has no dimension; it gets the scale of x, in whose row it stands
+        return np.append(shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
     steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
     high = np.append(np.full(n, np.inf), [settings.bounds[n][1], settings.high])
@@ -138,10 +138,13 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
 POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 
 
-def branches_on(
+def line_branches(
     operation: Plane, x: tuple[float, float], y: float, *, name: str, unit: str, start: ArrayLike | None = None
 ) -> tuple[list[Branch], Coexistence, list[str]]:
-    """Every motion that is found on the line y = const, followed to both sides until a branch passes each of them.
+    """Find all motions on the line y = const and follow them to both sides, until branches pass through all of them.
+
+    A motion is followed as long as deviations grow less than a thousandfold per turn. Folds and period doublings beyond that,
+    next to the limit of assembly, come in pairs with slivers of stability between them that no machine stays in.
 
     Parameters
     ----------
@@ -197,10 +200,10 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
-    """Monodromy matrix of the mechanism's own periodic orbit of one turn over a plane; points are remembered.
+    """Return a function that gives the monodromy matrix of the periodic orbit of one turn at a point of a plane.
 
     Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from those around it
-    on a grid, then by all the ways of `orbit_of` from the first guess.
+    on a grid, then from all starts of `orbit_of`. Points are remembered.
 
     Parameters
     ----------
@@ -230,26 +233,26 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
     return matrix
 
 
-def test_of(matrix: Monodromy, crossing: Crossing | int) -> Test:
-    """Test function `crossing_test` of a monodromy matrix over a plane."""
+def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
+    """Return the test function `crossing_test` of a monodromy matrix over a plane."""
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
-    """`test_of` of `orbit_monodromy`."""
-    return test_of(orbit_monodromy(operation, start=start), multiplier)
+    """Return the test function of the mechanism's own periodic orbit: see `plane_test` and `orbit_monodromy`."""
+    return plane_test(orbit_monodromy(operation, start=start), multiplier)
 
 
 # Removing damping
 
 
 class RemovalError(LinkworkError):
-    """The damping asked for does not lie in the range given."""
+    """The removing damping does not lie in the range given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RemovingDamping:
-    """The damping at which a region vanishes, and the point at which it does last.
+    """The damping at which a region vanishes, and the point at which it vanishes last.
 
     Attributes
     ----------
@@ -274,7 +277,7 @@ def removing_damping(
     samples: int = 40,
     tolerance: float = 1e-8,
 ) -> RemovingDamping:
-    """Damping at which a region of instability vanishes: where the least value of its test function is zero.
+    """Find the damping at which a region of instability vanishes: the least value of its test function is zero there.
 
     Parameters
     ----------
@@ -283,7 +286,7 @@ def removing_damping(
     x : (float, float)
         Range of the other parameter, with this region and no other in it.
     damping : (float, float)
-        Range in which the region vanishes: it is there at the lower end and not at the upper one.
+        Range in which the region vanishes: it exists at the lower end and not at the upper one.
     samples : int
         Of x, from which the least value is sought.
     tolerance : float
@@ -292,7 +295,7 @@ def removing_damping(
     Raises
     ------
     RemovalError
-        If the region is not there at the lower end, or still there at the upper one.
+        If the region does not exist at the lower end, or still exists at the upper one.
     LinkworkError
         As the test function.
     """
@@ -308,52 +311,3 @@ def removing_damping(
     found = float(scipy.optimize.brentq(least, *damping, xtol=0.1 * tolerance * damping[1], rtol=1e-14))
     place, value = lowest(lambda s: test(s, found), *x, samples=samples)
     return RemovingDamping(damping=found, x=place, residual=value)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorstDamping:
-    """The greatest of the removing dampings over a further parameter: it removes the region everywhere.
-
-    Attributes
-    ----------
-    damping, x, other : float
-        The damping, and the point at which the region vanishes last.
-    """
-
-    damping: float
-    x: float
-    other: float
-
-
-def removing_damping_over(
-    test: Callable[[float, float, float], float],
-    x: Callable[[float], tuple[float, float]],
-    damping: tuple[float, float],
-    other: tuple[float, float],
-    *,
-    samples: int = 5,
-    tolerance: float = 1e-8,
-) -> WorstDamping:
-    """Damping that removes a region for every value of a further parameter.
-
-    Parameters
-    ----------
-    test : callable
-        Test function of (x, damping, other).
-    x : callable
-        Range of x at a value of the other parameter; see `removing_damping`.
-    damping : (float, float)
-    other : (float, float)
-        Range of the further parameter.
-    samples : int
-        Of it, from which the worst is sought.
-    tolerance : float
-        See `removing_damping`.
-    """
-
-    def removing(value: float) -> RemovingDamping:
-        return removing_damping(lambda s, d: test(s, d, value), x(value), damping, tolerance=tolerance)
-
-    worst, _ = lowest(lambda value: -removing(value).damping, *other, samples=samples, tolerance=1e-4)
-    found = removing(worst)
-    return WorstDamping(damping=found.damping, x=found.x, other=worst)

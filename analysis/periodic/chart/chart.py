@@ -1,7 +1,7 @@
-"""The stability of a mechanism over two parameters, whole: grid, traced boundaries, removing damping, long runs.
+"""Stability charts: the stability of a mechanism over two parameters.
 
-`stability_chart` puts together what `grids`, `boundaries` and `stability` compute, for one mechanism and two parameters by
-their FMI names, the crank speed among them.
+`stability_chart` combines the grid of Floquet multipliers, traced boundaries, removing damping and long runs, for one
+mechanism and two parameters by their FMI names, the crank speed among them.
 """
 
 from __future__ import annotations
@@ -17,59 +17,61 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
 
+from ...display import Shown, format_count, format_range
 from ...files import write_csv
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count, format_range
 from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import shown, takes_published
 from ...units import RAD_S_PER_RPM, Amount, si
-from ..motion.drive import Drive, published_drive, scale_of
+from ..motion.drive import Drive, published_drive
 from ..motion.floquet import Crossing
 from ..motion.orbit import PeriodicOrbit
 from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
 from ..response.branch import distance
 from ..response.frequency import first_freedom, natural_frequency
 from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
-from .boundary import BRANCH_POINTS, Monodromy, branches_on, follow_crossing, orbit_monodromy, removing_damping, test_of
+from .boundary import (
+    BRANCH_POINTS,
+    Monodromy,
+    follow_crossing,
+    line_branches,
+    orbit_monodromy,
+    plane_test,
+    removing_damping,
+)
 from .coexistence import Coexistence, coexistence
 from .grid import Grid, grid, points_to_confirm
 
-#: Crank speeds of a chart where none are given, relative to the natural frequency; others, relative to the value there is.
+#: Default range of crank speeds relative to the natural frequency, and of others relative to the present value.
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
-
-#: Lines of a chart on which boundaries are sought, of either kind, and samples on each.
+#: Lines x = const and y = const of a chart on which boundaries are sought, and samples on each.
 LINES, SAMPLES = (2, 5), 120
-
-#: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid are of one motion.
+#: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid belong to one motion.
 SAME_MOTION = 0.4
-
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
-
-#: What the boundaries of the periodic motion that the grid has are called, and those of others.
+#: Names for boundaries of the grid's motion and of other motions.
 TRUE_ORBIT, OTHER_ORBIT = "true orbit", "another motion"
-
-#: How a boundary is written to files: whose it is, other names being of the linear equation, and its multiplier.
+#: Codes of a boundary in files: its motion, 0 for the linear equation, and its multiplier.
 _MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
-
 _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """A parameter of a chart as it is printed and drawn: speeds in rpm, all else in SI.
+    """An axis of a chart as it is printed and drawn: speeds in rpm, all else in SI.
 
     Attributes
     ----------
     name : str
         FMI name.
     unit : str
-        In which it is printed and drawn.
+        For printing and drawing.
     factor : float
         From SI to that unit.
     si : str
-        Its unit in SI.
+        The unit in SI.
     """
 
     name: str
@@ -83,7 +85,7 @@ class Axis:
         return f"{self.name} [{self.unit}]"
 
     def format_value(self, value: float) -> str:
-        """A value in SI with the parameter's name and unit."""
+        """Return a value in SI with the parameter's name and unit."""
         return format_value(self.name, value, self.si)
 
 
@@ -96,14 +98,14 @@ class Traced:
     points : ndarray, shape (n, 2)
         In SI.
     motion : str
-        `TRUE_ORBIT`, the one that the grid has; `OTHER_ORBIT`; or the name of a motion asked for beside them.
+        `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`; or the name of a motion given in ``beside``.
     kind : Crossing
-        What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more; under a torque
-        a complex pair may pass the unit circle, at a torus.
+        At -1 a period doubling; at +1 a fold, beyond which the orbit does not exist; under a torque a complex pair may cross
+        the unit circle, at a torus.
     ends : (End, End)
         At the first and at the last point.
     starts : ndarray, shape (n, m), or None
-        y at crank angle 0 of the motions on it, where they were followed.
+        y at crank angle 0 of the motions on it, if they were followed.
     """
 
     points: NDArray[np.float64]
@@ -124,7 +126,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StabilityChart(Shown):
-    """Where the periodic motion of one turn is unstable.
+    """The stability of the periodic motion of one turn over two parameters.
 
     Attributes
     ----------
@@ -134,17 +136,17 @@ class StabilityChart(Shown):
     grid : Grid
         Largest Floquet multiplier of the true orbit.
     boundaries : tuple of Traced
-        Of the true orbit, of other motions, and of those asked for beside them.
+        Of the true orbit, of other motions, and of those given in ``beside``.
     removals : tuple of str
-        The damping that removes the regions between the ends of the other axis, in words; none unless damping is an axis.
+        For each region the damping that removes it, in words; empty unless damping is an axis.
     runs : tuple of Run
-        Three points put to the test.
+        Long runs at three points.
     most : int
-        Most stable motions that were found at a point of the lines searched, or of ``beside``.
+        Greatest number of stable motions at a point of the lines searched, or of ``beside``.
     beside : Coexistence or None
-        All motions at every point, where it was asked for them.
+        All motions at every point, if they were asked for.
     problems : tuple of str
-        What could not be computed, a sentence each; empty where everything was.
+        What could not be computed, a sentence each; empty if all was.
     """
 
     axes: tuple[Axis, Axis]
@@ -173,7 +175,7 @@ class StabilityChart(Shown):
         )
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the grid as a table, a row a point."""
+        """Write the grid as a table, one row per point."""
         x, y = self.axes
         columns = {
             x.label: x.factor * np.tile(self.grid.x, len(self.grid.y)),
@@ -184,7 +186,7 @@ class StabilityChart(Shown):
         return write_csv(path, columns)
 
     def boundaries_to_csv(self, path: str | Path) -> Path:
-        """Write the boundaries as a table, a row a point, numbered in the first column."""
+        """Write the boundaries as a table, one row per point, numbered in the first column."""
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
             points = traced.points * [axis.factor for axis in self.axes]
@@ -220,9 +222,9 @@ def stability_chart(
     parameters : parameters of a mechanism
         Or a published set or its name.
     drive : Drive, optional
-        Speed, or torque, and constant forces, where they are no axes. A published set needs none: it is driven at its speed.
+        Speed, or torque, and constant forces, unless they are axes. A published set needs none: it is driven at its speed.
     names : (str, str), optional
-        FMI names of the parameters along x and y; without it the crank speed and the damping of the first freedom beside the
+        FMI names of the parameters along x and y; by default the crank speed and the damping of the first freedom beside the
         crank, of a five-bar ``drive.speed`` and ``slider.damping``.
     ranges : ((float, float), (float, float)), optional
         Their ranges, in SI or as text such as "420 rpm"; see `default_range`.
@@ -231,19 +233,17 @@ def stability_chart(
     start : array_like, shape (n,), optional
         Guess of the orbits; under a torque it is needed: see `find_orbit`.
     beside : mapping, optional
-        Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: name to their monodromy
-        matrix over a plane.
+        Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: by name, a function from a
+        plane to their monodromy matrix over it.
     coexisting : bool
         Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
-    n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
-    progress : bool
-        Show a progress bar.
+    n_jobs, progress
+        See `grid`.
 
     Returns
     -------
     StabilityChart
-        What could not be computed is in ``problems``.
+        ``problems`` has what could not be computed.
 
     Raises
     ------
@@ -274,37 +274,13 @@ def stability_chart(
     survey = _Survey(
         operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
     )
-    survey.note_missing_orbits()
     around = coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None
-    true = orbit_monodromy(operation, start=start, near=found)
-    # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
-    survey.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
-    for motion, of in (beside or {}).items():
-        matrix = of(operation)
-        for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
-            survey.trace(motion, matrix, kind)
-    survey.follow_lines(np.linspace(*box.y, LINES[1]).tolist(), progress)
-    if around is not None:
-        true_ones = [traced.points for traced in survey.traced if traced.motion in _MOTION]
-        survey.follow_lines(unmet(around, survey.lines, true_ones), progress)
-        survey.most = max(survey.most, int(around.stable.max()))
-    survey.run_three_points()
-    return StabilityChart(
-        axes=survey.axes,
-        box=box,
-        grid=found,
-        boundaries=tuple(survey.traced),
-        removals=survey.removals(true),
-        runs=tuple(survey.runs),
-        most=survey.most,
-        beside=around,
-        problems=tuple(survey.problems),
-    )
+    return survey.chart({name: of(operation) for name, of in (beside or {}).items()}, around, progress)
 
 
 @dataclass(slots=True)
 class _Survey:
-    """A chart as it is made."""
+    """A chart while it is computed."""
 
     operation: Plane
     axes: tuple[Axis, Axis]
@@ -319,8 +295,35 @@ class _Survey:
     lines: list[float] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
 
+    def chart(self, beside: Mapping[str, Monodromy], around: Coexistence | None, progress: bool) -> StabilityChart:
+        """Find the boundaries of the true orbit, of the motions ``beside``, and of others; make the long runs."""
+        self.note_missing_orbits()
+        true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
+        # at a fold the true orbit ends, and its test function with it: folds are found on branches
+        self.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
+        for motion, matrix in beside.items():
+            for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
+                self.trace(motion, matrix, kind)
+        self.follow_lines(np.linspace(*self.box.y, LINES[1]).tolist(), progress)
+        if around is not None:
+            true_ones = [traced.points for traced in self.traced if traced.motion in _MOTION]
+            self.follow_lines(unmet_lines(around, self.lines, true_ones), progress)
+            self.most = max(self.most, int(around.stable.max()))
+        self.run_three_points()
+        return StabilityChart(
+            axes=self.axes,
+            box=self.box,
+            grid=self.grid,
+            boundaries=tuple(self.traced),
+            removals=self.removals(true),
+            runs=tuple(self.runs),
+            most=self.most,
+            beside=around,
+            problems=tuple(self.problems),
+        )
+
     def place(self, x: float, y: float) -> str:
-        """A point of the chart in words."""
+        """Return a point of the chart in words."""
         return ", ".join(axis.format_value(value) for axis, value in zip(self.axes, (x, y)))
 
     def note_missing_orbits(self) -> None:
@@ -335,7 +338,7 @@ class _Survey:
 
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
         """Find and trace the boundaries of a kind by their test function."""
-        result = chart(test_of(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
+        result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
         self.traced += [Traced(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries]
         if result.gaps:
             first = result.gaps[0]
@@ -345,11 +348,11 @@ class _Survey:
             )
 
     def follow_lines(self, ys: Sequence[float], progress: bool) -> None:
-        """The boundaries that the branches of all motions on the lines y = const lead to, folds above all."""
+        """Follow the branches of all motions on the lines y = const, and the boundaries from their special points."""
         lost: list[str] = []
         with shown(progress and bool(ys), float(len(ys)), "following branches") as show:
             for number, y in enumerate(ys, start=1):
-                branches, found, failed = branches_on(
+                branches, found, failed = line_branches(
                     self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start
                 )
                 self.lines.append(y)
@@ -380,8 +383,8 @@ class _Survey:
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return
-        own = np.mean([_is_of(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
-        # of two folds that meet in a cusp the grid's motion ends at one; next to a jump it is the other motion on a coarse grid
+        own = np.mean([_belongs(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
+        # of two folds that meet in a cusp only one ends the grid's motion; near a jump a coarse grid may have the other motion
         true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
         self.traced.append(
             Traced(
@@ -397,16 +400,16 @@ class _Survey:
                 self.problems.append(f"{what} is followed to {self.place(*end.point)} only: {end.message}")
 
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
-        """Whether a boundary of the same kind and of the same motion passes a special point, nearly."""
+        """Return whether a boundary of the same kind and motion nearly passes through a special point."""
         orbit = special.orbit
-        scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        scale = orbit.scale
         for boundary in self.traced:
             if boundary.kind is not special.kind or boundary.motion not in _MOTION:
                 continue
             if distance(boundary.points / self.box.size, place / self.box.size) > SAME:
                 continue
             if boundary.starts is None:
-                same = _is_of(self.grid, orbit, place)
+                same = _belongs(self.grid, orbit, place)
             else:
                 near = int(np.linalg.norm((boundary.points - place) / self.box.size, axis=1).argmin())
                 same = float(np.linalg.norm((boundary.starts[near] - orbit.start) / scale)) < SAME_MOTION
@@ -415,7 +418,7 @@ class _Survey:
         return False
 
     def run_three_points(self) -> None:
-        """Long runs at the points that put the grid to the test."""
+        """Run the mechanism at the points of `points_to_confirm`."""
         for row, column in points_to_confirm(self.grid):
             x, y = float(self.grid.x[column]), float(self.grid.y[row])
             try:
@@ -426,7 +429,7 @@ class _Survey:
                 self.runs.append(Run(x=x, y=y, confirmation=check))
 
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
-        """The damping that removes each region, where damping is one of the axes; a sentence a boundary of a true motion."""
+        """Return a sentence on the damping that removes each region of a true motion, if damping is one of the axes."""
         names = [axis.name for axis in self.axes]
         if self.damping not in names:
             return ()
@@ -438,7 +441,7 @@ class _Survey:
         )
 
     def _removal(self, matrix: Monodromy, boundary: Traced, which: int) -> str:
-        """The damping, along axis ``which``, that removes the region of a boundary."""
+        """Return a sentence on the damping, along axis ``which``, that removes the region of a boundary."""
         other, up = self.axes[1 - which], self.axes[which]
         spans = (self.box.x, self.box.y)
         across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]
@@ -454,7 +457,7 @@ class _Survey:
         # this region and no other
         margin = 0.25 * (high - low)
         x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
-        test = test_of(matrix, boundary.kind)
+        test = plane_test(matrix, boundary.kind)
         try:
             found = removing_damping(
                 lambda value, damping: test(value, damping) if which == 1 else test(damping, value),
@@ -467,8 +470,8 @@ class _Survey:
         return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 
 
-def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """A line y = const through each part of a plane with a number of stable motions that no line and no boundary has met.
+def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
+    """Return a line y = const through each part of a plane, with one number of stable motions, that nothing has met so far.
 
     Parameters
     ----------
@@ -492,16 +495,16 @@ def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDAr
     return found
 
 
-def _is_of(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
-    """Whether an orbit is of the motion whose multipliers a grid has, by the points of the grid around its place."""
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
+    """Return whether an orbit belongs to the motion of a grid, by the starts at the points around its place."""
+    scale = orbit.scale
     distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
 
 
 @takes_published()
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
-    """Range of an axis where none is given: speeds about the natural frequency, others about the value there is.
+    """Return the range of an axis by default: speeds around the natural frequency, others around the present value.
 
     Raises
     ------

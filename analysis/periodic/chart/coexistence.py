@@ -1,4 +1,4 @@
-"""Motions beside each other: how many stable ones each point of a plane has, and which of them a start ends in."""
+"""Coexisting motions: how many are stable at each point of a plane, and on which of them a start settles."""
 
 from __future__ import annotations
 
@@ -13,27 +13,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count
 from ...files import write_csv
-from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count
+from ...mechanisms import Parameters
 from ...run import takes_published
-from ..motion.discretisation import section_of
-from ..motion.drive import Drive, extent_of, scale_of, starts_of
+from ..motion.discretisation import OperatingPoint
+from ..motion.drive import Drive, extent_of, starts_of
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, PLAIN, VARIATIONAL
-from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, require_turns
-from ..motion.search import Orbits, orbits_of, passages
-from ..motion.variables import Operation, Plane
+from ..motion.orbit import PeriodicOrbit, first_guess, require_turns
+from ..motion.search import Orbits, orbits_of
+from ..motion.variables import Plane
 from . import kernels
-from .grid import axes_of, code_of, kept_rows, name_of, row_of
-from .kernels import LOST, MOST_ORBITS, UNSETTLED
+from .grid import Keeping, grid_points, row_code, row_name, row_points, row_search
+from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 
-#: Starts from which the motions of a point are sought beside those of its neighbour: a power of two.
+FloatArray = NDArray[np.float64]
+#: Starts from which the motions of a point are sought, after those of its neighbour: a power of two.
 STARTS = 16
-
-#: Samples of a turn from which an amplitude is taken.
+#: Samples of a turn for an amplitude.
 SAMPLES = 64
-
 #: Bound of the integrator's local error of a basin, distance from a motion, relative to the scale, at which a start has
 #: arrived, and turns at most.
 _TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000
@@ -47,38 +46,38 @@ class Coexistence:
     ----------
     x, y : ndarray, shapes (nx,) and (ny,)
     largest : masked array, shape (ny, nx, k)
-        Largest modulus of the Floquet multipliers of each motion, by amplitude; masked where there is no further one.
+        Largest modulus of the Floquet multipliers of each motion, by amplitude; masked after the last.
     amplitude : masked array, shape (ny, nx, k)
         Half the range of the first free coordinate, of a slider position (m).
     starts : ndarray, shape (ny, nx, k, n)
-        y at crank angle 0; NaN where there is none.
+        y at crank angle 0; NaN after the last.
     swing : (str, str)
-        What the amplitude is of, and its unit.
+        Coordinate that the amplitude is of, and its unit.
     computed : int
         Rows that were not in the cache.
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: FloatArray
+    y: FloatArray
     largest: np.ma.MaskedArray[Any, np.dtype[np.float64]]
     amplitude: np.ma.MaskedArray[Any, np.dtype[np.float64]]
-    starts: NDArray[np.float64]
+    starts: FloatArray
     swing: tuple[str, str]
     computed: int
 
     @property
     def count(self) -> NDArray[np.int64]:
-        """Motions that were found at each point, shape (ny, nx)."""
+        """Number of motions that were found at each point, shape (ny, nx)."""
         return np.asarray(self.largest.count(axis=2))
 
     @property
     def stable(self) -> NDArray[np.int64]:
-        """Stable motions that were found at each point, shape (ny, nx)."""
+        """Number of stable motions that were found at each point, shape (ny, nx)."""
         return np.asarray(self._is_stable.sum(axis=2))
 
     @property
     def _is_stable(self) -> NDArray[np.bool_]:
-        """Of each motion, shape (ny, nx, k)."""
+        """Whether each motion is stable, shape (ny, nx, k)."""
         return np.asarray(np.ma.filled(self.largest < 1.0 - TOLERANCE, False))
 
     @property
@@ -96,7 +95,7 @@ class Coexistence:
         return np.ma.masked_invalid(of(stable, axis=2).filled(np.nan))
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the grid as a table, a row a point, in SI."""
+        """Write the grid as a table, one row per point, in SI."""
         columns = {
             "x": np.tile(self.x, len(self.y)),
             "y": np.repeat(self.y, len(self.x)),
@@ -118,26 +117,21 @@ def coexistence(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Coexistence:
-    """All periodic motions of one turn that are found at every point of a grid.
+    """Find all periodic motions of one turn at every point of a grid.
 
-    Those of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones divided
-    out. A motion that is alone in its part of a row may be missed: `find_orbits` looks at one point more closely. The rows go
-    over workers and are kept, as those of `grid` are.
+    The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones
+    divided out. One that exists in a short part of a row only may be missed: `find_orbits` looks at one point more closely.
+    The rows are distributed over workers and kept as in `grid`.
 
     Parameters
     ----------
     operation : callable
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
-        Values of the axes.
     start : array_like, shape (n,), optional
-        A further start; under a torque one is needed for the crank speed, unless it follows from a motor.
-    folder : path, optional
-        Of the cache; see `grid`.
-    n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
-    progress : bool
-        Show a progress bar.
+        A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
+    folder, n_jobs, progress
+        See `grid`.
 
     Raises
     ------
@@ -146,24 +140,16 @@ def coexistence(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys = axes_of(x, y)
-    parameters, drive = operation(float(xs[0]), float(ys[0]))
-    mechanism = mechanism_of(parameters)
-    flow = drive.flow(mechanism)
-    guess = guess_of(flow, drive, start)
-    guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
-    rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
-    code = code_of(kernels.solve_all)
-    data, computed = kept_rows(
-        partial(_motions_of, guesses),
+    xs, ys, rows = grid_points(operation, x, y)
+    first = rows[0][0]
+    guess = first_guess(first.flow, first.drive, start)
+    guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
+    code = row_code(kernels.solve_all)
+    data, computed = Keeping(folder, n_jobs, progress, "motions").rows(
+        partial(_compute_motions, guesses),
         rows,
-        [name_of(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
-        (len(xs), MOST_ORBITS, flow.size + 2),
-        mechanism=mechanism,
-        folder=folder,
-        n_jobs=n_jobs,
-        progress=progress,
-        what="motions",
+        [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
+        (len(xs), MOST_ORBITS, first.flow.size + 2),
     )
     return Coexistence(
         x=xs,
@@ -171,32 +157,24 @@ def coexistence(
         largest=np.ma.masked_invalid(data[..., 0]),
         amplitude=np.ma.masked_invalid(data[..., 1]),
         starts=data[..., 2:],
-        swing=flow.components[0],
+        swing=first.flow.components[0],
         computed=computed,
     )
 
 
-def _motions_of(guesses: NDArray[np.float64], row: Sequence[Operation]) -> NDArray[np.float64]:
-    """Largest multiplier, amplitude and start of each motion of the points of a row, by amplitude; NaN where there is none.
+def _compute_motions(guesses: FloatArray, row: Sequence[OperatingPoint]) -> FloatArray:
+    """Return largest multiplier, amplitude and start of each motion of the points of a row, by amplitude; NaN after the last.
 
     The shape is (m, MOST_ORBITS, n + 2).
     """
-    parameters, drives = [p for p, _ in row], [drive for _, drive in row]
-    period, m, n = drives[0].flow(mechanism_of(parameters[0])).period, len(row), guesses.shape[1]
-    starts, counts = np.full((m, MOST_ORBITS, n), np.nan), np.zeros(m, dtype=np.int64)
-    monodromies, swings = np.full((m, MOST_ORBITS, n * n), np.nan), np.full((m, MOST_ORBITS, SAMPLES), np.nan)
-    section, *points = row_of(parameters, drives, guesses[0], VARIATIONAL, PLAIN)
-    kernels.solve_all(
-        section,
-        tuple(points),
-        period,
-        MOST_ITERATIONS,
-        SEARCH_TOLERANCE,
-        np.linspace(0.0, period, SAMPLES, endpoint=False),
-        guesses,
-        (starts, monodromies, swings),
-        counts,
-    )
+    m, n = len(row), guesses.shape[1]
+    shapes = (m, MOST_ORBITS, n), (m, MOST_ORBITS, n * n), (m, MOST_ORBITS, SAMPLES)
+    starts, monodromies, swings = (np.full(shape, np.nan) for shape in shapes)
+    counts = np.zeros(m, dtype=np.int64)
+    section = row[0].section(guesses[0], VARIATIONAL, PLAIN, beside=[point.parameters for point in row])
+    angles = np.linspace(0.0, row[0].flow.period, SAMPLES, endpoint=False)
+    found_all = Motions(starts, monodromies, swings, counts)
+    kernels.solve_all(section, row_points(row, guesses[0]), row_search(row), angles, guesses, found_all)
     largest = np.full((m, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
     largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
@@ -211,23 +189,23 @@ def _motions_of(guesses: NDArray[np.float64], row: Sequence[Operation]) -> NDArr
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Basins(Shown):
-    """Which motion each start at crank angle 0 ends in.
+    """The motion on which each start at crank angle 0 settles.
 
     Attributes
     ----------
     position, rate : ndarray, shapes (nx,) and (ny,)
         Starts of the first free coordinate, of a slider (m), and of its rate (m/s); the rest of y is that of the first motion.
     ends : ndarray of int, shape (ny, nx)
-        Number of the stable motion among ``motions``; -1 where the links come to the limit of assembly, -2 where none of them
-        is met within the turns that are followed.
+        Number of the stable motion among ``motions``; -1 if the links come to the limit of assembly, -2 if none of them is
+        met within the turns that are followed.
     found : Orbits
-        All motions that were sought, the unstable ones on the boundaries of the basins among them.
+        All motions that were found; the unstable ones lie on the boundaries of the basins.
     computed : int
         Rows that were not in the cache.
     """
 
-    position: NDArray[np.float64]
-    rate: NDArray[np.float64]
+    position: FloatArray
+    rate: FloatArray
     ends: NDArray[np.int64]
     found: Orbits
     computed: int
@@ -245,11 +223,11 @@ class Basins(Shown):
         return self.found.stable
 
     def share(self, end: int) -> float:
-        """Part of the starts that end so."""
+        """Return the share of the starts with this end."""
         return float(np.mean(self.ends == end))
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the picture as a table, a row a start."""
+        """Write the basins as a table, one row per start."""
         (name, unit), (rate, rate_unit) = self._components()
         columns = {
             f"{name} [{unit}]": np.tile(self.position, len(self.rate)),
@@ -264,7 +242,7 @@ class Basins(Shown):
 
     @property
     def labels(self) -> tuple[str, str]:
-        """Names of the two axes with their units."""
+        """Names of both axes with units."""
         (name, unit), (rate, rate_unit) = self._components()
         return f"{name} [{unit}]", f"{rate} [{rate_unit}]"
 
@@ -283,27 +261,23 @@ def basins(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Basins:
-    """Which of the stable periodic motions a start ends in, over a plane of starts; its rows are kept as those of `grid` are.
+    """Compute on which stable periodic motion each start of a plane settles; its rows are kept as those of `grid`.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
     drive : Drive
     turns : int
-        Motions of up to so many turns of the crank are sought.
+        Greatest number of turns in the period of the motions that are sought.
     points : int
-        Of the plane, along each axis.
+        Number of starts along each axis.
     position, rate : (float, float), optional
-        Ranges of the first free coordinate and of its rate at crank angle 0; as far as the mechanism can be assembled by
-        default.
+        Ranges of the first free coordinate and of its rate at crank angle 0; by default as far as the mechanism can be
+        assembled.
     start : array_like, shape (n,), optional
         Under a torque a guess of y with the crank speed; see `find_orbits`.
-    folder : path, optional
-        Of the cache; see `grid`.
-    n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
-    progress : bool
-        Show a progress bar.
+    folder, n_jobs, progress
+        See `grid`.
 
     Raises
     ------
@@ -323,51 +297,39 @@ def basins(
     found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        raise InputError(f"there is no stable motion of {of_turns(turns)} here: no start ends in one")
+        raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one")
     first = motions[0].start
-    extent, scale, half = extent_of(parameters, drive, first)[0], scale_of(parameters, drive, first), len(first) // 2
+    extent, scale, half = extent_of(parameters, drive, first)[0], motions[0].scale, len(first) // 2
     spans = position or (-extent, extent), rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0))
     for name, (low, high) in zip(("position", "rate"), spans):
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
     across, up = (np.linspace(low, high, points) for low, high in spans)
     # a motion of several turns is met at the beginning of any of them
-    passed = [passages(orbit) for orbit in motions]
+    passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
-    code = code_of(kernels.basins_of)
-    ends, computed = kept_rows(
-        partial(_ends, parameters, drive, known, across),
+    point, code = motions[0].point, row_code(kernels.settle_starts)
+    ends, computed = Keeping(folder, n_jobs, progress, "starts").rows(
+        partial(_ends, point, known, across),
         up.tolist(),
-        [name_of([(parameters, drive)], known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
+        [row_name([point], known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
         (points,),
-        mechanism=mechanism_of(parameters),
-        folder=folder,
-        n_jobs=n_jobs,
-        progress=progress,
-        what="starts",
     )
     met = ends.astype(np.int64)
     met[met >= 0] = owner[met[met >= 0]]
     return Basins(position=across, rate=up, ends=met, found=found, computed=computed)
 
 
-def of_turns(turns: int) -> str:
-    """Up to so many turns, in words."""
+def format_turns(turns: int) -> str:
+    """Return "one turn" or "up to ... turns"."""
     return "one turn" if turns == 1 else f"up to {turns} turns"
 
 
-def _ends(
-    parameters: Parameters,
-    drive: Drive,
-    known: NDArray[np.float64],
-    across: NDArray[np.float64],
-    rate: float,
-) -> NDArray[np.float64]:
-    """The ends of a row of starts."""
-    flow = drive.flow(mechanism_of(parameters))
+def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:
+    """Return the ends of a row of starts."""
     starts = np.tile(known[0], (len(across), 1))
-    starts[:, 0], starts[:, flow.size // 2] = across, rate
+    starts[:, 0], starts[:, point.flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
-    section = section_of(parameters, drive, known[0], PLAIN, tolerance=_TOLERANCE)
-    kernels.basins_of(section, flow.period, _NEAR, _TURNS, starts, known, ends)
+    section = point.section(known[0], PLAIN, tolerance=_TOLERANCE)
+    kernels.settle_starts(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
     return ends.astype(float)

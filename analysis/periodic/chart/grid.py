@@ -1,4 +1,4 @@
-"""Grids of the largest Floquet multiplier, each point on its own periodic orbit: over cores, kept on disk, gone on with."""
+"""Grids of the largest Floquet multiplier, each point on its own periodic orbit: over cores, kept on disk, resumed."""
 
 from __future__ import annotations
 
@@ -9,55 +9,47 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
-from linkwork.mechanism import Mechanism
 
 from ...files import load_array, save_array
-from ...mechanisms import MECHANISMS, Parameters, mechanism_of
-from ...numerics.codegen import cache_root, fingerprint
+from ...mechanisms import Parameters
+from ...numerics.cache import cache_root
+from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, interruptible, over_workers
 from ...run import shown
-from ..motion.discretisation import INTEGRATOR_TOLERANCE, section_of
-from ..motion.drive import Drive, is_smooth, scale_of, starts_of
+from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, collocation_serves, operating_point
+from ..motion.drive import Drive, starts_of
 from ..motion.floquet import TOLERANCE, Stability, multipliers
 from ..motion.flow import GAP, PLAIN, VARIATIONAL
-from ..motion.kernels import REASONS, Section, Status
-from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, guess_of
-from ..motion.variables import Operation, Plane
+from ..motion.kernels import REASONS, Status
+from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, first_guess
+from ..motion.variables import Plane
 from . import kernels
+from .kernels import Points, Row, Search
+
+FloatArray = NDArray[np.float64]
+Item = TypeVar("Item")
+#: Starts from which the orbit of a point is sought if it is not found from its neighbour: a power of two.
+STARTS = 32
 
 
-class Row(NamedTuple):
-    """A row of mechanisms as the kernels take it: what they share; constants, drives and magnitudes of y, each by rows."""
+def row_points(points: Sequence[OperatingPoint], start: FloatArray) -> Points:
+    """Return the numbers of a row of operating points for the kernels, with magnitudes of y at a start."""
+    numbers = np.array([point.constants for point in points])
+    vectors = np.array([point.vector for point in points])
+    scales = np.array([point.scale(start) for point in points])
+    return Points(np.hstack([numbers, np.zeros_like(numbers)]), np.hstack([vectors, np.zeros_like(vectors)]), scales)
 
-    section: Section
-    constants: NDArray[np.float64]
-    drives: NDArray[np.float64]
-    scales: NDArray[np.float64]
 
-
-def row_of(
-    rows: Sequence[Parameters],
-    drives: Sequence[Drive],
-    start: NDArray[np.float64],
-    *functions: int,
-    tolerance: float = INTEGRATOR_TOLERANCE,
-) -> Row:
-    """What the kernels need of a row of mechanisms and their drives: see `section_of`."""
-    mechanism = mechanism_of(rows[0])
-    numbers = np.array([(*parameters.constants(),) for parameters in rows])
-    vectors = np.array([drive.vector(mechanism) for drive in drives])
-    return Row(
-        section_of(rows[0], drives[0], start, *functions, tolerance=tolerance, beside=rows),
-        np.hstack([numbers, np.zeros_like(numbers)]),
-        np.hstack([vectors, np.zeros_like(vectors)]),
-        np.array([scale_of(parameters, drive, start) for parameters, drive in zip(rows, drives)]),
-    )
+def row_search(points: Sequence[OperatingPoint], turns: int = 1) -> Search:
+    """Return how the orbits of a row are sought."""
+    serves = collocation_serves([point.drive for point in points], [point.parameters for point in points])
+    return Search(points[0].flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, serves)
 
 
 def largest_multipliers(
@@ -67,16 +59,16 @@ def largest_multipliers(
     *,
     turns: int = 1,
     tolerance: float = INTEGRATOR_TOLERANCE,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Largest Floquet multiplier of each of a row of mechanisms, every one on its own periodic orbit.
+) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+    """Compute the largest Floquet multiplier of each of a row of mechanisms, each on its own periodic orbit.
 
-    Each is sought from its neighbour's start, so that they should be ordered along a line of a chart, then from the guesses.
+    Each orbit is sought from the start of its neighbour, then from the guesses: the mechanisms should be ordered along a line.
 
     Parameters
     ----------
     rows, drives : sequences of m
     guesses : array_like, shape (n,) or (k, n), optional
-        Start of the first, and others where nothing is found from there; see `find_orbit`.
+        Start of the first, and others if nothing is found from there; see `find_orbit`.
     turns : int
     tolerance : float
         Bound of the integrator's local error.
@@ -84,48 +76,41 @@ def largest_multipliers(
     Returns
     -------
     values : ndarray, shape (m,)
-        Largest modulus of the multipliers; NaN where there is none.
+        Largest modulus of the multipliers; NaN if there is none.
     starts : ndarray, shape (m, n)
-        y at crank angle 0; NaN where there is none.
+        y at crank angle 0; NaN if there is none.
     status : ndarray of int, shape (m,)
-        `kernels.Status`: 0 where an orbit was found.
+        `kernels.Status`: 0 if an orbit was found.
     """
-    mechanism = mechanism_of(rows[0])
-    flow = drives[0].flow(mechanism)
-    if any(drive.flow(mechanism) is not flow for drive in drives):
-        raise InputError("a row has both drives by speed and by torque, or other modes or ratios: it must have one kind")
+    points = [operating_point(parameters, drive) for parameters, drive in zip(rows, drives)]
+    flow = points[0].flow
+    if any(point.flow is not flow for point in points):
+        raise InputError(
+            "a row has both drives by speed and by torque, or other modes or ratios: it must have one kind"
+        )
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
-    starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
-    n, first = flow.size, starting[0]
-    section, *points = row_of(rows, drives, first, PLAIN, VARIATIONAL, tolerance=tolerance)
-    monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
-    status = np.zeros(len(rows), dtype=np.int64)
-    kernels.solve_row(
-        section,
-        tuple(points),
-        flow.period * turns,
-        turns,
-        MOST_ITERATIONS,
-        SEARCH_TOLERANCE,
-        all(map(is_smooth, dict.fromkeys(rows))),
-        starting,
-        (starts, monodromies, status),
-    )
-    values = np.full(len(rows), np.nan)
-    good = status == Status.DONE
+    starting = np.array([first_guess(flow, drives[0], guess) for guess in given])
+    return _solve_row(points, starting, tolerance, turns)
+
+
+def _solve_row(
+    points: Sequence[OperatingPoint], guesses: FloatArray, tolerance: float, turns: int = 1
+) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+    """Return multipliers, starts and status of a row: see `largest_multipliers`."""
+    n, m = guesses.shape[1], len(points)
+    beside = [point.parameters for point in points]
+    section = points[0].section(guesses[0], PLAIN, VARIATIONAL, tolerance=tolerance, beside=beside)
+    found = Row(np.full((m, n), np.nan), np.full((m, n * n), np.nan), np.zeros(m, dtype=np.int64))
+    kernels.solve_row(section, row_points(points, guesses[0]), row_search(points, turns), guesses, found)
+    values = np.full(m, np.nan)
+    good = found.status == Status.DONE
     if good.any():
-        values[good] = np.abs(multipliers(monodromies[good].reshape(-1, n, n)))[:, 0]
-    return values, starts, status
-
-
-Item = TypeVar("Item")
-
-#: Starts from which the orbit of a point is sought where it is not found from its neighbour: a power of two.
-STARTS = 32
+        values[good] = np.abs(multipliers(found.monodromies[good].reshape(-1, n, n)))[:, 0]
+    return values, found.starts, found.status
 
 
 class GridInterrupted(Interrupted):
-    """A grid was interrupted; the rows that were done are kept and the same call goes on from there.
+    """A grid was interrupted; the finished rows are kept, and the same call goes on from them.
 
     Attributes
     ----------
@@ -142,41 +127,41 @@ class GridInterrupted(Interrupted):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grid:
-    """The largest multiplier of the true orbit over a grid.
+    """The largest Floquet multiplier over a grid, each point on its own periodic orbit.
 
     Attributes
     ----------
     x, y : ndarray, shapes (nx,) and (ny,)
     largest : masked array, shape (ny, nx)
-        Largest modulus of the Floquet multipliers; masked where no orbit was found.
+        Largest modulus of the Floquet multipliers; masked if no orbit was found.
     starts : ndarray, shape (ny, nx, n)
-        Starts of the orbits, see `PeriodicOrbit`; NaN where ``largest`` is masked.
+        Starts of the orbits, see `PeriodicOrbit`; NaN if ``largest`` is masked.
     status : ndarray of int, shape (ny, nx)
         `kernels.Status`: 0, or why there is no orbit.
     computed : int
         Rows that were not in the cache.
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: FloatArray
+    y: FloatArray
     largest: np.ma.MaskedArray[Any, np.dtype[np.float64]]
-    starts: NDArray[np.float64]
+    starts: FloatArray
     status: NDArray[np.int64]
     computed: int
 
     def reason(self, row: int, column: int) -> str:
-        """Why a point has no orbit; empty if it has one."""
+        """Return why a point has no orbit; empty if it has one."""
         return REASONS.get(Status(self.status[row, column]), "")
 
-    def around(self, x: float, y: float) -> NDArray[np.float64]:
-        """Starts of the orbits at the points around a place, the nearest first; shape (k, n)."""
+    def around(self, x: float, y: float) -> FloatArray:
+        """Return the starts of the orbits at the points around a place, the nearest first; shape (k, n)."""
         across, up = (np.argsort(np.abs(axis - value))[:3] for axis, value in ((self.x, x), (self.y, y)))
         starts = self.starts[np.ix_(up, across)].reshape(-1, self.starts.shape[-1])
-        kept: NDArray[np.float64] = starts[~np.isnan(starts).any(axis=1)]
+        kept: FloatArray = starts[~np.isnan(starts).any(axis=1)]
         return kept
 
     def stability(self, tolerance: float = TOLERANCE) -> NDArray[Any]:
-        """`Stability` of each point, None where no orbit was found; an array of objects of shape (ny, nx)."""
+        """Return the `Stability` of each point, None if it has no orbit; an array of objects of shape (ny, nx)."""
         margin = 1.0 - self.largest.filled(np.nan)
         result = np.full(margin.shape, Stability.MARGINAL, dtype=object)
         result[margin > tolerance] = Stability.STABLE
@@ -186,7 +171,7 @@ class Grid:
 
 
 def grid_folder() -> Path:
-    """Folder of the rows of grids that have been computed, beside that of the compiled code."""
+    """Return the folder in which rows of grids are kept, next to the compiled code."""
     return cache_root() / "grids"
 
 
@@ -201,10 +186,10 @@ def grid(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Grid:
-    """The largest Floquet multiplier of the true orbit at every point of a grid.
+    """Compute the largest Floquet multiplier at every point of a grid.
 
-    The rows go over workers; each is, once done, a file in the cache, under a name made from all it depends on: mechanisms,
-    drives, guess, tolerance and the machine code. An interrupted grid goes on from the rows that are there.
+    The rows are distributed over workers; each becomes a file in the cache, under a name made from all it depends on:
+    mechanisms, drives, guess, tolerance and machine code. An interrupted grid goes on from the rows that are there.
 
     Parameters
     ----------
@@ -213,13 +198,13 @@ def grid(
     x, y : array_like, shapes (nx,) and (ny,)
         Values of the axes.
     start : array_like, shape (n,), optional
-        Guess of the first orbit of each row; see `find_orbit`. Where it leads to none, others are tried.
+        Guess of the first orbit of each row; see `find_orbit`. If it leads to none, others are tried.
     tolerance : float
         Bound of the integrator's local error.
     folder : path, optional
         Of the cache; `grid_folder` by default.
     n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
+        Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
     progress : bool
         Show a progress bar.
 
@@ -232,23 +217,16 @@ def grid(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys = axes_of(x, y)
-    parameters, drive = operation(float(xs[0]), float(ys[0]))
-    mechanism = mechanism_of(parameters)
-    guess = guess_of(drive.flow(mechanism), drive, start)
-    guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
-    code = code_of(kernels.solve_row, multipliers)
-    points = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
-    data, computed = kept_rows(
+    xs, ys, rows = grid_points(operation, x, y)
+    first = rows[0][0]
+    guess = first_guess(first.flow, first.drive, start)
+    guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
+    code = row_code(kernels.solve_row, multipliers)
+    data, computed = Keeping(folder, n_jobs, progress, "filling in the stability chart").rows(
         partial(_compute_row, guesses, tolerance),
-        points,
-        [name_of(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in points],
+        rows,
+        [row_name(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
         (len(xs), len(guess) + 2),
-        mechanism=mechanism,
-        folder=folder,
-        n_jobs=n_jobs,
-        progress=progress,
-        what="filling in the stability chart",
     )
     status = data[..., -1].astype(np.int64)
     return Grid(
@@ -261,153 +239,159 @@ def grid(
     )
 
 
-def _compute_row(guesses: NDArray[np.float64], tolerance: float, row: Sequence[Operation]) -> NDArray[np.float64]:
-    """A row, with the columns multiplier, start and status."""
-    mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
-    values, starts, status = largest_multipliers(mechanisms, drives, guesses, tolerance=tolerance)
+def _compute_row(guesses: FloatArray, tolerance: float, row: Sequence[OperatingPoint]) -> FloatArray:
+    """Compute a row, with the columns multiplier, start and status."""
+    values, starts, status = _solve_row(row, guesses, tolerance)
     return np.column_stack([values, starts, status])
 
 
 # Rows over workers, kept on disk
 
 
-def axes_of(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values of the axes of a grid; raises InputError if an axis is empty or not finite."""
+def grid_points(
+    operation: Plane, x: ArrayLike, y: ArrayLike
+) -> tuple[FloatArray, FloatArray, list[list[OperatingPoint]]]:
+    """Return the values of the axes of a grid and its operating points by rows.
+
+    Raises InputError if an axis is empty or not finite.
+    """
     xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    return xs, ys
+    return xs, ys, [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
 
 
-def code_of(*functions: Any) -> tuple[str, ...]:
-    """What computes a row: functions that are compiled, and all Python of this package, whatever of it they are called by."""
+def row_code(*functions: Any) -> tuple[str, ...]:
+    """Return the code that computes a row: fingerprints of compiled functions, and all Python sources of this package."""
     sources = (path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parents[1].rglob("*.py")))
     return *map(fingerprint, functions), *sources
 
 
-def name_of(
-    row: Sequence[Operation],
-    guesses: NDArray[np.float64],
+def row_name(
+    row: Sequence[OperatingPoint],
+    guesses: FloatArray,
     functions: Sequence[int],
     code: Sequence[str],
     *numbers: float,
 ) -> str:
-    """Name under which a row is kept: a hash of all it depends on.
+    """Return the name under which a row is kept: a hash of all it depends on.
 
     Parameters
     ----------
-    row : sequence of (parameters, Drive)
+    row : sequence of OperatingPoint
     guesses : ndarray, shape (k, n)
-        Starts; from the first the magnitudes of y are taken.
+        Starts; the first gives the magnitudes of y.
     functions : sequence of int
         Numbers of the flow's functions that are called.
     code : sequence of str
-        Of what computes the row: see `code_of`.
+        See `row_code`.
     *numbers : float
-        What else goes in.
+        Further numbers that the row depends on.
     """
-    mechanism, drive = mechanism_of(row[0][0]), row[0][1]
-    flow = drive.flow(mechanism)
-    switched = any(mechanism.switched(p.constants()) for p, _ in row)
+    flow, mechanism = row[0].flow, row[0].mechanism
+    switched = any(mechanism.switched(point.constants.tolist()) for point in row)
     digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=switched), *code)).encode())
-    columns = [(*p.constants(), *d.vector(mechanism), *scale_of(p, d, guesses[0])) for p, d in row]
-    digest.update(np.array(columns).tobytes())
+    digest.update(np.array([(*p.constants, *p.vector, *p.scale(guesses[0])) for p in row]).tobytes())
     digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, *numbers]).tobytes())
     return digest.hexdigest()[:32]
 
 
-def kept_rows(
-    work: Callable[[Item], NDArray[np.float64]],
-    items: Sequence[Item],
-    names: Sequence[str],
-    shape: tuple[int, ...],
-    *,
-    mechanism: Mechanism,
-    folder: str | Path | None,
-    n_jobs: int | None,
-    progress: bool,
-    what: str,
-) -> tuple[NDArray[np.float64], int]:
-    """The array that ``work`` makes of each item: from the cache, or over workers and then kept there.
+@dataclass(frozen=True, slots=True)
+class Keeping:
+    """How rows are computed over workers and kept on disk.
 
-    Parameters
+    Attributes
     ----------
-    names : sequence of str
-        Of the items in the cache: see `name_of`.
-    shape : tuple of int
-        Of each array.
-    mechanism : Mechanism
-        Which the workers are to know.
+    folder : path or None
+        Of the cache; `grid_folder` if None.
+    n_jobs : int or None
+    progress : bool
     what : str
-        Is written before the progress bar.
-
-    Returns
-    -------
-    rows : ndarray, shape (items, *shape)
-    computed : int
-        Rows that were not in the cache.
-
-    Raises
-    ------
-    InputError
-        If there are no cores.
-    GridInterrupted
-        On Ctrl-C.
+        Text before the progress bar.
     """
-    check_jobs(n_jobs)
-    where = grid_folder() if folder is None else Path(folder)
-    with suppress(OSError):  # said once the first row cannot be kept
-        where.mkdir(parents=True, exist_ok=True)
-    paths = [where / f"{name}.row" for name in names]
-    rows: dict[Path, NDArray[np.float64]] = {}
-    missing: dict[Path, Item] = {}
-    for path, item in zip(paths, items):
-        kept = load_array(path)
-        if kept is not None and kept.shape == shape:
-            rows[path] = kept
-        else:
-            missing[path] = item
-    unkept = 0
-    with interruptible() as interrupted, shown(progress, float(len(paths)), what) as show:
-        show(float(len(rows)))
-        compute, places = partial(_knowing, mechanism, work), list(missing)
-        for number, made in over_workers(compute, list(missing.values()), interrupted, n_jobs=n_jobs):
-            path = places[number]
-            rows[path] = made
-            try:
-                save_array(path, made)
-            except OSError as error:
-                if not unkept:
-                    warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
-                unkept += 1
+
+    folder: str | Path | None
+    n_jobs: int | None
+    progress: bool
+    what: str
+
+    def rows(
+        self,
+        work: Callable[[Item], FloatArray],
+        items: Sequence[Item],
+        names: Sequence[str],
+        shape: tuple[int, ...],
+    ) -> tuple[FloatArray, int]:
+        """Return the array that ``work`` makes of each item, from the cache or from a worker, and then keep it.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of the items in the cache: see `row_name`.
+        shape : tuple of int
+            Of each array.
+
+        Returns
+        -------
+        rows : ndarray, shape (items, *shape)
+        computed : int
+            Rows that were not in the cache.
+
+        Raises
+        ------
+        InputError
+            If there are no cores.
+        GridInterrupted
+            On Ctrl-C.
+        """
+        check_jobs(self.n_jobs)
+        where = grid_folder() if self.folder is None else Path(self.folder)
+        with suppress(OSError):  # said once the first row cannot be kept
+            where.mkdir(parents=True, exist_ok=True)
+        paths = [where / f"{name}.row" for name in names]
+        rows: dict[Path, FloatArray] = {}
+        missing: dict[Path, Item] = {}
+        for path, item in zip(paths, items):
+            kept = load_array(path)
+            if kept is not None and kept.shape == shape:
+                rows[path] = kept
+            else:
+                missing[path] = item
+        unkept = 0
+        with interruptible() as interrupted, shown(self.progress, float(len(paths)), self.what) as show:
             show(float(len(rows)))
-            if interrupted:
-                break
-        if interrupted and len(rows) < len(set(paths)):
-            raise GridInterrupted(len(rows) - unkept, len(paths), where)
-    return np.array([rows[path] for path in paths]), len(missing)
+            places = list(missing)
+            for number, made in over_workers(work, list(missing.values()), interrupted, n_jobs=self.n_jobs):
+                path = places[number]
+                rows[path] = made
+                try:
+                    save_array(path, made)
+                except OSError as error:
+                    if not unkept:
+                        warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
+                    unkept += 1
+                show(float(len(rows)))
+                if interrupted:
+                    break
+            if interrupted and len(rows) < len(set(paths)):
+                raise GridInterrupted(len(rows) - unkept, len(paths), where)
+        return np.array([rows[path] for path in paths]), len(missing)
 
 
-def _knowing(mechanism: Mechanism, work: Callable[[Item], NDArray[np.float64]], item: Item) -> NDArray[np.float64]:
-    """The work on an item, in a process in which a mechanism that the caller has registered may be unknown."""
-    MECHANISMS.setdefault(mechanism.name, mechanism)
-    return work(item)
-
-
-#: Margin from which on a long run distinguishes growth from decay with certainty.
+#: Least margin with which a long run distinguishes growth from decay with certainty.
 MEASURABLE = 1e-2
 
 
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
-    """Three points of a grid that put it to the test: its most stable, its least stable, and the one nearest to a boundary.
+    """Choose three points of a grid for long runs: the most stable, the least stable, and the one nearest to a boundary.
 
-    The last is the point of the least margin, to either side, that a long run can still measure, and none of the two others.
+    The last is the point with the least margin, to either side, that a long run can still measure.
 
     Returns
     -------
     list of (int, int)
-        Rows and columns; as many as have an orbit where these are fewer than three, none where the grid has none.
+        Rows and columns; fewer than three if fewer points have an orbit.
     """
     margin = 1.0 - found.largest
     if margin.count() == 0:

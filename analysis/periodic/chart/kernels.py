@@ -1,9 +1,17 @@
-"""Compiled: the periodic motions of a row of mechanisms, one of each or all, and where starts end."""
+"""Compiled: the periodic motions of a row of mechanisms, one of each or all of them, and the basins of attraction.
+
+Along a row the orbits change evenly: the polynomial through the last ones predicts the next at every node, and collocation
+corrects it. If that fails (friction, a torque, the limit of assembly, a fold on the way) shooting finds the orbit, from its
+neighbour to the left, from that to the right, or from other starts.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import boolean, float64, int64, types
+from numpy.typing import NDArray
 
 from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inner, kernel, part
 from ..motion.collocation import NODES, close, make_desk, spread
@@ -24,27 +32,107 @@ from ..motion.kernels import (
 
 #: Elements of a turn, from few to many.
 COUNTS = np.array([6, 8, 12, 16, 24, 32, 48])
-
-#: `collocation.tail_of` below which fewer elements of a turn are taken, relative to the root of the integrator's tolerance.
+#: Value of `collocation.tail` below which fewer elements of a turn are taken, relative to the root of the tolerance.
 IDLE = 0.7
-
-#: Orbits of a row without a look whether elements suffice, after one where they did not.
+#: Orbits of a row that are not tried by collocation after one for which no number of elements sufficed.
 _PAUSE = 8
-
-#: Binomial coefficients with signs: the next of so many equally spaced values of a polynomial, from the last on.
+#: Extrapolation by a polynomial through one to four equally spaced values: weights, the last value first.
 _NEXT = np.array([[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]])
-
 PASSED = len(_NEXT)
+#: Periodic motions of a point that are kept at most.
+MOST_ORBITS = 8
+
+
+class Points(NamedTuple):
+    """The mechanisms of a row, shapes (m, constants), (m, drive) and (m, n): as `Section` has them."""
+
+    constants: NDArray[np.float64]
+    drives: NDArray[np.float64]
+    scales: NDArray[np.float64]
+
+
+class Search(NamedTuple):
+    """How the orbits of a row are sought.
+
+    Attributes
+    ----------
+    end : float
+        Crank angle at the end of the period (rad).
+    turns : int
+        Turns in a period.
+    most : int
+        Newton iterations at most.
+    loose : float
+        Tolerance of the integrator in the search from further starts.
+    smooth : bool
+        Whether collocation serves.
+    """
+
+    end: float
+    turns: int
+    most: int
+    loose: float
+    smooth: bool
+
+
+class Row(NamedTuple):
+    """The orbits of a row.
+
+    Attributes
+    ----------
+    starts : ndarray, shape (m, n)
+        y at crank angle 0, written where the status is DONE.
+    monodromies : ndarray, shape (m, n n)
+        Monodromy matrices by columns, likewise.
+    status : ndarray of int64, shape (m,)
+        The `Status` of each.
+    """
+
+    starts: NDArray[np.float64]
+    monodromies: NDArray[np.float64]
+    status: NDArray[np.int64]
+
+
+class Motions(NamedTuple):
+    """All orbits of a row, at most MOST_ORBITS of each point.
+
+    Attributes
+    ----------
+    starts, monodromies, swings : ndarray, shapes (m, MOST_ORBITS, n), (m, MOST_ORBITS, n n) and (m, MOST_ORBITS, samples)
+        Starts, monodromy matrices, and samples of the first component of y.
+    counts : ndarray of int64, shape (m,)
+        Number of orbits of each point.
+    """
+
+    starts: NDArray[np.float64]
+    monodromies: NDArray[np.float64]
+    swings: NDArray[np.float64]
+    counts: NDArray[np.int64]
+
+
+POINTS = types.NamedUniTuple(MATRIX, 3, Points)
+SEARCH = types.NamedTuple((float64, int64, int64, float64, boolean), Search)
+ROW = types.NamedTuple((MATRIX, MATRIX, int64[::1]), Row)
+MOTIONS = types.NamedTuple((CUBE, CUBE, CUBE, int64[::1]), Motions)
 
 
 @part
-def settle_on(section, end, turns, level, start, angles, path, desk, room):
-    """Begin with the fewest elements that suffice, from the given level of `COUNTS` on; the level, -1 if there is none."""
+def point_section(section, points, row, tolerance):
+    """Return the section of one mechanism of a row."""
+    return numbered(section, points.drives[row], points.constants[row], points.scales[row], tolerance)
+
+
+@part
+def divide(section, search, level, start, angles, path, desk, room):
+    """Find an orbit by collocation with the fewest elements that suffice, from a level of `COUNTS` on.
+
+    Returns the level, -1 if there is none.
+    """
     y, w = path
     while level < len(COUNTS):
-        m = COUNTS[level] * turns
+        m = COUNTS[level] * search.turns
         for e in range(m + 1):
-            angles[e] = end * e / m
+            angles[e] = search.end * e / m
         if spread(section, angles, start, y[:m], w[:m], room) != DONE:
             return -1
         status = close(section, angles, y[:m], w[:m], desk, room)
@@ -56,16 +144,9 @@ def settle_on(section, end, turns, level, start, angles, path, desk, room):
     return -1
 
 
-@part
-def from_guess(own, wide, end, most, start, z, room, carry, report):
-    """Newton's method from far, at first to the tolerance of a search."""
-    status = newton(wide, end, most, start, z, room, carry, report)
-    return newton(own, end, most, start, z, room, carry, report) if status == DONE else status
-
-
 @inner
 def predict(known, size, path):
-    """The next of a vector, of which ``size`` numbers count, into the first row from so many before it."""
+    """Extrapolate the first ``size`` numbers of a vector from the rows below into the first row."""
     for i in range(size):
         path[0, i] = 0.0
         for old in range(known):
@@ -73,42 +154,42 @@ def predict(known, size, path):
 
 
 @inner
-def make_way(size, path):
-    """Move what is known of a vector, of which ``size`` numbers count, on by a row."""
+def shift(size, path):
+    """Move the first ``size`` numbers of each vector down by a row."""
     for old in range(PASSED, 0, -1):
         copy(path[old - 1, :size], path[old, :size])
 
 
 @part
-def from_left(section, rows, end, turns, most, loose, smooth, guess, found):
-    """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
-    (parameters, drives, scales), (starts, monodromies, status) = rows, found
+def solve_from_left(section, points, search, guess, found):
+    """Find the orbits of a row from left to right: by collocation as far as it goes, else by shooting."""
+    starts, monodromies, status = found
     n = guess.shape[0]
     z = np.empty(n * (1 + n))
     carry = np.array([0.1, 0.0])
     report = np.zeros(3)
     start = np.empty(n)
-    most_elements = COUNTS[-1] * turns
+    most_elements = COUNTS[-1] * search.turns
     angles = np.zeros(most_elements + 1)
-    # of this orbit and of those before it, the last first: all numbers of one in a row, and by elements
+    # this orbit and those before it, the last first: all numbers of one in a row, and by elements
     ys, ws = np.zeros((1 + PASSED, most_elements * n)), np.zeros((1 + PASSED, most_elements * NODES * (n // 2)))
     y, w = ys.reshape((1 + PASSED, most_elements, n)), ws.reshape((1 + PASSED, most_elements, NODES, n // 2))
     desk = make_desk(n, most_elements)
     level, known, pause = 0, 0, 0
     passed = 0
-    for row in range(parameters.shape[0]):
-        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+    for row in range(status.shape[0]):
+        own = point_section(section, points, row, section.tolerance)
         room = make_room(own, n)
         what = DIVERGED
         if known:
-            m = COUNTS[level] * turns
+            m = COUNTS[level] * search.turns
             predict(known, y[0, :m].size, ys)
             predict(known, w[0, :m].size, ws)
             what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, room)
             if what == NO_STEP:
                 # more elements; the start is good enough to go on from
                 copy(y[0, 0], start)
-                more = settle_on(own, end, turns, level + 1, start, angles, (y[0], w[0]), desk, room)
+                more = divide(own, search, level + 1, start, angles, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
                 what = DONE if more >= 0 else NO_STEP
         by_collocation = what == DONE
@@ -121,11 +202,14 @@ def from_left(section, rows, end, turns, most, loose, smooth, guess, found):
             elif passed == 1:
                 copy(starts[row - 1], start)
             if passed:
-                what = newton(own, end, most, start, z, room, carry, report)
+                what = newton(own, search.end, search.most, start, z, room, carry, report)
             if what != DONE:
+                # from far away, to the tolerance of a search at first
                 copy(guess, start)
-                wide = numbered(section, drives[row], parameters[row], scales[row], loose)
-                what = from_guess(own, wide, end, most, start, z, room, carry, report)
+                wide = point_section(section, points, row, search.loose)
+                what = newton(wide, search.end, search.most, start, z, room, carry, report)
+                if what == DONE:
+                    what = newton(own, search.end, search.most, start, z, room, carry, report)
         status[row] = what
         if what != DONE:
             passed = 0
@@ -140,57 +224,57 @@ def from_left(section, rows, end, turns, most, loose, smooth, guess, found):
             copy(start, starts[row])
             copy(z[n:], monodromies[row])
             pause -= 1
-            if smooth and not section.torque and pause < 0:
-                more = settle_on(own, end, turns, level, start, angles, (y[0], w[0]), desk, room)
+            if search.smooth and pause < 0:
+                more = divide(own, search, level, start, angles, (y[0], w[0]), desk, room)
                 level, by_collocation = max(more, 0), more >= 0
                 if not by_collocation:
                     pause = _PAUSE
         if by_collocation:
-            m = COUNTS[level] * turns
-            make_way(y[0, :m].size, ys)
-            make_way(w[0, :m].size, ws)
+            m = COUNTS[level] * search.turns
+            shift(y[0, :m].size, ys)
+            shift(w[0, :m].size, ws)
             known = min(known + 1, PASSED)
             if level > 0 and desk.report[0] < IDLE * np.sqrt(section.tolerance):
-                # fewer elements the next time, which is begun by shooting
+                # fewer elements for the next orbit, which is begun by shooting
                 copy(y[0, 0], start)
                 level -= 1
                 known = 0
 
 
 @part
-def from_right(section, rows, end, most, found):
-    """What was not found from the left may be found from the right."""
-    (parameters, drives, scales), (starts, monodromies, status) = rows, found
+def solve_from_right(section, points, search, found):
+    """Find orbits that were not found from the left from their neighbours to the right."""
+    starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
-    for row in range(parameters.shape[0] - 2, -1, -1):
+    for row in range(status.shape[0] - 2, -1, -1):
         if status[row] != DONE and status[row + 1] == DONE:
-            own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+            own = point_section(section, points, row, section.tolerance)
             start = starts[row + 1].copy()
-            if newton(own, end, most, start, z, make_room(own, n), carry, report) == DONE:
+            if newton(own, search.end, search.most, start, z, make_room(own, n), carry, report) == DONE:
                 status[row] = DONE
                 copy(start, starts[row])
                 copy(z[n:], monodromies[row])
 
 
 @part
-def from_others(section, rows, end, most, loose, guesses, found):
-    """What was not found from a neighbour is sought from the guesses but the first, once it is found from the left again."""
-    (parameters, drives, scales), (starts, monodromies, status) = rows, found
+def solve_from_guesses(section, points, search, guesses, found):
+    """Find orbits that were not found from a neighbour from the other guesses, and from the left once more."""
+    starts, monodromies, status = found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
     none = np.empty((0, n))
-    for row in range(parameters.shape[0]):
+    for row in range(status.shape[0]):
         if status[row] == DONE:
             continue
-        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-        wide = numbered(section, drives[row], parameters[row], scales[row], loose)
+        own = point_section(section, points, row, section.tolerance)
+        wide = point_section(section, points, row, search.loose)
         room = make_room(own, n)
         for guess in range(0 if row > 0 and status[row - 1] == DONE else 1, guesses.shape[0]):
             start = guesses[guess].copy() if guess else starts[row - 1].copy()
             if (
-                deflated(wide, end, most, 1.0, start, none, z, room, carry) == DONE
-                and newton(own, end, most, start, z, room, carry, report) == DONE
+                deflated(wide, search.end, search.most, 1.0, start, none, z, room, carry) == DONE
+                and newton(own, search.end, search.most, start, z, room, carry, report) == DONE
             ):
                 status[row] = DONE
                 copy(start, starts[row])
@@ -198,59 +282,35 @@ def from_others(section, rows, end, most, loose, guesses, found):
                 break
 
 
-@kernel(
-    types.void(
-        SECTION,
-        types.UniTuple(MATRIX, 3),
-        float64,
-        int64,
-        int64,
-        float64,
-        boolean,
-        MATRIX,
-        types.Tuple((MATRIX, MATRIX, int64[::1])),
-    ),
-    purpose="grids of periodic motions",
-)
-def solve_row(section, rows, end, turns, most, loose, smooth, guesses, found):
-    """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
-
-    By collocation from the PASSED orbits before, as far as it goes; where it does not, by shooting.
+@kernel(types.void(SECTION, POINTS, SEARCH, MATRIX, ROW), purpose="grids of periodic motions")
+def solve_row(section, points, search, guesses, found):
+    """Find one orbit of each of a row of mechanisms, each from the last: a row of a chart.
 
     Parameters
     ----------
-    rows : tuple of ndarray, shapes (m, constants), (m, drive) and (m, n)
-        Parameters, drives and scales as in `Section`, which has the rest.
-    turns : int
-        In a period.
-    loose : float
-        Tolerance of the search from further starts.
-    smooth : bool
-        Whether collocation serves.
+    section : Section
+        What the mechanisms share.
+    points : Points
+    search : Search
     guesses : ndarray, shape (k, n)
-        Start of the first; where Newton's method fails from the neighbour it is begun anew from there. An orbit that is not
-        found from a neighbour on either side is sought from the others.
-    found : tuple of ndarray, shapes (m, n), (m, n n) and (m,)
-        Starts, y at crank angle 0, and monodromy matrices by columns, written where the status is DONE; the `Status` of each,
-        int64.
+        The first is the start for the first mechanism, and after each failure of Newton's method. An orbit that is not found
+        from a neighbour on either side is sought from the others.
+    found : Row
+        Written.
     """
-    from_left(section, rows, end, turns, most, loose, smooth, guesses[0].copy(), found)
-    from_right(section, rows, end, most, found)
+    solve_from_left(section, points, search, guesses[0].copy(), found)
+    solve_from_right(section, points, search, found)
     missing = False
-    for what in found[2]:
+    for what in found.status:
         missing |= what != DONE
     if missing:
-        from_others(section, rows, end, most, loose, guesses, found)
-        from_right(section, rows, end, most, found)
-
-
-#: Periodic motions of a point at most that are kept.
-MOST_ORBITS = 8
+        solve_from_guesses(section, points, search, guesses, found)
+        solve_from_right(section, points, search, found)
 
 
 @inner
 def _is_known(start, known, scale, away):
-    """Whether a start is among the known ones."""
+    """Return whether a start is among the known ones."""
     found = False
     for k in range(known.shape[0]):
         difference(start, known[k], away)
@@ -258,35 +318,29 @@ def _is_known(start, known, scale, away):
     return found
 
 
-@kernel(
-    types.void(
-        SECTION, types.UniTuple(MATRIX, 3), float64, int64, float64, VECTOR, MATRIX, types.UniTuple(CUBE, 3),
-        int64[::1],
-    ),
-    purpose="grids of coexisting motions",
-)  # fmt: skip
-def solve_all(section, rows, end, most, loose, angles, guesses, found, counts):
-    """All orbits of each of a row of mechanisms, as far as they are found: see `solve_row` for what is not said here.
+@kernel(types.void(SECTION, POINTS, SEARCH, VECTOR, MATRIX, MOTIONS), purpose="grids of coexisting motions")
+def solve_all(section, points, search, angles, guesses, found):
+    """Find all orbits of each of a row of mechanisms.
 
-    Each point's orbits are sought from those of the point before, then from every guess with the known ones divided out.
+    The orbits of each point are sought from those of the point before, then from every guess with the known ones divided out.
 
     Parameters
     ----------
     angles : ndarray, shape (samples,)
-        Crank angles at which the first component of y is taken.
-    found : tuple of ndarray, shapes (m, MOST_ORBITS, n), (m, MOST_ORBITS, n n) and (m, MOST_ORBITS, samples)
-        Starts, monodromy matrices, and that component at these angles; written.
-    counts : ndarray of int64, shape (m,)
-        Orbits of each; written.
+        Crank angles at which the first component of y is sampled.
+    found : Motions
+        Written.
+
+    The other parameters are those of `solve_row`.
     """
-    (parameters, drives, scales), (starts, monodromies, swings) = rows, found
+    starts, monodromies, swings, counts = found
     n = guesses.shape[1]
     z, single = np.empty(n * (1 + n)), np.empty(n)
     report, carry = np.zeros(3), np.array([0.1, 0.0])
     start = np.empty(n)
-    for row in range(parameters.shape[0]):
-        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-        wide = numbered(section, drives[row], parameters[row], scales[row], loose)
+    for row in range(counts.shape[0]):
+        own = point_section(section, points, row, section.tolerance)
+        wide = point_section(section, points, row, search.loose)
         room, plain = make_room(own, n), make_room(own, 0)
         count = 0
         before = counts[row - 1] if row > 0 else 0
@@ -296,9 +350,10 @@ def solve_all(section, rows, end, most, loose, angles, guesses, found, counts):
                     copy(starts[row - 1, place], start)
                 else:
                     copy(guesses[place - before], start)
-                    if deflated(wide, end, most, 1.0, start, starts[row, :count], z, room, carry) != DONE:
+                    known = starts[row, :count]
+                    if deflated(wide, search.end, search.most, 1.0, start, known, z, room, carry) != DONE:
                         break
-                if newton(own, end, most, start, z, room, carry, report) != DONE:
+                if newton(own, search.end, search.most, start, z, room, carry, report) != DONE:
                     break
                 if _is_known(start, starts[row, :count], own.scale, single):
                     break
@@ -317,28 +372,25 @@ def solve_all(section, rows, end, most, loose, angles, guesses, found, counts):
         counts[row] = count
 
 
-#: How a start ended that was followed until it stays with a motion: at the limit of assembly, or not within the turns.
+#: Ends of a start that settles on no known motion: at the limit of assembly, or not within the turns.
 LOST, UNSETTLED = -1, -2
 
 
-@kernel(
-    types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]),
-    purpose="basins of attraction",
-)
-def basins_of(section, turn, near, most, starts, known, ends):
-    """Which of the known motions each start ends in, followed turn by turn.
+@kernel(types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]), purpose="basins of attraction")
+def settle_starts(section, turn, near, most, starts, known, ends):
+    """Follow each start turn by turn until it settles on one of the known motions.
 
     Parameters
     ----------
     turn : float
         Crank angle of a turn (rad).
     near : float
-        Distance from a known start, relative to the scale, at which the motion counts as arrived.
+        Distance from a known start, relative to the scale, at which the motion counts as settled.
     most : int
         Turns at most.
     starts, known : ndarray, shapes (m, n) and (k, n)
     ends : ndarray of int64, shape (m,)
-        Number of the known motion, `LOST` where the links come to the limit of assembly, `UNSETTLED`; written.
+        Written: number of the known motion, or `LOST` or `UNSETTLED`.
     """
     room = make_room(section, 0)
     z, away, carry = np.empty(starts.shape[1]), np.empty(starts.shape[1]), np.array([0.1, 0.0])

@@ -1,12 +1,12 @@
-"""Compiled: a period by Gauss collocation, from what is known of it from a neighbour.
+"""Compiled: Gauss collocation. A period from what is known of a neighbouring one.
 
-At prescribed speed the coordinates follow from the rates, and these from their slopes over the crank angle: the unknowns are
-the slopes w at the Gauss nodes of each element of a period, and y at its beginning. All of them are corrected together
-(Newton's method), the slopes of an element being eliminated first, so that the elements are joined by small matrices, whose
-product is the monodromy matrix. With NODES nodes the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G.
-Wanner, Solving Ordinary Differential Equations I, section II.7). From a good guess, which neighbours give at every node, two
-or three corrections do, each with a sixth of the right-hand sides that an integrator of order 8 needs for a period; and the
-decay of the Legendre coefficients over each element says how good it is.
+At prescribed speed the coordinates follow from the rates, and the rates from their slopes over the crank angle. The unknowns
+are therefore the slopes w at the Gauss nodes of each element of a period, and y at its beginning. Newton's method corrects all
+of them together. The slopes of an element are eliminated first; small matrices, whose product is the monodromy matrix, then
+join the elements. With NODES nodes the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G. Wanner, Solving
+Ordinary Differential Equations I, section II.7). From a good guess, which neighbours give at every node, two or three
+corrections suffice, each with a sixth of the right-hand sides that an integrator of order 8 needs for a period. The decay of
+the Legendre coefficients over each element tells the error.
 """
 
 from __future__ import annotations
@@ -22,31 +22,25 @@ from linkwork.limits import LIMIT_SINE
 from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ...numerics.gauss import gauss
 from .flow import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
-from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, make_room
+from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room
 
 #: Nodes of an element.
 NODES = 12
-
-#: Places and weights on an element of length 1, integrals of the Lagrange polynomials up to each place, the same twice.
+#: Nodes and weights on an element of length 1, integrals of the Lagrange polynomials up to each node, and their integrals.
 C, B, A, _COEFFICIENTS = gauss(NODES)
-
 AA = np.ascontiguousarray(A @ A)
-
 BA = B @ A
-
 #: The two highest Legendre coefficients.
 TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
-
-#: `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
+#: `tail` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
 DECAY = 200.0
-
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 
 
 class Bench(NamedTuple):
-    """Room to work in: what a flow takes and gives; derivatives of the rates' slopes by coordinates and by rates at the
-    nodes, and along lambda those of coordinates' slopes; the equations of an element."""
+    """Work space of an element: arguments and values of the flow; derivatives of the rates' slopes by coordinates and by
+    rates at the nodes; derivatives of the coordinates' slopes by lambda; the linear equations."""
 
     z: NDArray[np.float64]
     out: NDArray[np.float64]
@@ -56,9 +50,30 @@ class Bench(NamedTuple):
     equations: NDArray[np.float64]
 
 
+class Element(NamedTuple):
+    """A linearised element, written by `condense`.
+
+    Attributes
+    ----------
+    end : ndarray, shape (n,)
+        y at its end, with the slopes corrected.
+    matrix : ndarray, shape (n, n)
+        Derivatives of the end by y at the beginning.
+    slope : ndarray, shape (n,)
+        Derivatives of the end by lambda.
+    moves : ndarray, shape (NODES f, 1 + n (+ 1))
+        Corrections of the slopes w, and their derivatives by the beginning and by lambda.
+    """
+
+    end: NDArray[np.float64]
+    matrix: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    moves: NDArray[np.float64]
+
+
 @part
 def make_bench(n, directional):
-    """Room for y of n components."""
+    """Make work space for y of n components."""
     f = n // 2
     size = NODES * f
     columns = n + 1 if directional else n
@@ -73,48 +88,16 @@ def make_bench(n, directional):
 
 
 @inner
-def eliminate(matrix, size):
-    """Solve a system with its right-hand sides in the columns after the first ``size``, in place; whether it could be."""
-    width = matrix.shape[1]
-    for c in range(size):
-        pivot = c
-        for r in range(c + 1, size):
-            if abs(matrix[r, c]) > abs(matrix[pivot, c]):
-                pivot = r
-        # a NaN is no pivot either
-        if not abs(matrix[pivot, c]) > 0.0:
-            return False
-        if pivot != c:
-            for j in range(c, width):
-                matrix[c, j], matrix[pivot, j] = matrix[pivot, j], matrix[c, j]
-        inverse = 1.0 / matrix[c, c]
-        for r in range(c + 1, size):
-            factor = matrix[r, c] * inverse
-            if factor != 0.0:
-                for j in range(c + 1, width):
-                    matrix[r, j] -= factor * matrix[c, j]
-    for c in range(size - 1, -1, -1):
-        inverse = 1.0 / matrix[c, c]
-        for j in range(size, width):
-            matrix[c, j] *= inverse
-        for r in range(c):
-            factor = matrix[r, c]
-            for j in range(size, width):
-                matrix[r, j] -= factor * matrix[c, j]
-    return True
-
-
-@inner
 def identity(matrix):
-    """Write the identity."""
+    """Write the identity matrix."""
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[0]):
             matrix[i, j] = 1.0 if i == j else 0.0
 
 
 @inner
-def pace_of(section, y, bench):
-    """The time that a radian takes: the derivative of a coordinate's slope by its rate."""
+def pace(section, y, bench):
+    """Return the time per radian: the derivative of a coordinate's slope by its rate."""
     n = y.shape[0]
     bench.z[:] = 0.0
     for i in range(n):
@@ -125,24 +108,23 @@ def pace_of(section, y, bench):
 
 
 @inner
-def at_node(s, h, pace, y, w, z):
-    """y at a node of an element, into z."""
+def at_node(s, h, unit, y, w, z):
+    """Write y at a node of an element into z."""
     f = w.shape[1]
     for i in range(f):
         q, v = C[s] * y[f + i], y[f + i]
         for j in range(NODES):
             q += h * AA[s, j] * w[j, i]
             v += h * A[s, j] * w[j, i]
-        z[i] = y[i] + h * pace * q
+        z[i] = y[i] + h * unit * q
         z[f + i] = v
 
 
 @inner
-def condense(section, angle, h, pace, y, w, bench, into):
-    """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; whether it could be.
+def condense(section, angle, h, unit, y, w, bench, into):
+    """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; return whether that was possible.
 
-    Written are ``into`` y at its end with the slopes corrected for this beginning, shape (n,), its derivatives by the
-    beginning, (n, n), and by lambda, (n,), and the corrections and derivatives of the slopes, (NODES f, 1 + n (+ 1)).
+    The result is written to ``into``, an `Element`.
     """
     end, matrix, slope, moves = into
     n = y.shape[0]
@@ -155,7 +137,7 @@ def condense(section, angle, h, pace, y, w, bench, into):
     for i in range(n):
         z[n + i * n + i] = 1.0
     for s in range(NODES):
-        at_node(s, h, pace, y, w, z)
+        at_node(s, h, unit, y, w, z)
         evaluate(equation, angle + C[s] * h, z, section.modes, section.drive, section.p, out)
         for i in range(f):
             system[s * f + i, size] = out[f + i] - w[s, i]
@@ -169,7 +151,7 @@ def condense(section, angle, h, pace, y, w, bench, into):
         for i in range(f):
             row = s * f + i
             for j in range(f):
-                by_q, by_v = h * pace * bench.by_q[s, i, j], bench.by_v[s, i, j]
+                by_q, by_v = h * unit * bench.by_q[s, i, j], bench.by_v[s, i, j]
                 for t in range(NODES):
                     system[row, t * f + j] = -h * (A[s, t] * by_v + AA[s, t] * by_q)
                 system[row, size + 1 + j] = bench.by_q[s, i, j]
@@ -184,19 +166,19 @@ def condense(section, angle, h, pace, y, w, bench, into):
         for j in range(moves.shape[1]):
             moves[row, j] = system[row, size + j]
     for i in range(f):
-        end[i] = y[i] + h * pace * y[f + i]
+        end[i] = y[i] + h * unit * y[f + i]
         end[f + i] = y[f + i]
         for j in range(n):
             matrix[i, j] = 0.0
             matrix[f + i, j] = 0.0
         matrix[i, i] = 1.0
-        matrix[i, f + i] = h * pace
+        matrix[i, f + i] = h * unit
         matrix[f + i, f + i] = 1.0
         slope[i] = 0.0
         slope[f + i] = 0.0
         for s in range(NODES):
             row = s * f + i
-            far, near = h * h * pace * BA[s], h * B[s]
+            far, near = h * h * unit * BA[s], h * B[s]
             value = w[s, i] + moves[row, 0]
             end[i] += far * value
             end[f + i] += near * value
@@ -210,8 +192,8 @@ def condense(section, angle, h, pace, y, w, bench, into):
 
 
 @inner
-def tail_of(h, scale, along, w, moves):
-    """How far the Legendre coefficients of the slopes, and of their derivatives by the beginning and lambda, have decayed."""
+def tail(h, scale, along, w, moves):
+    """Return the size of the last Legendre coefficients of the slopes and of their derivatives, relative to the greatest."""
     f = w.shape[1]
     n = 2 * f
     worst = 0.0
@@ -229,11 +211,11 @@ def tail_of(h, scale, along, w, moves):
 
 
 @inner
-def correct(section, angles, y, w, desk):
-    """One correction of beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period; its size relative to the scale.
+def correct_period(section, angles, y, w, desk):
+    """Correct beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period once; return the size of the correction.
 
-    Written on the desk are what `condense` gives of each element, the monodromy matrix before the correction, and the decay of
-    the Legendre coefficients into ``report[0]``. Returns NaN where there is no correction.
+    Written on the desk are each `Element`, the monodromy matrix before the correction, and the decay of the Legendre
+    coefficients into ``report[0]``. The size is relative to the scale, and NaN if there is no correction.
     """
     bench, ends, matrices, slopes, moves, monodromy, report = desk
     m, n = y.shape
@@ -241,25 +223,19 @@ def correct(section, angles, y, w, desk):
     scale = section.scale
     shift, column = bench.z, bench.out
     report[0] = 0.0
-    pace = pace_of(section, y[0], bench)
+    unit = pace(section, y[0], bench)
     identity(monodromy)
     for e in range(m):
         h = angles[e + 1] - angles[e]
-        into = ends[e], matrices[e], slopes[e], moves[e]
-        if not condense(section, angles[e], h, pace, y[e], w[e], bench, into):
+        into = Element(ends[e], matrices[e], slopes[e], moves[e])
+        if not condense(section, angles[e], h, unit, y[e], w[e], bench, into):
             return np.nan
-        report[0] = max(report[0], tail_of(h, scale, section.along, w[e], moves[e]))
+        report[0] = max(report[0], tail(h, scale, section.along, w[e], moves[e]))
         after = y[(e + 1) % m]
         for i in range(n):
             ends[e, i] -= after[i]
-        for j in range(n):
-            for i in range(n):
-                column[i] = 0.0
-                for k in range(n):
-                    column[i] += matrices[e, i, k] * monodromy[k, j]
-            for i in range(n):
-                monodromy[i, j] = column[i]
-    # the gaps between the elements, carried to the end of the period
+        _chain(matrices[e], monodromy, column)
+    # carry the gaps between the elements to the end of the period
     for i in range(n):
         shift[i] = 0.0
     for e in range(m):
@@ -293,8 +269,21 @@ def correct(section, angles, y, w, desk):
 
 
 @inner
+def _chain(matrix, product, column):
+    """Multiply a product of matrices by the next one from the left, in place."""
+    n = product.shape[0]
+    for j in range(n):
+        for i in range(n):
+            column[i] = 0.0
+            for k in range(n):
+                column[i] += matrix[i, k] * product[k, j]
+        for i in range(n):
+            product[i, j] = column[i]
+
+
+@inner
 def _carry(matrix, gap, shift, column):
-    """A deviation at the beginning of an element becomes that at the beginning of the next."""
+    """Carry a deviation at the beginning of an element to the beginning of the next."""
     n = gap.shape[0]
     for i in range(n):
         column[i] = gap[i]
@@ -306,13 +295,13 @@ def _carry(matrix, gap, shift, column):
 
 @inner
 def least_gap(section, angles, y, w, bench, gap):
-    """How near the links come to the limit of assembly at the nodes; NaN beyond it."""
+    """Return the least clearance to the limit of assembly at the nodes; NaN beyond it."""
     least = np.inf
-    pace = pace_of(section, y[0], bench)
+    unit = pace(section, y[0], bench)
     for e in range(y.shape[0]):
         h = angles[e + 1] - angles[e]
         for s in range(NODES):
-            at_node(s, h, pace, y[e], w[e], bench.z)
+            at_node(s, h, unit, y[e], w[e], bench.z)
             evaluate(
                 section.equations[GAP], angles[e] + C[s] * h, bench.z, section.modes, section.drive, section.p, gap
             )
@@ -322,7 +311,7 @@ def least_gap(section, angles, y, w, bench, gap):
 
 
 class Desk(NamedTuple):
-    """Room to work in for a period: that of an element, what `condense` writes of each, and what `correct` does."""
+    """Work space of a period: of an element, what `condense` writes of each, and what `correct_period` writes."""
 
     bench: Bench
     ends: NDArray[np.float64]
@@ -335,7 +324,7 @@ class Desk(NamedTuple):
 
 @part
 def make_desk(n, most):
-    """Room for y of n components and so many elements."""
+    """Make work space for y of n components and at most so many elements."""
     return Desk(
         make_bench(n, False),
         np.zeros((most, n)),
@@ -349,13 +338,13 @@ def make_desk(n, most):
 
 @part
 def close(section, angles, y, w, desk, room):
-    """Newton's method for beginnings y and slopes w of a period that closes; how it ended.
+    """Newton's method for the beginnings y and slopes w of a period that closes; return a `Status`.
 
-    NO_STEP says that the elements are too few.
+    NO_STEP means that the elements are too few.
     """
     before = 0.0
     for count in range(_CORRECTIONS):
-        size = correct(section, angles, y, w, desk)
+        size = correct_period(section, angles, y, w, desk)
         if not size <= (0.5 * before if count else _FAR):
             return DIVERGED
         if size <= 100.0 * section.tolerance:
@@ -368,7 +357,7 @@ def close(section, angles, y, w, desk, room):
 
 @part
 def spread(section, angles, start, y, w, room):
-    """Beginnings y and slopes w of the elements of a period from its start, by the integrator."""
+    """Compute beginnings y and slopes w of the elements of a period from its start by the integrator; return a `Status`."""
     n = start.shape[0]
     z, out = start.copy(), np.empty(n)
     carry = np.array([0.1, 0.0])
@@ -387,6 +376,62 @@ def spread(section, angles, start, y, w, room):
     return DONE
 
 
+@inner
+def solve_element(section, angle, h, unit, y, w, bench, into):
+    """Solve the slopes of an element from its beginning by Newton's method; return whether they were found."""
+    f = w.shape[1]
+    before = 0.0
+    for count in range(_CORRECTIONS):
+        if not condense(section, angle, h, unit, y, w, bench, into):
+            return False
+        size = 0.0
+        for row in range(into.moves.shape[0]):
+            w[row // f, row % f] += into.moves[row, 0]
+            size = max(size, abs(h * into.moves[row, 0]) / section.scale[f + row % f])
+        if not size <= (0.5 * before if count else _FAR):
+            return False
+        before = size
+        if size <= 100.0 * section.tolerance:
+            return True
+    return False
+
+
+class Neighbour(NamedTuple):
+    """What is known of a neighbouring motion, by elements.
+
+    Attributes
+    ----------
+    y : ndarray, shape (m, n)
+        Beginnings.
+    w : ndarray, shape (m, NODES, f)
+        Slopes.
+    moves : ndarray, shape (m, NODES f, 2 + n)
+        Their corrections and derivatives: see `Element`.
+    """
+
+    y: NDArray[np.float64]
+    w: NDArray[np.float64]
+    moves: NDArray[np.float64]
+
+
+class Walked(NamedTuple):
+    """What `walk` finds.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (k, n (2 + n))
+        y at the end of each piece, dy/dy0 by columns, dy/dlambda: as `kernels.segments` writes them.
+    tails : ndarray, shape (m,)
+        Decay of the Legendre coefficients of each element.
+    clearance : ndarray, shape (1,)
+        Least clearance to the limit of assembly.
+    """
+
+    rows: NDArray[np.float64]
+    tails: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+
+
 @kernel(
     int64(
         SECTION,
@@ -395,13 +440,13 @@ def spread(section, angles, start, y, w, room):
         MATRIX,
         float64,
         boolean,
-        types.Tuple((MATRIX, CUBE, CUBE)),
-        types.Tuple((MATRIX, VECTOR, VECTOR)),
+        types.NamedTuple((MATRIX, CUBE, CUBE), Neighbour),
+        types.NamedTuple((MATRIX, VECTOR, VECTOR), Walked),
     ),
     purpose="the collocation of periodic motions",
 )
 def walk(section, angles, firsts, starts, change, known, neighbour, found):
-    """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
+    """Solve y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
 
     Parameters
     ----------
@@ -414,27 +459,26 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
     change : float
         Of lambda from the neighbour.
     known : bool
-        Whether there is one; without it the integrator gives the first guess.
-    neighbour : tuple of ndarray, shapes (m, n), (m, NODES, f) and (m, NODES f, 2 + n)
-        Its beginnings, slopes and their derivatives; overwritten.
-    found : tuple of ndarray, shapes (k, n (2 + n)), (m,) and (1,)
-        Written: y at the end of each piece, dy/dy there by columns, dy/dlambda; decay of the Legendre coefficients of each
-        element; how near the links come to the limit of assembly.
+        Whether there is a neighbour; if not, the integrator gives the first guess.
+    neighbour : Neighbour
+        Overwritten with this motion.
+    found : Walked
+        Written.
 
     Returns
     -------
     int
-        A `Status`; NO_STEP where elements are too long, DIVERGED if the slopes were not found.
+        A `Status`; NO_STEP if elements are too long, DIVERGED if the slopes were not found.
     """
-    (y, w, moves), (rows, tails, report) = neighbour, found
+    (y, w, moves), (rows, tails, clearance) = neighbour, found
     n = starts.shape[1]
     f = n // 2
     scale = section.scale
     bench, room = make_bench(n, True), make_room(section, 0)
     start, end, column = np.empty(n), np.empty(n), np.empty(n)
     matrix, whole, slope, along = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
-    report[0] = np.inf
-    pace = pace_of(section, starts[0], bench)
+    clearance[0] = np.inf
+    unit = pace(section, starts[0], bench)
     for piece in range(starts.shape[0]):
         first, last = firsts[piece], firsts[piece + 1]
         copy(starts[piece], start)
@@ -453,29 +497,10 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
                     ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
                 w[e, row // f, row % f] += ahead
             copy(start, y[e])
-            before = 0.0
-            for count in range(_CORRECTIONS):
-                if not condense(section, angles[e], h, pace, y[e], w[e], bench, (end, matrix, slope, moves[e])):
-                    return DIVERGED
-                size = 0.0
-                for row in range(moves.shape[1]):
-                    w[e, row // f, row % f] += moves[e, row, 0]
-                    size = max(size, abs(h * moves[e, row, 0]) / scale[f + row % f])
-                if not size <= (0.5 * before if count else _FAR):
-                    return DIVERGED
-                before = size
-                if size <= 100.0 * section.tolerance:
-                    break
-            else:
+            if not solve_element(section, angles[e], h, unit, y[e], w[e], bench, Element(end, matrix, slope, moves[e])):
                 return DIVERGED
-            tails[e] = tail_of(h, scale, section.along, w[e], moves[e])
-            for j in range(n):
-                for i in range(n):
-                    column[i] = 0.0
-                    for k in range(n):
-                        column[i] += matrix[i, k] * whole[k, j]
-                for i in range(n):
-                    whole[i, j] = column[i]
+            tails[e] = tail(h, scale, section.along, w[e], moves[e])
+            _chain(matrix, whole, column)
             _carry(matrix, slope, along, column)
             copy(end, start)
         for i in range(n):
@@ -486,5 +511,5 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
     for e in range(tails.shape[0]):
         if tails[e] > DECAY * np.sqrt(section.tolerance):
             return NO_STEP
-    report[0] = least_gap(section, angles, y, w, bench, room.gap)
-    return DONE if report[0] > LIMIT_SINE else LIMIT
+    clearance[0] = least_gap(section, angles, y, w, bench, room.gap)
+    return DONE if clearance[0] > LIMIT_SINE else LIMIT

@@ -1,42 +1,52 @@
-"""Discretised periods: y at the ends of their pieces with exact derivatives, by shooting and by collocation."""
+"""Discretised periods: one interface for shooting and collocation, and the rule that chooses between them.
+
+A period is divided into pieces. The unknowns of a periodic motion are y at the beginnings of the pieces; the residual is y at
+the end of each piece less y at the beginning of the next; its exact Jacobian has the derivatives of each end by its beginning,
+whose product is the monodromy matrix with the Floquet multipliers. Either method gives the `Ends` of the pieces, and
+`orbit.OrbitEquations` makes of them what Newton's method and the continuation solve.
+
+- **Shooting** integrates each piece with steps of order 8. With one piece it is single shooting, with several multiple
+  shooting. It serves always.
+- **Collocation** corrects the polynomials of a neighbouring motion, element by element, with a sixth of the right-hand sides.
+  It serves if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as long as the links stay clear
+  of the limit of assembly and not too many elements are needed; else shooting takes over for a while.
+
+One piece is followed as long as a deviation grows less than `GROWTH` times over the period; then the period is divided so that
+deviations grow about `AIM` times over each piece (`choose_pieces`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, LinkworkError
+from linkwork.mechanism import Mechanism
 
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import MECHANISMS, Parameters, mechanism_of
 from ...run import takes_published
 from . import collocation, kernels
-from .drive import Direction, Drive, scale_in
+from .drive import Direction, Drive, is_smooth, scale_in
 from .flow import DIRECTIONAL, GAP, PLAIN, VARIATIONAL, Flow
 from .kernels import Section, Status
 
+FloatArray = NDArray[np.float64]
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
 INTEGRATOR_TOLERANCE = 1e-12
-
-
-class Stations(NamedTuple):
-    """Places of a period at which the motion is begun anew: multiple shooting.
-
-    Attributes
-    ----------
-    angles : ndarray, shape (k + 1,)
-        Crank angles (rad): the first 0, the last the end of the period.
-    starts : ndarray, shape (k, n)
-        y at all but the last.
-    growth : float
-        Greatest norm of the derivatives of y over a piece with respect to y at its beginning, scaled.
-    """
-
-    angles: NDArray[np.float64]
-    starts: NDArray[np.float64]
-    growth: float
+#: Growth of a deviation over a period, or over one of its pieces, from which it is divided into (more) pieces; growth aimed at
+#: for each; places of a turn from which the ends of the pieces are chosen.
+GROWTH, AIM, PLACES = 1e3, 10.0, 64
+#: Pieces of a turn at least.
+_FEWEST = 8
+#: Collocation: calls left to shooting after one in which no number of elements sufficed; elements of a turn to begin with;
+#: elements at most, for each piece and beside eight times as many as that; calls after which they are chosen anew.
+_PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 6, 8, 64
+#: Clearance to the limit of assembly below which shooting takes over: between the nodes the links may come nearer.
+_NEAR = 1e-2
 
 
 class OrbitError(LinkworkError):
@@ -47,9 +57,9 @@ class OrbitError(LinkworkError):
     reason : str
         One sentence on why.
     start : tuple of float
-        y at crank angle 0 at which it ended: see `PeriodicOrbit`.
+        y at crank angle 0 of the last iterate: see `PeriodicOrbit`.
     residual : float
-        ``|y(T) - y(0)|`` relative to the scale there; infinite where not one period could be followed.
+        ``|y(T) - y(0)|`` relative to the scale there; infinite if not one period could be followed.
     iterations : int
     """
 
@@ -66,76 +76,175 @@ class OrbitError(LinkworkError):
 
 
 class OrbitAssemblyError(OrbitError, AssemblyError):
-    """The motion that was followed comes to the limit of assembly."""
+    """The motion comes to the limit of assembly on the way."""
 
 
-def section_of(
-    parameters: Parameters,
-    drive: Drive,
-    start: NDArray[np.float64],
-    *functions: int,
-    tolerance: float = INTEGRATOR_TOLERANCE,
-    direction: Direction | None = None,
-    along: float = 1.0,
-    beside: Sequence[Parameters] = (),
-) -> Section:
-    """What the kernels need of a mechanism and its drive.
+def orbit_error(
+    status: int, flow: Flow, start: FloatArray, residual: float = np.inf, iterations: int = 0
+) -> OrbitError:
+    """Return the error for a status of `kernels`."""
+    kind = OrbitAssemblyError if status == Status.LIMIT else OrbitError
+    return kind(kernels.REASONS[Status(status)], flow, start, float(residual), iterations)
 
-    Parameters
+
+class Ends(NamedTuple):
+    """The ends of the k pieces of a period.
+
+    Attributes
     ----------
-    start : ndarray, shape (n,)
-        From which the magnitudes of y are taken.
-    *functions : int
-        Numbers of the flow's functions that are called, beside `kernels.GAP`.
-    direction : Direction, optional
-        With respect to a parameter lambda; zero without it.
-    along : float
-        Magnitude of lambda.
-    beside : sequence of parameters
-        Whose constants are to take the place of these: what is switched on in one is computed for all.
+    y : ndarray, shape (k, n)
+        y at the end of each piece.
+    matrices : ndarray, shape (k, n, n)
+        Its derivatives by y at the beginning.
+    slopes : ndarray, shape (k, n)
+        Its derivatives by a parameter lambda.
+    clearance : float or None
+        Least clearance to the limit of assembly; None if it was not computed.
     """
-    mechanism = mechanism_of(parameters)
-    flow, vector, p = drive.flow(mechanism), drive.vector(mechanism), np.array(parameters.constants())
-    d_drive, d_p = direction or (np.zeros_like(vector), np.zeros_like(p))
-    # lambda may be what switches on
-    switched = any(map(mechanism.switched, (p.tolist(), d_p.tolist(), *(other.constants() for other in beside))))
-    return Section(
-        flow.addresses(GAP, *functions, switched=switched),
-        np.array(flow.modes, dtype=float),
-        np.concatenate([vector, d_drive]),
-        np.concatenate([p, d_p]),
-        scale_in(flow, parameters, vector, start),
-        along,
-        tolerance,
-        flow.torque,
-    )
+
+    y: FloatArray
+    matrices: FloatArray
+    slopes: FloatArray
+    clearance: float | None = None
 
 
 class Period(NamedTuple):
     """One period from a start: y(T) - y(0), shape (n,), its derivatives dy(T)/dy(0), (n, n), and dy(T)/dlambda, (n,)."""
 
-    shift: NDArray[np.float64]
-    monodromy: NDArray[np.float64]
-    slope: NDArray[np.float64]
+    shift: FloatArray
+    monodromy: FloatArray
+    slope: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OperatingPoint:
+    """A mechanism and its drive in numbers, computed once for all that is asked of a motion.
+
+    Attributes
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    mechanism : Mechanism
+    flow : Flow
+        The mechanism driven in this way.
+    vector, constants : ndarray
+        Numbers of the drive and constants of the equations.
+    """
+
+    parameters: Parameters
+    drive: Drive
+    mechanism: Mechanism
+    flow: Flow
+    vector: FloatArray
+    constants: FloatArray
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _unpickle, (self.mechanism, self.parameters, self.drive)
+
+    def scale(self, start: FloatArray) -> FloatArray:
+        """Return the magnitudes of y: see `scale_of`."""
+        return scale_in(self.flow, self.parameters, self.vector, start)
+
+    def section(
+        self,
+        start: FloatArray,
+        *functions: int,
+        tolerance: float = INTEGRATOR_TOLERANCE,
+        direction: Direction | None = None,
+        along: float = 1.0,
+        beside: Sequence[Parameters] = (),
+    ) -> Section:
+        """Return what the kernels need.
+
+        Parameters
+        ----------
+        start : ndarray, shape (n,)
+            For the magnitudes of y.
+        *functions : int
+            Numbers of the flow's functions that are called, beside GAP.
+        direction : Direction, optional
+            Derivatives by a parameter lambda; zero without it.
+        along : float
+            Magnitude of lambda.
+        beside : sequence of parameters
+            Whose constants will take the place of these: what one of them switches on is computed for all.
+        """
+        d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
+        # lambda may be what switches on
+        numbers = (self.constants.tolist(), d_p.tolist(), *(other.constants() for other in beside))
+        switched = any(map(self.mechanism.switched, numbers))
+        return Section(
+            self.flow.addresses(GAP, *functions, switched=switched),
+            np.array(self.flow.modes, dtype=float),
+            np.concatenate([self.vector, d_drive]),
+            np.concatenate([self.constants, d_p]),
+            self.scale(start),
+            along,
+            tolerance,
+            self.flow.torque,
+        )
+
+    def shoot(
+        self, angles: FloatArray, starts: FloatArray, direction: Direction | None = None, along: float = 1.0
+    ) -> Ends:
+        """Integrate y with its derivatives over the pieces of a period, each from its own start.
+
+        Parameters
+        ----------
+        angles, starts
+            As in `Stations`.
+        direction, along
+            See `section`.
+
+        Raises
+        ------
+        OrbitError
+            If a piece cannot be followed.
+        """
+        k, n = starts.shape
+        rows = np.zeros((k, n * (2 + n)))
+        section = self.section(starts[0], DIRECTIONAL, direction=direction, along=along)
+        status = kernels.segments(section, angles, np.ascontiguousarray(starts), rows)
+        if status != Status.DONE:
+            raise orbit_error(status, self.flow, starts[0])
+        return _ends(rows, n)
+
+    def period(self, start: FloatArray, turns: int, direction: Direction | None = None, along: float = 1.0) -> Period:
+        """Follow a period from a start that need not be on a periodic orbit; see `shoot`."""
+        ends = self.shoot(np.array([0.0, self.flow.period * turns]), start[None, :], direction, along)
+        return Period(ends.y[0] - start, ends.matrices[0].copy(), ends.slopes[0])
+
+
+def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
+    """Return a mechanism and its drive in numbers; raises InputError if the drive does not suit the mechanism."""
+    mechanism = mechanism_of(parameters)
+    constants = np.array(parameters.constants())
+    return OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)
+
+
+def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> OperatingPoint:
+    """Return an operating point in a process that may not know a mechanism that the caller has registered."""
+    MECHANISMS.setdefault(mechanism.name, mechanism)
+    return operating_point(parameters, drive)
 
 
 @takes_published()
 def period_from(
     parameters: Parameters,
     drive: Drive,
-    start: NDArray[np.float64],
+    start: FloatArray,
     turns: int,
     direction: Direction | None = None,
     along: float = 1.0,
 ) -> Period:
-    """Follow the plant over one period from a start that need not be on a periodic orbit.
+    """Follow the mechanism over one period from a start that need not be on a periodic orbit.
 
     Parameters
     ----------
     start : ndarray, shape (n,)
         y at crank angle 0.
     direction : Direction, optional
-        With respect to a parameter lambda; zero without it.
+        Derivatives by a parameter lambda; zero without it.
     along : float
         Magnitude of lambda.
 
@@ -144,128 +253,95 @@ def period_from(
     OrbitError
         If the period cannot be followed.
     """
-    flow = drive.flow(mechanism_of(parameters))
-    n = flow.size
-    z = np.zeros(n * (2 + n))
-    z[:n] = start
-    section = section_of(parameters, drive, start, DIRECTIONAL, direction=direction, along=along)
-    status = kernels.period(section, flow.period * turns, z, np.array([0.1, 0.0]))
-    if status != Status.DONE:
-        raise failure(status, flow, start)
-    return Period(z[:n] - start, z[n : n + n * n].reshape(n, n).T.copy(), z[n + n * n :].copy())
+    return operating_point(parameters, drive).period(start, turns, direction, along)
 
 
-def pieces_from(
-    parameters: Parameters,
-    drive: Drive,
-    angles: NDArray[np.float64],
-    starts: NDArray[np.float64],
-    direction: Direction | None = None,
-    along: float = 1.0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Follow the plant over the pieces of a period, each from its own start: see `period_from`.
+def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
+    """Return whether collocation serves for motions under these drives: at prescribed speed and with smooth rates."""
+    return all(drive.speed_drive for drive in drives) and all(map(is_smooth, dict.fromkeys(mechanisms)))
+
+
+class Stations(NamedTuple):
+    """The pieces of a period in multiple shooting.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (k + 1,)
+        Crank angles (rad) at which the pieces begin, the first 0, and the end of the period.
+    starts : ndarray, shape (k, n)
+        y at the beginnings.
+    growth : float
+        Greatest norm of the derivatives of y over a piece by y at its beginning, scaled.
+    """
+
+    angles: FloatArray
+    starts: FloatArray
+    growth: float
+
+
+def growths(matrices: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return the greatest growth of a deviation, scaled, over each piece of a period; shape (k,)."""
+    growths: FloatArray = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
+    return growths
+
+
+def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tuple[FloatArray, FloatArray]:
+    """Divide a period into pieces over which deviations grow alike.
 
     Parameters
     ----------
-    angles, starts
-        As in `Stations`.
+    places : ndarray, shape (PLACES turns, n)
+        y at equal steps of the crank angle.
 
     Returns
     -------
-    ends : ndarray, shape (k, n)
-        y at the end of each piece.
-    matrices : ndarray, shape (k, n, n)
-        Their derivatives with respect to the start.
-    slopes : ndarray, shape (k, n)
-        Their derivatives with respect to lambda.
-
-    Raises
-    ------
-    OrbitError
-        If a piece cannot be followed.
+    angles, starts
+        As in `Stations`.
     """
-    k, n = starts.shape
-    rows = np.zeros((k, n * (2 + n)))
-    section = section_of(parameters, drive, starts[0], DIRECTIONAL, direction=direction, along=along)
-    status = kernels.segments(section, angles, np.ascontiguousarray(starts), rows)
-    if status != Status.DONE:
-        raise failure(status, drive.flow(mechanism_of(parameters)), starts[0])
-    matrices = rows[:, n : n + n * n].reshape(k, n, n).transpose(0, 2, 1)
-    return rows[:, :n], matrices, rows[:, n + n * n :]
+    count = len(places)
+    angles = np.linspace(0.0, point.flow.period * turns, count + 1)
+    growth = np.log(growths(point.shoot(angles, places).matrices, point.scale(places[0])).clip(1.0))
+    # half of the pieces by growth, half by angle
+    pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(AIM)), _FEWEST * turns, count))
+    share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
+    chosen = np.unique(np.searchsorted(share, np.linspace(0.0, share[-1], pieces + 1)).clip(0, count))
+    return angles[chosen], places[chosen[:-1]]
 
 
-def failure(
-    status: int, flow: Flow, start: NDArray[np.float64], residual: float = np.inf, iterations: int = 0
-) -> OrbitError:
-    """The error that says what a status of `kernels` means."""
-    kind = OrbitAssemblyError if status == Status.LIMIT else OrbitError
-    return kind(kernels.REASONS[Status(status)], flow, start, float(residual), iterations)
-
-
-#: Calls without collocation after one in which no number of elements sufficed.
-_PAUSE = 16
-
-#: Elements of a turn to begin with; elements at most, for each piece and beside eight times as many as that; calls after which
-#: they are chosen anew.
-_ELEMENTS, _MOST, _RENEWED = 6, 8, 64
-
-#: How near to the limit of assembly collocation is left.
-_NEAR = 1e-2
-
-
-class Ends(NamedTuple):
-    """The ends of the pieces of a period: y there, shape (k, n), its derivatives by the beginnings, (k, n, n), and by lambda,
-    (k, n); how near the links come to the limit of assembly, None where it is not known."""
-
-    y: NDArray[np.float64]
-    matrices: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    clearance: float | None
-
-
-class PeriodPath:
-    """The plant over the pieces of a period, by collocation from the last such path, and where that fails by the integrator.
+class Discretisation:
+    """The pieces of a period along a family of motions: by collocation from the last motion, if that fails by shooting.
 
     Parameters
     ----------
     angles : ndarray, shape (k + 1,)
         As in `Stations`.
-    smooth : bool
-        Whether all mechanisms are, see `is_smooth`; others are left to the integrator.
+    collocated : bool
+        Whether collocation is tried: see `collocation_serves`.
     """
 
-    def __init__(self, angles: NDArray[np.float64], smooth: bool) -> None:
-        self.angles, self.smooth = angles, smooth
+    def __init__(self, angles: FloatArray, collocated: bool) -> None:
+        self.angles, self.collocated = angles, collocated
         self._calls = self._pause = 0
         self._value: float | None = None
-        self._mesh = self._firsts = self._y = self._w = self._moves = np.empty(0)
+        self._mesh = self._firsts = np.empty(0)
 
-    def follow(
-        self,
-        parameters: Parameters,
-        drive: Drive,
-        starts: NDArray[np.float64],
-        value: float,
-        direction: Direction,
-        along: float,
-    ) -> Ends:
-        """Follow the plant from the beginnings of the pieces, at a value of lambda: see `pieces_from`.
+    def ends(self, point: OperatingPoint, starts: FloatArray, value: float, direction: Direction, along: float) -> Ends:
+        """Compute the ends of the pieces from their beginnings at a value of lambda: see `OperatingPoint.shoot`.
 
         Raises OrbitError if a piece cannot be followed.
         """
         self._pause -= 1
-        if drive.speed_drive and self.smooth and self._pause < 0:
-            section = section_of(
-                parameters, drive, starts[0], PLAIN, VARIATIONAL, DIRECTIONAL, direction=direction, along=along
-            )
-            ends = self._collocated(section, drive.flow(mechanism_of(parameters)), starts, value)
+        if self.collocated and self._pause < 0:
+            functions = (PLAIN, VARIATIONAL, DIRECTIONAL)
+            section = point.section(starts[0], *functions, direction=direction, along=along)
+            ends = self._collocate(section, point.flow, starts, value)
             if ends is not None:
                 return ends
-        return Ends(*pieces_from(parameters, drive, self.angles, starts, direction, along), None)
+        return point.shoot(self.angles, starts, direction, along)
 
-    def _collocated(self, section: Section, flow: Flow, starts: NDArray[np.float64], value: float) -> Ends | None:
+    def _collocate(self, section: Section, flow: Flow, starts: FloatArray, value: float) -> Ends | None:
+        """Compute the ends by collocation on as many elements as are needed; None if it does not serve here."""
         k, n = starts.shape
-        rows, nearest = np.zeros((k, n * (2 + n))), np.zeros(1)
         self._calls += 1
         if self._calls % _RENEWED == 1:
             lengths = np.diff(self.angles)
@@ -275,51 +351,43 @@ class PeriodPath:
         most = _MOST * len(self.angles) + 8 * _ELEMENTS * (self.angles[-1] / flow.period)
         while len(self._mesh) <= most:
             known = self._value is not None
-            tails = np.zeros(len(self._mesh) - 1)
+            found = collocation.Walked(np.zeros((k, n * (2 + n))), np.zeros(len(self._mesh) - 1), np.zeros(1))
+            change = 0.0 if self._value is None else value - self._value
             status = collocation.walk(
-                section,
-                self._mesh,
-                self._firsts,
-                np.ascontiguousarray(starts),
-                0.0 if self._value is None else value - self._value,
-                known,
-                (self._y, self._w, self._moves),
-                (rows, tails, nearest),
+                section, self._mesh, self._firsts, np.ascontiguousarray(starts), change, known, self._known, found
             )
             self._value = None
             if status == Status.LIMIT:
-                raise failure(status, flow, starts[0])
+                raise orbit_error(status, flow, starts[0])
             if status == Status.DONE:
-                if nearest[0] < _NEAR:
-                    # between the nodes they may come nearer: the integrator looks at every step
+                clearance = float(found.clearance[0])
+                if clearance < _NEAR:
                     return None
                 self._value = value
-                matrices = rows[:, n : n + n * n].reshape(k, n, n).transpose(0, 2, 1)
-                return Ends(rows[:, :n], matrices, rows[:, n + n * n :], float(nearest[0]))
+                return _ends(found.rows, n)._replace(clearance=clearance)
             if status == Status.NO_STEP:
-                long = tails > collocation.DECAY * np.sqrt(section.tolerance)
+                long = found.tails > collocation.DECAY * np.sqrt(section.tolerance)
             elif known:
                 # not found from the neighbour: without it
                 continue
             else:
-                long = np.ones(len(tails), dtype=bool)
+                long = np.ones(len(found.tails), dtype=bool)
             halves = 0.5 * (self._mesh[:-1] + self._mesh[1:])
             self._divide(np.sort(np.concatenate([self._mesh, halves[long]])), n)
         self._calls, self._pause = 0, _PAUSE
         return None
 
-    def _divide(self, mesh: NDArray[np.float64], n: int) -> None:
+    def _divide(self, mesh: FloatArray, n: int) -> None:
         """Take other elements, of which nothing is known."""
         self._value = None
         self._mesh = mesh
         self._firsts = np.searchsorted(mesh, self.angles).astype(np.int64)
-        m = len(mesh) - 1
-        self._y = np.zeros((m, n))
-        self._w = np.zeros((m, collocation.NODES, n // 2))
-        self._moves = np.zeros((m, collocation.NODES * (n // 2), 2 + n))
+        m, f = len(mesh) - 1, n // 2
+        shapes = (m, n), (m, collocation.NODES, f), (m, collocation.NODES * f, 2 + n)
+        self._known = collocation.Neighbour(*map(np.zeros, shapes))
 
 
-def growths(matrices: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Greatest growth of a deviation, scaled, over each piece of a period; shape (k,)."""
-    growths: NDArray[np.float64] = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
-    return growths
+def _ends(rows: FloatArray, n: int) -> Ends:
+    """Return the ends of pieces from the rows of a kernel."""
+    matrices = rows[:, n : n + n * n].reshape(-1, n, n).transpose(0, 2, 1)
+    return Ends(rows[:, :n], matrices, rows[:, n + n * n :])

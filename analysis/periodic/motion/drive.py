@@ -18,7 +18,6 @@ from linkwork.parameters import field_name
 
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ...numerics.sobol import sobol
 from ...run import InductionMotor, Inputs, driven, given, started, takes_published
 from ...units import Amount, in_si
 from .flow import Crank, Flow, crank_of, flow
@@ -119,7 +118,9 @@ class Drive:
             for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
                 object.__setattr__(self, name, value)
         if self.ratios:
-            ratios = {n: r if isinstance(r, Fraction) else _ratio(n, float(r), "crank", 1.0) for n, r in self.ratios.items()}
+            ratios = {
+                n: r if isinstance(r, Fraction) else _ratio(n, float(r), "crank", 1.0) for n, r in self.ratios.items()
+            }
             object.__setattr__(self, "ratios", ratios)
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
             raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero")
@@ -185,7 +186,9 @@ class Drive:
         for number in made.others:
             name = mechanism.freedoms[number].coordinate
             if number in made.free and number not in ratios:
-                raise InputError(f"{name} is free: say how often it turns for each turn of the crank, ratios = {{{name!r}: 1}}")
+                raise InputError(
+                    f"{name} is free: say how often it turns for each turn of the crank, ratios = {{{name!r}: 1}}"
+                )
             if number in ratios and number not in (*made.free, *made.commanded):
                 raise InputError(f"{name} has a ratio, but is neither commanded nor free")
         if made.size == 0:
@@ -411,9 +414,7 @@ def _turning(
     if len(mechanism.cyclic) < 2:
         return crank_of(mechanism), {}
     commanded = {mechanism.channels[n].freedom: mechanism.channels[n] for n in mechanism.commands(modes)}
-    speeds = {
-        n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic if n in commanded
-    }
+    speeds = {n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic if n in commanded}
     first = next((n for n, speed in speeds.items() if speed > 0.0), mechanism.cyclic[0])
     crank = crank_of(mechanism, mechanism.freedoms[first].coordinate)
     start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in mechanism.cyclic}
@@ -421,7 +422,9 @@ def _turning(
     ratios = {}
     for n in mechanism.cyclic:
         if n != first and n in speeds:
-            ratios[n] = _ratio(commanded[n].name, speeds[n], commanded[first].name, speed) if first in speeds else Fraction(0)
+            ratios[n] = (
+                _ratio(commanded[n].name, speeds[n], commanded[first].name, speed) if first in speeds else Fraction(0)
+            )
         elif n != first and speed != 0.0:
             ratios[n] = Fraction(round(start[n] / speed))
     return crank, ratios
@@ -429,10 +432,8 @@ def _turning(
 
 #: Distance of two starts, relative to the scale, below which they are of one motion.
 SAME = 1e-6
-
 #: How far starts reach where no limit of assembly is met, in the scale of y, and the step to it.
 _WIDEST, _WIDER = 16.0, 1.25
-
 #: Crank speeds of starts under a torque, relative to the guess.
 _SPEEDS = (0.25, 1.5)
 
@@ -497,7 +498,9 @@ def starts_of(
     flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
     half = flow.size // 2
     extent = extent_of(parameters, drive, guess)
-    sequence = sobol(flow.size, count, number)
+    from scipy.stats import qmc  # takes half a second
+
+    sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
     found = np.tile(guess, (count, 1))
     found[:, :half] = extent * amplitude * np.cos(phase)

@@ -1,8 +1,7 @@
-"""Floquet multipliers and what they say: verdicts with a margin, and how stability is lost.
+"""Floquet multipliers and verdicts on stability.
 
-What a small deviation from a periodic motion becomes after one period is the monodromy matrix times what it was; the
-eigenvalues of that matrix are the Floquet multipliers. The orbits of the mechanism
-itself and linear equations with periodic coefficients are judged here by the same rule.
+The monodromy matrix maps a small deviation from a periodic motion to the deviation one period later; its eigenvalues are the
+Floquet multipliers. Orbits of a mechanism and linear equations with periodic coefficients are judged by the same rule.
 """
 
 from __future__ import annotations
@@ -19,18 +18,17 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Distance of the largest multiplier from the unit circle below which a verdict is "marginal" by default.
 TOLERANCE = 1e-6
-
 #: Angle from the real axis (rad) below which a multiplier counts as real. A double one on the axis is computed only to the
 #: square root of the rounding errors.
 REAL_ANGLE = 1e-5
 
 
 class VerdictError(LinkworkError, TypeError):
-    """A verdict was used as if it were a bare yes or no."""
+    """A verdict was used as if it were a boolean."""
 
 
 class Stability(Enum):
-    """What becomes of a small deviation: it dies out, grows, or the linear theory does not decide."""
+    """The fate of a small deviation: it dies out, grows, or linear theory does not decide."""
 
     STABLE = "stable"
     UNSTABLE = "unstable"
@@ -38,7 +36,7 @@ class Stability(Enum):
 
 
 class Crossing(Enum):
-    """Where on the unit circle the largest multiplier leaves it, and what happens there."""
+    """The way in which the largest multiplier leaves the unit circle."""
 
     FOLD = "fold"  # at +1: two motions of the same period meet, or a branch point
     PERIOD_DOUBLING = "period doubling"  # at -1
@@ -51,13 +49,13 @@ _SIGN = {Crossing.FOLD: 1, Crossing.PERIOD_DOUBLING: -1}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StabilityVerdict:
-    """A verdict on a periodic motion; not a bare boolean: ask for ``stability``.
+    """A verdict on a periodic motion; it has no truth value: ask for ``stability``.
 
     Attributes
     ----------
     stability : Stability
     margin : float
-        1 - ``max |multiplier|``: positive where deviations die out, negative where they grow; dimensionless.
+        1 - ``max |multiplier|``: positive if deviations die out, negative if they grow; dimensionless.
     tolerance : float
         Size of the margin below which the verdict is MARGINAL. A system without damping is never better than that.
     largest_multiplier : complex
@@ -84,12 +82,12 @@ class StabilityVerdict:
 
     @property
     def crossing(self) -> Crossing:
-        """Where the largest multiplier leaves the unit circle, or would."""
+        """The way in which the largest multiplier leaves the unit circle, or would."""
         return crossing(self.largest_multiplier)
 
 
 def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
-    """Floquet multipliers, the largest modulus first.
+    """Return the Floquet multipliers, the largest modulus first.
 
     Parameters
     ----------
@@ -114,13 +112,13 @@ def multipliers(monodromy: ArrayLike) -> NDArray[np.complex128]:
 
 
 def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVerdict:
-    """The verdict that the multipliers of one periodic motion give.
+    """Judge the stability of a periodic motion by its multipliers.
 
     Parameters
     ----------
     multipliers : array_like of complex, shape (n,)
     tolerance : float
-        Margin from which on the verdict is not "marginal"; at least the error of the multipliers.
+        Size of the margin up to which the verdict is "marginal"; at least the error of the multipliers.
 
     Raises
     ------
@@ -144,7 +142,7 @@ def verdict(multipliers: ArrayLike, tolerance: float = TOLERANCE) -> StabilityVe
 
 
 def crossing(multiplier: complex, angle: float = REAL_ANGLE) -> Crossing:
-    """What a multiplier on its way through the unit circle means; real ones to within an angle (rad)."""
+    """Return the kind of crossing of a multiplier; one counts as real within an angle (rad)."""
     if abs(np.angle(multiplier)) <= angle:
         return Crossing.FOLD
     if abs(np.angle(-multiplier)) <= angle:
@@ -153,7 +151,7 @@ def crossing(multiplier: complex, angle: float = REAL_ANGLE) -> Crossing:
 
 
 def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
-    """Determinant of the monodromy matrix by Liouville's formula, exp of the integral of the trace over the period.
+    """Return the determinant of the monodromy matrix by Liouville's formula: exp of the integral of the trace over the period.
 
     Parameters
     ----------
@@ -175,7 +173,7 @@ def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
 
 
 def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> NDArray[np.float64]:
-    """Smooth function of monodromy matrices that is zero where a multiplier crosses the unit circle in this way.
+    """Return a smooth function of monodromy matrices that is zero where a multiplier crosses the unit circle.
 
     Parameters
     ----------

@@ -18,7 +18,6 @@ from ...run import MOTOR, constants, kloss, traced
 
 # Functions of a flow, by their numbers among its addresses
 PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
-
 _NAMES = ("plain", "variational", "directional", "gap", "state")
 
 

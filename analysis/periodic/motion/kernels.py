@@ -1,16 +1,16 @@
-"""Compiled: one period of a mechanism with its variational equations, and Newton's method on the map over it.
+"""Compiled: shooting. A period of a mechanism with its variational equations, and Newton's method on the map over it.
 
-The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that a period is known beforehand
-however it is driven. The state is y: the coordinates and the rates of the other freedoms, as far as they are free, and after
-them the crank's rate where a torque drives it. The angle runs from 0, which makes the map over a period that of the Poincare
-section there. With y are integrated the columns of dy/dy0 and, where asked for, dy/dlambda for a parameter. The right-hand
-sides and their exact derivatives are traced from the equations (`flow`); the integrator is that of a run.
+The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that the period is known beforehand
+whatever drives it. The state y has the coordinates of the other free freedoms, their rates, and under a torque the crank's
+rate. The angle runs from 0: the map over a period is the Poincare map of the section there. The columns of dy/dy0, and if
+asked for dy/dlambda for a parameter lambda, are integrated with y. The right-hand sides and their exact derivatives are
+traced from the equations (`flow`); the integrator is the one that `simulate` uses.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
-from math import fabs, isfinite, isnan
+from math import isfinite, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from .flow import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 
 class Status(IntEnum):
-    """How an integration or a solution ended."""
+    """How an integration or a search ended."""
 
     DONE = 0
     LIMIT = 3
@@ -34,30 +34,42 @@ class Status(IntEnum):
     DIVERGED = 6
 
 
-# as plain numbers, for the compiled code
+# the same as plain numbers, for the compiled code
 DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
-
-#: Each in words.
+#: Each failure in words.
 REASONS = {
     Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
     Status.NO_STEP: "the integrator cannot meet its tolerance",
     Status.STALLED: "the crank comes to rest within the period",
     Status.DIVERGED: "Newton's method does not converge",
 }
-
-#: Least fraction of a radian that a step may have.
+#: Least step of the integrator (rad).
 _LEAST_STEP = 1e-9
-
-#: Crank speed below which the crank counts as stalled, relative to that at the start.
+#: Crank speed below which the crank counts as stalled, relative to its speed at the start.
 _STALL = 1e-3
-
-#: Least fraction of a Newton correction that is tried, and in the search for other motions.
+#: Least fraction of a Newton correction that is tried: in Newton's method, and in the search for other motions.
 _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
-    """A flow with numbers: addresses of its functions, modes, drive and constants with their directions after them, and
-    magnitudes of y and of lambda; whether the crank's rate is the last of y."""
+    """A flow with numbers.
+
+    Attributes
+    ----------
+    equations : ndarray of int64
+        Addresses of the flow's functions.
+    modes : ndarray
+    drive, p : ndarray
+        Numbers of the drive and constants of the equations, each followed by its derivatives by lambda.
+    scale : ndarray, shape (n,)
+        Magnitudes of y.
+    along : float
+        Magnitude of lambda.
+    tolerance : float
+        Bound of the local error of a step.
+    torque : bool
+        Whether the crank's rate is the last component of y.
+    """
 
     equations: NDArray[np.int64]
     modes: NDArray[np.float64]
@@ -74,12 +86,12 @@ SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64,
 
 @part
 def numbered(section, drive, p, scale, tolerance):
-    """The same flow with other numbers."""
+    """Return the section with other numbers."""
     return Section(section.equations, section.modes, drive, p, scale, 1.0, tolerance, section.torque)
 
 
 class Room(NamedTuple):
-    """Room to work in: stages, state at their end, magnitudes of z, the rate of one component."""
+    """Work space of the integrator: stages, z after a step, magnitudes of z, clearance."""
 
     k: NDArray[np.float64]
     y: NDArray[np.float64]
@@ -89,7 +101,7 @@ class Room(NamedTuple):
 
 @part
 def make_room(section, columns):
-    """Room for y and so many columns: magnitudes of y, of dy_i/dy0_j and of dy_i/dlambda."""
+    """Make work space for y and a number of columns of derivatives."""
     n = section.scale.shape[0]
     sizes = np.empty(n * (1 + columns))
     for i in range(n):
@@ -107,7 +119,10 @@ def _clearance(section, angle, z, room):
 
 @inner
 def _take(section, equation, angle, end, slowest, z, room, carry):
-    """A good step from z, its rates in room.k[0], as far as to ``end``: the status and the angle there; z there is room.y."""
+    """Take an accepted step from z, whose rates are room.k[0], to ``end`` at most; return the status and the new angle.
+
+    z after the step is room.y.
+    """
     n = section.scale.shape[0]
     flow = Flow(equation, section.modes, section.p, room.sizes)
     proposed = carry[0]
@@ -134,7 +149,7 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
 
 @inner
 def _enter(section, equation, angle, z, room):
-    """Rates of z at the beginning of a range of crank angles, into room.k[0]; the status, and the speed of a stalled crank."""
+    """Write the rates of z at an angle into room.k[0]; return the status and the speed below which the crank stalls."""
     n = section.scale.shape[0]
     slowest = _STALL * z[n - 1] if section.torque else 0.0
     if section.torque and not slowest > 0.0:
@@ -148,7 +163,7 @@ def _enter(section, equation, angle, z, room):
 
 @inner
 def advance(section, begin, end, z, room, carry):
-    """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
+    """Integrate z over a range of crank angles; carry[0] is the first step and becomes the next one, carry[1] counts steps."""
     n = section.scale.shape[0]
     size = z.shape[0]
     equation = section.equations[PLAIN if size == n else VARIATIONAL if size == n * (1 + n) else DIRECTIONAL]
@@ -164,8 +179,8 @@ def advance(section, begin, end, z, room, carry):
 
 
 @inner
-def _begin(n, start, z):
-    """z at the beginning of a period: the start, the identity, zeros along lambda."""
+def start_piece(n, start, z):
+    """Write the initial values of a piece into z: y, the identity, zeros along lambda."""
     for i in range(z.shape[0]):
         z[i] = 0.0
     for i in range(n):
@@ -174,48 +189,23 @@ def _begin(n, start, z):
             z[n + i * n + i] = 1.0
 
 
-@kernel(int64(SECTION, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
-def period(section, end, z, carry):
-    """Integrate y and as many columns of derivatives as ``z`` has room for from crank angle 0 to ``end``.
-
-    Parameters
-    ----------
-    section : Section
-    end : float
-        Crank angle at the end (rad): the turns of a period times that of one.
-    z : ndarray, shape (n (1 + columns),)
-        y at the start, and at the end when it returns; then dy/dy0 by columns (columns = n), then dy/dlambda (n + 1).
-    carry : ndarray, shape (2,)
-        Step to begin with (rad), the one to go on with when it returns; steps taken are added to the second.
-
-    Returns
-    -------
-    int
-        A `Status` but DIVERGED.
-    """
-    n = section.scale.shape[0]
-    room = make_room(section, z.shape[0] // n - 1)
-    _begin(n, z.copy(), z)
-    return advance(section, 0.0, end, z, room, carry)
-
-
 @inner
 def difference(a, b, out):
-    """a - b, as many components as ``out`` has."""
+    """Write a - b into ``out``, as many components as it has."""
     for i in range(out.shape[0]):
         out[i] = a[i] - b[i]
 
 
 @inner
-def moved(start, fraction, correction, trial):
-    """A fraction of a correction added to a start."""
+def move(start, fraction, correction, trial):
+    """Write the start plus a fraction of a correction into ``trial``."""
     for i in range(start.shape[0]):
         trial[i] = start[i] + fraction * correction[i]
 
 
 @inner
 def magnitude(correction, scale):
-    """Largest component relative to the scale."""
+    """Return the largest component relative to the scale, NaN if one is."""
     size = 0.0
     for i in range(scale.shape[0]):
         relative = abs(correction[i]) / scale[i]
@@ -225,34 +215,84 @@ def magnitude(correction, scale):
     return size
 
 
+@inner
+def eliminate(system, size):
+    """Solve a linear system in place by elimination with pivots; return whether it has a solution.
+
+    The right-hand sides are the columns after the first ``size``, which become the solutions.
+    """
+    width = system.shape[1]
+    for c in range(size):
+        pivot = c
+        for r in range(c + 1, size):
+            if abs(system[r, c]) > abs(system[pivot, c]):
+                pivot = r
+        # a NaN is no pivot either
+        if not abs(system[pivot, c]) > 0.0:
+            return False
+        if pivot != c:
+            for j in range(c, width):
+                system[c, j], system[pivot, j] = system[pivot, j], system[c, j]
+        inverse = 1.0 / system[c, c]
+        for r in range(c + 1, size):
+            factor = system[r, c] * inverse
+            if factor != 0.0:
+                for j in range(c + 1, width):
+                    system[r, j] -= factor * system[c, j]
+    for c in range(size - 1, -1, -1):
+        inverse = 1.0 / system[c, c]
+        for j in range(size, width):
+            system[c, j] *= inverse
+        for r in range(c):
+            factor = system[r, c]
+            for j in range(size, width):
+                system[r, j] -= factor * system[c, j]
+    return True
+
+
+@inner
+def correct_start(start, end, z, system, correction):
+    """Compute Newton's correction of a start for y(end) = y(0); return whether there is one.
+
+    The derivatives dy/dy0 are those in z, and y at the end that in ``end``, which may come from another start.
+    """
+    n = start.shape[0]
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
+        system[i, n] = end[i] - start[i]
+    solved = eliminate(system, n)
+    for i in range(n):
+        correction[i] = system[i, n]
+    return solved
+
+
 @part
 def newton(section, end, most, start, z, room, carry, report):
     """Newton's method for y(end) = y(0); see `solve`.
 
-    A correction is taken in part where the next one, found with the same matrix, would not be smaller (Deuflhard's natural
-    monotonicity test), or where it leads out of the domain.
+    A correction is taken in part if the next one, found with the same matrix, would not be smaller (Deuflhard's natural
+    monotonicity test), or if it leads out of the domain.
     """
     scale, tolerance = section.scale, section.tolerance
     n = scale.shape[0]
-    trial = start.copy()
-    correction = np.zeros(n)
-    following = np.empty(n)
-    matrix = np.empty((n, n))
+    trial, last = start.copy(), z.copy()
+    correction, following = np.zeros(n), np.empty(n)
+    system = np.empty((n, n + 1))
     size = 0.0
     fraction = 1.0
     report[0] = np.inf
     report[1] = 0.0
     for iteration in range(most):
         while True:
-            _begin(n, trial, z)
+            start_piece(n, trial, z)
             status = advance(section, 0.0, end, z, room, carry)
             if iteration == 0 and status != DONE:
                 return status
             if status == DONE:
                 if iteration == 0:
                     break
-                difference(z, trial, following)
-                solve_small(matrix.copy(), following)
+                correct_start(trial, z, last, system, following)
                 next_size = magnitude(following, scale)
                 # near the solution corrections stop falling at the integrator's error
                 if next_size <= (1.0 - 0.25 * fraction) * size or next_size <= 100.0 * tolerance:
@@ -260,72 +300,50 @@ def newton(section, end, most, start, z, room, carry, report):
             fraction *= 0.5
             if fraction < _LEAST_FRACTION:
                 return status if status != DONE else DIVERGED
-            moved(start, fraction, correction, trial)
+            move(start, fraction, correction, trial)
         report[1] = iteration + 1.0
         copy(trial, start)
+        copy(z, last)
         difference(z, trial, correction)
         report[0] = magnitude(correction, scale)
-        for i in range(n):
-            for j in range(n):
-                matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
-        if not solve_small(matrix.copy(), correction):
+        if not correct_start(trial, z, z, system, correction):
             return DIVERGED
         size = magnitude(correction, scale)
         if not isfinite(size):
             return DIVERGED
-        # what was taken in part is tried less cautiously the next time
+        # after a correction taken in part the next one is tried less cautiously
         fraction = min(1.0, 4.0 * fraction)
         if size <= 100.0 * tolerance:
             fraction = 1.0
-        moved(start, fraction, correction, trial)
+        move(start, fraction, correction, trial)
         if size <= 100.0 * tolerance:
             copy(trial, start)
             return DONE
     return DIVERGED
 
 
-@inner
-def solve_small(a, b):
-    """Solve a x = b in place by elimination with pivots; whether it could be."""
-    n = b.shape[0]
-    for c in range(n):
-        pivot = c
-        for r in range(c + 1, n):
-            if fabs(a[r, c]) > fabs(a[pivot, c]):
-                pivot = r
-        if a[pivot, c] == 0.0:
-            return False
-        for j in range(n):
-            a[c, j], a[pivot, j] = a[pivot, j], a[c, j]
-        b[c], b[pivot] = b[pivot], b[c]
-        for r in range(c + 1, n):
-            f = a[r, c] / a[c, c]
-            for j in range(c, n):
-                a[r, j] -= f * a[c, j]
-            b[r] -= f * b[c]
-    for c in range(n - 1, -1, -1):
-        for j in range(c + 1, n):
-            b[c] -= a[c, j] * b[j]
-        b[c] /= a[c, c]
-    return True
-
-
 @kernel(int64(SECTION, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
 def solve(section, end, most, start, z, report):
-    """Periodic orbit by Newton's method with step control on the map over a period.
+    """Find a periodic orbit by Newton's method with step control on the map over a period.
 
     Parameters
     ----------
+    section : Section
+    end : float
+        Crank angle at the end of the period (rad).
     most : int
         Iterations at most.
     start : ndarray, shape (n,)
         Guess of y at crank angle 0; the solution when it returns DONE.
     z : ndarray, shape (n (1 + n),)
-        y at the end of the period and the monodromy matrix by columns, of the last iterate; written.
+        Written: y at the end of the period and the monodromy matrix by columns, of the last iterate.
     report : ndarray, shape (3,)
-        Residual |y(end) - y(0)| relative to the scale before the last correction, iterations, steps; written.
+        Written: residual |y(end) - y(0)| relative to the scale before the last correction, iterations, steps.
 
-    The others as for `period`. Returns a `Status`.
+    Returns
+    -------
+    int
+        A `Status`.
     """
     room = make_room(section, section.scale.shape[0])
     carry = np.array([0.1, 0.0])
@@ -336,29 +354,25 @@ def solve(section, end, most, start, z, report):
 
 @part
 def deflated(section, end, most, reach, start, known, z, room, carry):
-    """See `search`."""
+    """Newton's method away from known orbits; see `search`."""
     scale = section.scale
     n = scale.shape[0]
     trial = start.copy()
     correction = np.zeros(n)
-    matrix = np.empty((n, n))
+    system = np.empty((n, n + 1))
     for iteration in range(most):
         fraction = 1.0
         while True:
-            _begin(n, trial, z)
+            start_piece(n, trial, z)
             status = advance(section, 0.0, end, z, room, carry)
             if status == DONE:
                 break
             fraction *= 0.5
             if iteration == 0 or fraction < _LEAST_SEARCHED:
                 return status
-            moved(start, fraction, correction, trial)
+            move(start, fraction, correction, trial)
         copy(trial, start)
-        difference(z, trial, correction)
-        for i in range(n):
-            for j in range(n):
-                matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
-        if not solve_small(matrix, correction):
+        if not correct_start(trial, z, z, system, correction):
             return DIVERGED
         size = magnitude(correction, scale)
         if not isfinite(size):
@@ -376,7 +390,7 @@ def deflated(section, end, most, reach, start, known, z, room, carry):
             if square > 0.0:
                 slope -= 2.0 * along / (square * (1.0 + square))
         if size <= 100.0 * section.tolerance and nearest > 1e-6:
-            moved(start, 1.0, correction, start)
+            move(start, 1.0, correction, start)
             return DONE
         if nearest == 0.0 or slope == 1.0:
             return DIVERGED
@@ -386,7 +400,7 @@ def deflated(section, end, most, reach, start, known, z, room, carry):
         if size > reach:
             for i in range(n):
                 correction[i] *= reach / size
-        moved(start, 1.0, correction, trial)
+        move(start, 1.0, correction, trial)
     return DIVERGED
 
 
@@ -395,16 +409,14 @@ def deflated(section, end, most, reach, start, known, z, room, carry):
     purpose="the search for coexisting motions",
 )
 def search(section, end, most, reach, start, known, z):
-    """Newton's method for a periodic orbit that is none of the known ones: each of these is divided out.
+    """Find a periodic orbit that is none of the known ones, by Newton's method with these divided out.
 
     The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known ones are no zeros any more
-    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). Its Newton correction is that of the residual
+    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). Its Newton correction is the one of the residual
     itself times a number.
 
     Parameters
     ----------
-    most : int
-        Iterations at most.
     reach : float
         Greatest correction relative to the scale.
     start : ndarray, shape (n,)
@@ -412,9 +424,9 @@ def search(section, end, most, reach, start, known, z):
     known : ndarray, shape (m, n)
         Starts of the known orbits; with none it is Newton's method.
     z : ndarray, shape (n (1 + n),)
-        Room to work in.
+        Work space.
 
-    The others as for `period`. Returns a `Status`.
+    The other parameters and the result are those of `solve`.
     """
     room = make_room(section, section.scale.shape[0])
     return deflated(section, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
@@ -422,7 +434,7 @@ def search(section, end, most, reach, start, known, z):
 
 @kernel(int64(SECTION, float64, float64, int64, VECTOR), purpose="the settling of motions")
 def settle(section, turn, change, most, start):
-    """Follow the motion from ``start``, which is overwritten, turn by turn until one changes y by less than ``change``."""
+    """Follow the motion from ``start``, which is overwritten, until a turn changes y by less than ``change``."""
     room = make_room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
@@ -440,12 +452,15 @@ def settle(section, turn, change, most, start):
 
 @kernel(int64(SECTION, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
 def sample(section, stations, starts, angles, rows):
-    """States of a run and channels, shape (m, states + inputs), at increasing crank angles, by the integrator's interpolant.
+    """Sample a period at increasing crank angles by the integrator's interpolant.
 
     Parameters
     ----------
     stations, starts : ndarray, shapes (k,) and (k, n)
-        Increasing crank angles, the first 0, at each of which y is begun anew, and y there.
+        Increasing crank angles at which the pieces begin, the first 0, and y there.
+    angles : ndarray, shape (m,)
+    rows : ndarray, shape (m, states + inputs)
+        Written: state of a run and channels at each angle.
     """
     n = starts.shape[1]
     room = make_room(section, 0)
@@ -485,23 +500,29 @@ def sample(section, stations, starts, angles, rows):
     return DONE
 
 
-@kernel(int64(SECTION, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
+@kernel(int64(SECTION, VECTOR, MATRIX, MATRIX), purpose="the integrator of periodic motions")
 def segments(section, angles, starts, rows):
-    """Integrate y with its derivatives over each of the pieces of a period: see `period`.
+    """Integrate y with its derivatives over each piece of a period.
 
     Parameters
     ----------
     angles : ndarray, shape (k + 1,)
-        Crank angles at which the pieces begin, and the end of the last.
+        Crank angles at which the pieces begin, and the end of the last (rad).
     starts : ndarray, shape (k, n)
         y at the beginning of each.
-    rows : ndarray, shape (k, n (2 + n))
-        y at the end of each, dy/dy there by columns, dy/dlambda; written.
+    rows : ndarray, shape (k, n (1 + columns))
+        Written: y at the end of each piece, then dy/dy0 by columns (columns = n), then dy/dlambda (n + 1), as far as there is
+        room for them.
+
+    Returns
+    -------
+    int
+        A `Status` other than DIVERGED.
     """
     room = make_room(section, rows.shape[1] // starts.shape[1] - 1)
     carry = np.array([0.1, 0.0])
     for piece in range(starts.shape[0]):
-        _begin(starts.shape[1], starts[piece], rows[piece])
+        start_piece(starts.shape[1], starts[piece], rows[piece])
         status = advance(section, angles[piece], angles[piece + 1], rows[piece], room, carry)
         if status != DONE:
             return status

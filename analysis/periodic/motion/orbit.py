@@ -1,9 +1,9 @@
-"""Periodic motions of the full nonlinear plant, by shooting, with their Floquet multipliers.
+"""Periodic motions of the full nonlinear mechanism with their Floquet multipliers.
 
 At prescribed speed a periodic motion repeats itself after one turn of the crank, or after several; under a torque the mean
-speed is part of the solution. `orbit_of` solves y(T) = y(0) by Newton's method with the exact monodromy matrix, which the
-variational equations give on the way; that matrix's eigenvalues, the Floquet multipliers, go with every solution: an
-unstable motion is found as easily as a stable one.
+speed is part of the solution. `orbit_of` solves y(T) = y(0) by Newton's method with the exact monodromy matrix from the
+variational equations. Its eigenvalues, the Floquet multipliers, come with every solution, and an unstable motion is found as
+easily as a stable one.
 """
 
 from __future__ import annotations
@@ -11,34 +11,54 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import reduce
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
+from ...display import Shown, format_count
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count
-from ...numerics.continuation import Evaluate, Evaluation
+from ...numerics.continuation import Evaluation
 from ...run import outputs_of, takes_published
 from ...units import RAD_S_PER_RPM
 from . import kernels
 from .discretisation import (
     INTEGRATOR_TOLERANCE,
+    Discretisation,
+    OperatingPoint,
     OrbitAssemblyError,
     OrbitError,
-    Period,
-    PeriodPath,
     Stations,
-    failure,
+    collocation_serves,
     growths,
-    section_of,
+    operating_point,
+    orbit_error,
 )
-from .drive import Drive, is_smooth, scale_of, starts_of
+from .drive import Drive, starts_of
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flow import PLAIN, STATE, VARIATIONAL, Flow
 from .kernels import Status
 from .variables import Family
+
+FloatArray = NDArray[np.float64]
+#: Largest correction relative to the scale at which a solution counts as found.
+ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
+#: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction in the scale of y. What it
+#: finds is solved again.
+SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
+#: Sets of starts if Newton's method fails from the guess, and starts of each, a power of two: near a resonance of small
+#: damping one in some forty leads to the motion.
+SETS, STARTS = 4, 64
+#: Newton iterations at most.
+MOST_ITERATIONS = 40
+#: Turns for which a motion is followed if Newton's method fails from the guess, and the change per turn that ends it.
+SETTLING_TURNS, SETTLED = 200, 1e-4
+#: Samples of a turn for amplitudes and harmonics.
+SAMPLES = 256
+#: Outputs that an orbit does not have: they count from the start of a run.
+_OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -56,43 +76,43 @@ class Turn:
     states, inputs : ndarray, shapes (n, states) and (n, channels)
         States of a run, no work done, and the channels in force.
     values : ndarray, shape (n, outputs)
-        Outputs by `names`: all of the FMI interface but the energies that count from the start of a run.
+        Outputs by `names`: those of the FMI interface except the energies that count from the start of a run.
     turns : int
         Turns of the crank in the period.
     modes : tuple of int
         Values of the mechanism's modes.
     names : tuple of str
     swing : str
-        The output whose amplitude is meant where none is named: the first free coordinate, such as ``slider.position``, or
-        the crank's speed where nothing else is free.
+        The output whose amplitude is meant if none is named: the first free coordinate, such as ``slider.position``, or the
+        crank's speed if nothing else is free.
 
     Notes
     -----
     ``turn["slider.position"]`` is an output over the period, shape (n,).
     """
 
-    angle: NDArray[np.float64]
-    time: NDArray[np.float64]
+    angle: FloatArray
+    time: FloatArray
     period: float
-    states: NDArray[np.float64]
-    inputs: NDArray[np.float64]
-    values: NDArray[np.float64]
+    states: FloatArray
+    inputs: FloatArray
+    values: FloatArray
     turns: int
     modes: tuple[int, ...]
     names: tuple[str, ...]
     swing: str
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> FloatArray:
         if name not in self.names:
             raise InputError(f"an orbit has no output {name!r}: it has {', '.join(self.names)}")
         return self.values[:, self.names.index(name)]
 
     @property
     def amplitude(self) -> float:
-        """Half the distance between the least and the greatest value of ``swing``, of a slider position (m).
+        """Half the distance between the least and the greatest value of ``swing``, such as a slider position (m).
 
-        From the Fourier series of the turn on a grid eight times as fine, and the parabolas through its greatest and its least
-        values: good to a millionth of itself, all the samples being enough for the series.
+        The Fourier series of the turn is evaluated on a grid eight times as fine, and parabolas are laid through its greatest
+        and its least values: good to a millionth of the amplitude if the samples are enough for the series.
         """
         u = self[self.swing]
         n = 8 * len(u)
@@ -104,7 +124,7 @@ class Turn:
         return 0.5 * float(np.ptp(at + beyond))
 
     def harmonic(self, name: str, order: float) -> float:
-        """Amplitude of a harmonic of an output, its order counted in turns of the crank: 1/2 where the period is two turns.
+        """Return the amplitude of a harmonic of an output; its order counts per turn of the crank: 1/2 has two turns.
 
         Raises
         ------
@@ -120,8 +140,8 @@ class Turn:
         return 2.0 * float(np.abs(np.fft.rfft(self[name])[int(number)])) / len(self.angle)
 
 
-def times_of(speed: NDArray[np.float64], way: float) -> tuple[NDArray[np.float64], float]:
-    """Time at equal steps of the crank angle over ``way``, and the period, by integrating the Fourier series of 1 / speed."""
+def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
+    """Return the time at equal steps of the crank angle over ``way``, and the period, from the Fourier series of 1 / speed."""
     n = len(speed)
     c = np.fft.rfft(1.0 / speed) / n
     angle = np.arange(n) * (way / n)
@@ -135,33 +155,9 @@ def times_of(speed: NDArray[np.float64], way: float) -> tuple[NDArray[np.float64
     return mean * angle + wave - wave[0], way * mean
 
 
-#: Largest correction relative to the scale at which a solution counts as found.
-ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
-
-#: The same in the search for motions far from a guess, iterations at most there, and the greatest correction in the scale of
-#: y; what is found is solved again.
-SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
-
-#: Sets of starts of that search where Newton's method fails from the guess, and starts of each, a power of two:
-#: near a resonance of small damping one in some forty leads to the motion.
-SETS, STARTS = 4, 64
-
-#: Newton iterations at most.
-MOST_ITERATIONS = 40
-
-#: Turns for which a motion is followed where Newton's method fails from the guess, and the change a turn that ends it.
-SETTLING_TURNS, SETTLED = 200, 1e-4
-
-#: Samples of a turn from which amplitudes and harmonics are taken.
-SAMPLES = 256
-
-#: Outputs that an orbit has none of: they count from the start of a run.
-_OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PeriodicOrbit(Shown):
-    """A periodic motion of the full nonlinear plant.
+    """A periodic motion of the full nonlinear mechanism.
 
     Attributes
     ----------
@@ -170,35 +166,34 @@ class PeriodicOrbit(Shown):
     turns : int
         Turns of the crank in one period.
     start : ndarray, shape (n,)
-        y at crank angle 0: coordinates and rates of the freedoms that are free beside the crank, of a five-bar u (m) and u'
+        y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and u'
         (m/s), and under a torque the crank speed (rad/s).
     monodromy : ndarray, shape (n, n)
-        Derivative of the map over one period on the section at the crank angle 0.
+        Derivative of the map over one period on the section at crank angle 0.
     residual : float
         ``|y(T) - y(0)|`` relative to `scale_of`, before the last correction.
     iterations : int
         Newton iterations taken.
     stations : Stations or None
-        Where the motion was begun anew on the way, because it is too unstable to be followed over a whole period.
+        The pieces in which the period was followed, if it is too unstable to be followed as a whole.
     others : int or None
-        How many other periodic motions of the same period there are, as far as was sought; None where it was not asked.
+        Number of other periodic motions of the same period, as far as they were sought; None if they were not.
     nearest : float or None
-        How near the links come to the limit of assembly, as `clearance` has it, where that was computed on the way.
+        Least clearance to the limit of assembly, see `clearance`, if it was computed on the way.
     """
 
     parameters: Parameters
     drive: Drive
     turns: int
-    start: NDArray[np.float64]
-    monodromy: NDArray[np.float64]
+    start: FloatArray
+    monodromy: FloatArray
     residual: float
     iterations: int
     stations: Stations | None = None
     others: int | None = None
     nearest: float | None = None
-    # `amplitude` and `multipliers`, once they have been asked for
-    _amplitude: list[float] = field(default_factory=list, init=False)
-    _multipliers: list[NDArray[np.complex128]] = field(default_factory=list, init=False)
+    # what has been computed of `point`, `scale`, `multipliers` and `amplitude`
+    _kept: dict[str, Any] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.monodromy).all():
@@ -217,21 +212,38 @@ class PeriodicOrbit(Shown):
         return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 
     @property
+    def point(self) -> OperatingPoint:
+        """The mechanism and its drive in numbers."""
+        if "point" not in self._kept:
+            self._kept["point"] = operating_point(self.parameters, self.drive)
+        point: OperatingPoint = self._kept["point"]
+        return point
+
+    @property
     def flow(self) -> Flow:
-        """The mechanism as a flow, driven as it is: names and units of y."""
-        return self.drive.flow(mechanism_of(self.parameters))
+        """The mechanism as a flow, with names and units of y."""
+        return self.point.flow
+
+    @property
+    def scale(self) -> FloatArray:
+        """Magnitudes of y, shape (n,): see `scale_of`."""
+        if "scale" not in self._kept:
+            self._kept["scale"] = self.point.scale(self.start)
+        scale: FloatArray = self._kept["scale"]
+        return scale
 
     @property
     def swing(self) -> tuple[str, str]:
-        """What the amplitude is of, as messages call it, and its unit: ``("u", "m")`` of a five-bar."""
+        """Short name and unit of the coordinate that the amplitude is of: ``("u", "m")`` of a five-bar."""
         return self.flow.labels[0], self.flow.components[0][1]
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers, the largest first, shape (n,)."""
-        if not self._multipliers:
-            self._multipliers.append(multipliers(self.monodromy))
-        return self._multipliers[0]
+        if "multipliers" not in self._kept:
+            self._kept["multipliers"] = multipliers(self.monodromy)
+        found: NDArray[np.complex128] = self._kept["multipliers"]
+        return found
 
     @property
     def largest(self) -> float:
@@ -239,25 +251,34 @@ class PeriodicOrbit(Shown):
         return float(abs(self.multipliers[0]))
 
     def verdict(self, tolerance: float = TOLERANCE) -> StabilityVerdict:
-        """Whether small deviations die out, with the margin."""
+        """Return whether small deviations die out, with the margin."""
         return verdict(self.multipliers, tolerance)
 
-    def turn(self, samples: int = SAMPLES) -> Turn:
-        """Outputs over one period at equal steps of the crank angle."""
-        flow, mechanism = self.flow, mechanism_of(self.parameters)
-        angles = np.linspace(0.0, flow.period * self.turns, samples, endpoint=False)
-        rows = np.empty((samples, mechanism.size + flow.inputs))
-        section = section_of(self.parameters, self.drive, self.start, PLAIN, STATE)
+    def sample(self, angles: FloatArray) -> FloatArray:
+        """Return states of a run and channels at increasing crank angles (rad), shape (m, states + inputs).
+
+        Raises OrbitError if the motion cannot be followed.
+        """
+        rows = np.empty((len(angles), self.point.mechanism.size + self.flow.inputs))
         stations, starts = (np.zeros(1), self.start[None, :].copy())
         if self.stations is not None:
             stations, starts = self.stations.angles[:-1].copy(), self.stations.starts
+        section = self.point.section(self.start, PLAIN, STATE)
         status = kernels.sample(section, stations, starts, angles, rows)
         if status != Status.DONE:
-            raise failure(status, flow, self.start)
+            raise orbit_error(status, self.flow, self.start)
+        return rows
+
+    def turn(self, samples: int = SAMPLES) -> Turn:
+        """Return the outputs over one period at equal steps of the crank angle."""
+        flow, mechanism = self.flow, self.point.mechanism
+        angles = np.linspace(0.0, flow.period * self.turns, samples, endpoint=False)
+        rows = self.sample(angles)
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
-        values = outputs_of(mechanism, section.modes, np.array([*self.parameters.constants(), 0.0]), states, channels)
+        modes = np.array(flow.modes, dtype=float)
+        values = outputs_of(mechanism, modes, np.append(self.point.constants, 0.0), states, channels)
         keep = [n for n, name in enumerate(mechanism.output_names) if name not in _OF_A_RUN]
-        time, period = times_of(states[:, len(mechanism.freedoms) + flow.crank], flow.period * self.turns)
+        time, period = _time(states[:, len(mechanism.freedoms) + flow.crank], flow.period * self.turns)
         return Turn(
             angle=angles,
             time=time,
@@ -273,33 +294,45 @@ class PeriodicOrbit(Shown):
 
     @property
     def amplitude(self) -> float:
-        """Half the range of the first free coordinate over a period, of a slider position (m); see `Turn.amplitude`."""
-        if not self._amplitude:
-            self._amplitude.append(self.turn().amplitude)
-        return self._amplitude[0]
+        """Half the range of the first free coordinate over a period, such as a slider position (m); see `Turn.amplitude`."""
+        if "amplitude" not in self._kept:
+            self._kept["amplitude"] = self.turn().amplitude
+        return float(self._kept["amplitude"])
 
     def clearance(self, samples: int = SAMPLES) -> float:
-        """How near the links come to the limit of assembly over a period, in the measure of `linkwork.limits.LIMIT_SINE`."""
-        mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
+        """Return the least clearance to the limit of assembly over a period, as `linkwork.limits.LIMIT_SINE` measures it."""
+        equations, p = self.point.mechanism.equations, self.parameters.constants()
         modes, turn = tuple(float(value) for value in self.flow.modes), self.turn(samples)
         return min(
-            abs(mechanism.equations.clearance(x, mechanism.equations.applied(modes, u, p), p))
+            abs(equations.clearance(x, equations.applied(modes, u, p), p))
             for x, u in zip(turn.states.tolist(), turn.inputs.tolist())
         )
 
     def determinant_by_liouville(self, samples: int = 512) -> float:
-        """Determinant of the monodromy matrix from the trace of the rates' Jacobian along the orbit.
+        """Return the determinant of the monodromy matrix from the trace of the rates' Jacobian along the orbit.
 
         It does not use the variational equations, and so checks them. With Coulomb friction the trace peaks sharply where the
         slider turns round: it then takes some ten thousand samples.
         """
-        flow, turn, mechanism = self.flow, self.turn(samples), mechanism_of(self.parameters)
-        drive, p = self.drive.vector(mechanism), list(self.parameters.constants())
-        y = flow.unknowns(turn.states, drive).T
-        traces = flow.jacobian_trace(mechanism.switched(p)).map(samples)(
-            turn.angle[None, :], y, list(flow.modes), drive, p
-        )
+        flow, turn, p = self.flow, self.turn(samples), self.point.constants
+        y = flow.unknowns(turn.states, self.point.vector).T
+        trace = flow.jacobian_trace(self.point.mechanism.switched(p.tolist())).map(samples)
+        traces = trace(turn.angle[None, :], y, list(flow.modes), self.point.vector, p)
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
+
+    def passages(self) -> FloatArray:
+        """Return y at the beginning of each turn of the period, any of which may be its start; shape (turns, n)."""
+        passed = [self.start]
+        for _ in range(self.turns - 1):
+            passed.append(passed[-1] + self.point.period(passed[-1], 1).shift)
+        return np.array(passed)
+
+
+def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
+    """Return an orbit at an operating point, which it keeps; the other arguments are those of `PeriodicOrbit`."""
+    orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
+    orbit._kept["point"] = point
+    return orbit
 
 
 @takes_published()
@@ -311,7 +344,7 @@ def orbit_of(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """A periodic motion: the one that Newton's method leads to.
+    """Find a periodic motion: the one to which Newton's method leads.
 
     Parameters
     ----------
@@ -319,86 +352,83 @@ def orbit_of(
     turns : int
         Turns of the crank in one period.
     start : array_like, shape (n,), optional
-        Guess of y at crank angle 0; without it all at zero.
+        Guess of y at crank angle 0; zero without it.
     settle : bool
-        Whether other starts are tried where Newton's method fails from the guess: where the motion goes by itself, and those
-        of `starts_of`.
+        Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles by
+        itself, and those of `starts_of`.
 
     Raises
     ------
     OrbitError
         If none is found; `OrbitAssemblyError` if the links come to the limit of assembly on the way.
     InputError
-        If what was given is not usable.
+        If an argument is not usable.
     """
-    require_turns(turns)
-    guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
-    _check_period(parameters, drive, guess, turns)
-    _check_assembly(parameters, drive, guess)
+    point = operating_point(parameters, drive)
+    guess = first_guess(point.flow, drive, start)
+    require_turns(turns, point, guess)
+    _check_assembly(point, guess)
     try:
-        return _newton(parameters, drive, turns, guess)
-    except OrbitError as failure:
+        return solve_orbit(point, turns, guess)
+    except OrbitError as error:
         if not settle:
             raise
-        first = failure
-    status, settled = settle_from(parameters, drive, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
+        failure = error
+    status, settled = settle_motion(point, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
     if status is Status.DONE:
         try:
-            return _newton(parameters, drive, turns, settled)
+            return solve_orbit(point, turns, settled)
         except OrbitError:
             pass
     for number in range(SETS):
         for place in starts_of(parameters, drive, guess, STARTS, number):
-            found = approach(parameters, drive, turns, place)
+            found = approach(point, turns, place)
             if found is None:
                 continue
             try:
-                return _newton(parameters, drive, turns, found)
+                return solve_orbit(point, turns, found)
             except OrbitError:
                 pass
-    raise first
+    raise failure
 
 
-def settle_from(
-    parameters: Parameters, drive: Drive, start: NDArray[np.float64], *, tolerance: float, change: float, turns: int
-) -> tuple[Status, NDArray[np.float64]]:
-    """Where the motion goes by itself from ``start``, until a turn changes y by less than ``change``, or for so many turns."""
+def settle_motion(
+    point: OperatingPoint, start: FloatArray, *, tolerance: float, change: float, turns: int
+) -> tuple[Status, FloatArray]:
+    """Follow the motion from ``start`` until a turn changes y by less than ``change``, or for so many turns."""
     settled = start.copy()
-    section = section_of(parameters, drive, start, PLAIN, tolerance=tolerance)
-    status = kernels.settle(section, drive.flow(mechanism_of(parameters)).period, change, turns, settled)
+    section = point.section(start, PLAIN, tolerance=tolerance)
+    status = kernels.settle(section, point.flow.period, change, turns, settled)
     return Status(status), settled
 
 
 def approach(
-    parameters: Parameters,
-    drive: Drive,
-    turns: int,
-    place: NDArray[np.float64],
-    known: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64] | None:
-    """Start of the motion that Newton's method leads to from a place, to the tolerance of a search; None if to none.
+    point: OperatingPoint, turns: int, place: FloatArray, known: FloatArray | None = None
+) -> FloatArray | None:
+    """Search a periodic motion from far away and return its start, to the tolerance of a search; None if there is none.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
+        Guess of the start.
     known : ndarray, shape (m, n), optional
         Starts of motions that are divided out.
     """
-    flow, start = drive.flow(mechanism_of(parameters)), place.copy()
+    n, start = point.flow.size, place.copy()
     status = kernels.search(
-        section_of(parameters, drive, place, VARIATIONAL, tolerance=SEARCH_TOLERANCE),
-        flow.period * turns,
+        point.section(place, VARIATIONAL, tolerance=SEARCH_TOLERANCE),
+        point.flow.period * turns,
         SEARCH_ITERATIONS,
         REACH,
         start,
-        np.empty((0, flow.size)) if known is None else known,
-        np.empty(flow.size * (1 + flow.size)),
+        np.empty((0, n)) if known is None else known,
+        np.empty(n * (1 + n)),
     )
     return start if status == Status.DONE else None
 
 
-def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
-    """Where Newton's method begins: ``start``, checked; without it all at zero, at a speed that a motor may have.
+def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray:
+    """Return the guess from which Newton's method begins: ``start``, or zero, at a speed that a motor may have.
 
     Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
     """
@@ -424,22 +454,21 @@ def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.fl
     return guess
 
 
-def require_turns(turns: int) -> None:
-    """Make sure that a period can have so many turns; raises InputError if it cannot."""
+def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:
+    """Raise InputError if a period cannot have so many turns.
+
+    A mechanism with a freedom driven by a groove or the like may need several turns to come back to its configuration: this is
+    checked at an operating point, from a start.
+    """
     if turns < 1 or turns != int(turns):
         raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
-
-
-def _check_period(parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int) -> None:
-    """Make sure that a mechanism in which no input but a groove or the like drives a freedom repeats itself after the turns."""
-    mechanism = mechanism_of(parameters)
-    if set(drive.arguments(mechanism).values()) <= {channel.argument for channel in mechanism.channels}:
+    if point is None or start is None:
         return
-    flow = drive.flow(mechanism)
-    section, plain = (
-        section_of(parameters, drive, start, PLAIN),
-        flow.function(PLAIN, mechanism.switched(parameters.constants())),
-    )
+    mechanism, flow = point.mechanism, point.flow
+    if set(point.drive.arguments(mechanism).values()) <= {channel.argument for channel in mechanism.channels}:
+        return
+    section = point.section(start, PLAIN)
+    plain = flow.function(PLAIN, mechanism.switched(point.constants.tolist()))
     z = np.append(start, np.zeros(flow.size * (flow.size + 1)))
     rates = [
         np.asarray(plain(angle + way, z, section.modes, section.drive, section.p)).ravel()
@@ -452,106 +481,111 @@ def _check_period(parameters: Parameters, drive: Drive, start: NDArray[np.float6
         )
 
 
-def _check_assembly(parameters: Parameters, drive: Drive, start: NDArray[np.float64]) -> None:
-    mechanism = mechanism_of(parameters)
-    flow, vector, p = drive.flow(mechanism), drive.vector(mechanism), parameters.constants()
+def _check_assembly(point: OperatingPoint, start: FloatArray) -> None:
+    """Raise OrbitAssemblyError if the links cannot be joined at the start."""
+    mechanism, flow, p = point.mechanism, point.flow, point.parameters.constants()
     modes = tuple(float(value) for value in flow.modes)
-    applied = mechanism.equations.applied(modes, tuple(vector[: flow.inputs].tolist()), p)
-    x = mechanism.equations.start(flow.state(start, vector), applied, p)
+    applied = mechanism.equations.applied(modes, tuple(point.vector[: flow.inputs].tolist()), p)
+    x = mechanism.equations.start(flow.state(start, point.vector), applied, p)
     try:
-        mechanism.check_state(parameters, x, applied, p)
+        mechanism.check_state(point.parameters, x, applied, p)
     except AssemblyError as error:
         raise OrbitAssemblyError(str(error), flow, start, np.inf, 0) from None
 
 
-def _newton(parameters: Parameters, drive: Drive, turns: int, guess: NDArray[np.float64]) -> PeriodicOrbit:
-    flow = drive.flow(mechanism_of(parameters))
-    n, start = flow.size, guess.copy()
+def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> PeriodicOrbit:
+    """Find a periodic motion by Newton's method from a guess; raises OrbitError if there is none."""
+    n, start = point.flow.size, guess.copy()
     z, report = np.empty(n * (1 + n)), np.zeros(3)
-    section = section_of(parameters, drive, guess, VARIATIONAL)
-    status = kernels.solve(section, flow.period * turns, MOST_ITERATIONS, start, z, report)
+    section = point.section(guess, VARIATIONAL)
+    status = kernels.solve(section, point.flow.period * turns, MOST_ITERATIONS, start, z, report)
+    residual, iterations = float(report[0]), int(report[1])
     if status != Status.DONE:
-        raise failure(status, flow, start, report[0], int(report[1]))
-    return PeriodicOrbit(
-        parameters=parameters,
-        drive=drive,
+        raise orbit_error(status, point.flow, start, residual, iterations)
+    return make_orbit(
+        point,
         turns=turns,
         start=start,
         monodromy=z[n:].reshape(n, n).T.copy(),
-        residual=float(report[0]),
-        iterations=int(report[1]),
+        residual=residual,
+        iterations=iterations,
     )
 
 
-def orbit_from(
-    parameters: Parameters,
-    drive: Drive,
-    start: NDArray[np.float64],
-    turns: int,
-    period: Period,
-    nearest: float | None = None,
-) -> PeriodicOrbit:
-    """The orbit that one period from its start is, as far as it closes."""
-    return PeriodicOrbit(
-        parameters=parameters,
-        drive=drive,
-        turns=turns,
-        start=start.copy(),
-        monodromy=period.monodromy,
-        residual=float(np.abs(period.shift / scale_of(parameters, drive, start)).max()),
-        iterations=1,
-        nearest=nearest,
+def trial_orbit(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[PeriodicOrbit, FloatArray]:
+    """Follow one period from a start; return it as an orbit, though it may not close, and y(T) - y(0).
+
+    Raises OrbitError if the period cannot be followed.
+    """
+    period = point.period(start, turns)
+    residual = float(np.abs(period.shift / point.scale(start)).max())
+    made = make_orbit(
+        point, turns=turns, start=start.copy(), monodromy=period.monodromy, residual=residual, iterations=1
     )
+    return made, period.shift
 
 
-def orbit_equations(
-    family: Family, turns: int, low: float, high: float, angles: NDArray[np.float64] | None = None
-) -> Evaluate:
-    """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`.
+class OrbitEquations:
+    """The equations of a family's periodic motions over a range, as `numerics.continuation` follows them.
 
-    With ``angles``, shape (k + 1,), the unknowns are y at the beginning of each piece between them, and what is to vanish
-    is the difference of each end from the next beginning: multiple shooting.
+    The unknowns are y at the beginnings of the pieces of a period; the residual is y at the end of each piece less y at the
+    beginning of the next; the data of an evaluation are the `PeriodicOrbit`.
+
+    Parameters
+    ----------
+    family : Family
+    turns : int
+        Turns of the crank in a period.
+    low, high : float
+        Range of the parameter.
+    angles : ndarray, shape (k + 1,), optional
+        As in `Stations`; without it the period is one piece.
     """
 
-    (mechanism, drive), (other, _) = family.at(low), family.at(high)
-    whole = np.array([0.0, drive.flow(mechanism_of(mechanism)).period * turns])
-    path = PeriodPath(whole if angles is None else angles, is_smooth(mechanism) and is_smooth(other))
-    # what varies is a number of the drive: all of them are linear in it
-    same = family.direction(high, low, high) if mechanism is other else None
+    def __init__(self, family: Family, turns: int, low: float, high: float, angles: FloatArray | None = None) -> None:
+        self.family, self.turns, self.low, self.high = family, turns, low, high
+        self._bounds = [family.at(value) for value in (low, high)]
+        (mechanism, drive), (other, last) = self._bounds
+        flow = drive.flow(mechanism_of(mechanism))
+        self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
+        # each piece with the next one, shape (k, n, k, n): the part of the Jacobian that stays the same
+        k, n = len(self.angles) - 1, flow.size
+        self._joined: FloatArray = np.zeros((k, n, k, n))
+        self._joined[np.arange(k), :, (np.arange(k) + 1) % k] = -np.eye(n)
+        self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))
+        # a number of the drive varies: the equations' numbers are linear in it
+        self._direction = family.direction(high, low, high) if mechanism is other else None
 
-    def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
-        parameters, drive = family.at(value)
-        direction = same or family.direction(value, low, high)
-        ends = path.follow(parameters, drive, y[None, :], value, direction, high - low)
-        period = Period(ends.y[0] - y, ends.matrices[0].copy(), ends.slopes[0])
-        orbit = orbit_from(parameters, drive, y, turns, period, ends.clearance)
-        return Evaluation(period.shift, period.monodromy - np.eye(len(y)), period.slope, orbit)
+    def scale(self, start: FloatArray) -> FloatArray:
+        """Return the magnitudes of the unknowns: the greatest of both ends of the range."""
+        scale = np.max([operating_point(*bound).scale(start) for bound in self._bounds], axis=0)
+        # an arc has the length of the mean square over the pieces
+        pieces = len(self.angles) - 1
+        return np.asarray(np.tile(scale * np.sqrt(pieces), pieces))
 
-    def in_pieces(y: NDArray[np.float64], value: float) -> Evaluation:
-        assert angles is not None
-        parameters, drive = family.at(value)
-        k = len(angles) - 1
-        starts = y.reshape(k, -1).copy()
-        n = starts.shape[1]
-        direction = same or family.direction(value, low, high)
-        ends, matrices, slopes, clearance = path.follow(parameters, drive, starts, value, direction, high - low)
-        gaps = ends - np.roll(starts, -1, axis=0)
-        jacobian = np.zeros((k, n, k, n))
+    def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
+        """Evaluate the residual with its exact derivatives; raises OrbitError if a piece cannot be followed."""
+        point = operating_point(*self.family.at(value))
+        k, n = self._joined.shape[:2]
+        starts = unknowns.reshape(k, n).copy()
+        direction = self._direction or self.family.direction(value, self.low, self.high)
+        ends = self._discretised.ends(point, starts, value, direction, self.high - self.low)
         pieces = np.arange(k)
-        jacobian[pieces, :, pieces] = matrices
-        jacobian[pieces, :, (pieces + 1) % k] -= np.eye(n)
-        scale = scale_of(parameters, drive, starts[0])
-        orbit = PeriodicOrbit(
-            parameters=parameters,
-            drive=drive,
-            turns=turns,
+        gaps = ends.y - starts[(pieces + 1) % k]
+        jacobian = self._joined.copy()
+        jacobian[pieces, :, pieces] += ends.matrices
+        scale = point.scale(starts[0])
+        stations = None
+        if k > 1:
+            stations = Stations(self.angles, starts, float(growths(ends.matrices, scale).max()))
+        orbit = make_orbit(
+            point,
+            turns=self.turns,
             start=starts[0].copy(),
-            monodromy=reduce(lambda product, matrix: matrix @ product, matrices),
+            monodromy=reduce(lambda product, matrix: matrix @ product, ends.matrices).copy(),
             residual=float(np.abs(gaps / scale).max()),
             iterations=1,
-            stations=Stations(angles, starts, float(growths(matrices, scale).max())),
-            nearest=clearance,
+            stations=stations,
+            nearest=ends.clearance,
         )
-        return Evaluation(gaps.ravel(), jacobian.reshape(k * n, k * n), slopes.ravel(), orbit)
-
-    return evaluation if angles is None else in_pieces
+        return Evaluation(gaps.ravel(), jacobian.reshape(k * n, k * n), ends.slopes.ravel(), orbit)

@@ -1,11 +1,12 @@
-"""All periodic motions at a point, not one: from many starts, and by dividing out those that are known.
+"""The search for periodic motions: all that exist at a point, the one a machine meets, and a sweep through the speeds.
 
-Newton's method finds the motion whose basin a guess happens to lie in. `find_orbits` seeks by two methods that share nothing
-but the map over a period: from a set of starts that fills the region where the mechanism can be assembled, and from fewer
-starts by deflation, where each motion that was found is divided out and sought no more. Where both find the same number, and
-the indices of the motions add up, none was missed as far as can be said.
+Newton's method finds the motion whose basin a guess happens to lie in. `find_orbits` uses two methods that share only the map
+over a period: a set of starts that fills the region in which the mechanism can be assembled, and from fewer starts deflation,
+which divides out each motion that was found. If both find the same number, and the indices of the motions add up, it is
+unlikely that one was missed.
 
-`find_orbit` returns the one that a machine meets which is run up slowly from rest.
+`find_orbit` returns the motion that a machine meets when it is run up slowly from rest; `sweep` goes through speeds as a
+machine does, with its jumps.
 """
 
 from __future__ import annotations
@@ -18,38 +19,46 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count
 from ...mechanisms import InitialState, Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...run import Inputs, driven, started, takes_published
 from ...units import Amount, in_si
-from .discretisation import OrbitError, period_from
-from .drive import SAME, Drive, Torque, drive_of, scale_of, starts_of
+from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
+from .drive import SAME, Drive, Torque, drive_of, starts_of
 from .floquet import Stability
-from .kernels import REASONS, Status
-from .orbit import SEARCH_TOLERANCE, PeriodicOrbit, approach, guess_of, orbit_of, require_turns, settle_from
+from .kernels import Status
+from .orbit import (
+    SEARCH_TOLERANCE,
+    PeriodicOrbit,
+    approach,
+    first_guess,
+    orbit_of,
+    require_turns,
+    settle_motion,
+    solve_orbit,
+)
 
-#: Turns for which a motion that has lost its stability is followed to the next steady one, and the change a turn that ends it.
+FloatArray = NDArray[np.float64]
+#: Turns for which a motion that lost its stability is followed to the next steady one, and the change per turn that ends it.
 JUMP_TURNS, SETTLED = 5000, 1e-9
-
-#: Change of the amplitude from one speed to the next, relative, beyond which the step is halved, and how often it may be.
+#: Relative change of the amplitude from one speed to the next beyond which the step is halved, and halvings at most.
 FAR, HALVINGS = 0.25, 6
-
-#: Periods, in turns, that a steady motion is looked for with.
+#: Periods, in turns, that a steady motion may have.
 PERIODS = (1, 2, 3, 4)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Jump:
-    """Where a sweep left one steady motion for another.
+    """A jump of a sweep from one steady motion to another.
 
     Attributes
     ----------
     speed : float
-        The first on the new motion (rad/s).
+        First speed on the new motion (rad/s).
     amplitude_before, amplitude_after : float
         m.
     turns_before, turns_after : int
-        Turns in a period: a motion that doubles its period changes its amplitude but little.
+        Turns in a period: a period doubling hardly changes the amplitude.
     """
 
     speed: float
@@ -68,26 +77,26 @@ class Sweep:
     speed : ndarray, shape (m,)
         rad/s, in the order of the sweep.
     orbits : tuple of (PeriodicOrbit or None)
-        None where no steady motion with a period of 1 to 4 turns was met.
+        None if no steady motion with a period of 1 to 4 turns was met.
     flags : tuple of str
-        Why there is none; empty where there is one.
+        Why there is none; else empty.
     jumps : tuple of Jump
     """
 
-    speed: NDArray[np.float64]
+    speed: FloatArray
     orbits: tuple[PeriodicOrbit | None, ...]
     flags: tuple[str, ...]
     jumps: tuple[Jump, ...]
 
     @property
     def amplitude(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
-        """Half the range of the slider position (m), masked where there is no steady motion; shape (m,)."""
+        """Half the range of the first free coordinate, of a slider (m), masked without a steady motion; shape (m,)."""
         values = [np.nan if orbit is None else orbit.amplitude for orbit in self.orbits]
         return np.ma.masked_invalid(np.array(values))
 
     @property
     def turns(self) -> NDArray[np.int64]:
-        """Turns in a period; 0 where there is no steady motion. Shape (m,)."""
+        """Turns in a period, 0 without a steady motion; shape (m,)."""
         return np.array([0 if orbit is None else orbit.turns for orbit in self.orbits])
 
 
@@ -103,8 +112,8 @@ def sweep(
 ) -> Sweep:
     """Go through crank speeds as a machine would, each begun from the steady motion of the last.
 
-    Where that motion is lost or unstable at the new speed, the plant is followed for up to 5000 turns to the next steady one:
-    a jump. Speeds upward and downward may meet different motions.
+    If that motion is lost or unstable at the new speed, the mechanism is followed for up to 5000 turns to the next steady
+    motion: a jump. Rising and falling speeds may meet different motions.
 
     Parameters
     ----------
@@ -112,9 +121,9 @@ def sweep(
     speeds : array_like, shape (m,)
         rad/s, increasing or decreasing.
     drive : Drive, optional
-        What acts beside the speed, which takes the place of its own.
+        Other inputs; its own speed is replaced.
     start : array_like, shape (n,), optional
-        y at crank angle 0 at the first speed, of a five-bar u (m) and u' (m/s); at rest at zero without it.
+        y at crank angle 0 at the first speed, of a five-bar u (m) and u' (m/s); zero without it.
     watch : callable, optional
         Called with every speed.
 
@@ -133,14 +142,15 @@ def sweep(
     flags: list[str] = []
     jumps: list[Jump] = []
     drive = drive or Drive(speed=float(grid[0]))
-    state = guess_of(_at(drive, float(grid[0])).flow(mechanism_of(parameters)), drive, start)
+    first = _speed_drive(drive, float(grid[0]))
+    state = first_guess(first.flow(mechanism_of(parameters)), drive, start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
         orbit = None if last is None else _continued(parameters, speed, last)
         flag = ""
         if orbit is None:
             try:
-                orbit = _settled(parameters, _at(drive, speed), state)
+                orbit = _settled(operating_point(parameters, _speed_drive(drive, speed)), state)
             except OrbitError as error:
                 flag = str(error)
             if orbit is not None and last is not None:
@@ -163,21 +173,21 @@ def sweep(
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 
-def _at(drive: Drive, speed: float) -> Drive:
-    """The drive at a prescribed speed."""
+def _speed_drive(drive: Drive, speed: float) -> Drive:
+    """Return the drive at a prescribed speed."""
     return replace(drive, speed=speed, torque=0.0, motor=None)
 
 
 def _continued(
     parameters: Parameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
 ) -> PeriodicOrbit | None:
-    """The stable motion that the last one becomes at another speed; None if it is lost on the way.
+    """Follow a stable motion to another speed; return None if it is lost on the way.
 
-    A neighbour that differs much may be another motion that Newton's method fell upon: it is sought again in half steps.
+    A neighbour that differs much may be another motion, which Newton's method met by chance: half steps are taken then.
     """
     assert last.drive.speed is not None
     try:
-        orbit = orbit_of(parameters, _at(last.drive, speed), turns=last.turns, start=last.start, settle=False)
+        orbit = orbit_of(parameters, _speed_drive(last.drive, speed), turns=last.turns, start=last.start, settle=False)
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -190,29 +200,27 @@ def _continued(
     return None if middle is None else _continued(parameters, speed, middle, halvings - 1)
 
 
-def _settled(parameters: Parameters, drive: Drive, state: Sequence[float] | NDArray[np.float64]) -> PeriodicOrbit:
-    """The steady motion that the plant goes to by itself from a state at crank angle 0."""
-    start = np.array(state, dtype=float)
-    scale, flow = scale_of(parameters, drive, start), drive.flow(mechanism_of(parameters))
-    status, start = settle_from(parameters, drive, start, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
+def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
+    """Return the steady motion on which the mechanism settles from a state at crank angle 0."""
+    status, start = settle_motion(point, state, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
     if status is not Status.DONE:
-        raise OrbitError(REASONS[status], flow, start, np.inf, 0)
+        raise orbit_error(status, point.flow, start)
     for turns in PERIODS:
         try:
-            orbit = orbit_of(parameters, drive, turns=turns, start=start, settle=False)
+            orbit = orbit_of(point.parameters, point.drive, turns=turns, start=start, settle=False)
         except OrbitError:
             continue
-        if orbit.verdict(0.0).stability is Stability.STABLE and np.abs((orbit.start - start) / scale).max() < 1e-3:
+        far = np.abs((orbit.start - start) / point.scale(state)).max()
+        if orbit.verdict(0.0).stability is Stability.STABLE and far < 1e-3:
             return orbit
-    raise OrbitError(f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns", flow, start, np.inf, 0)
+    reason = f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns"
+    raise OrbitError(reason, point.flow, start, np.inf, 0)
 
 
 #: Starts of the two methods in a round, and rounds at most.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
-
-#: Distance, relative to the scale, at which what a search that divides nothing out comes to is taken for a known motion.
+#: Distance, relative to the scale, below which a motion that a search without deflation approaches counts as known.
 _NEAR = 1e-4
-
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
 
@@ -228,10 +236,10 @@ class Orbits(Shown):
     agreed : bool
         Whether the two methods found the same motions; if not, there may be more.
     index : int
-        Sum of the signs of det(I - monodromy matrix) over these motions and those of a period that goes into theirs, each as
-        often as it has turns. It is 1 where every motion stays clear of the limit of assembly, since motions come and go in
-        pairs of opposite signs: another sum says that one was missed, or lost at that limit. Where motions of several numbers
-        of turns were sought, it is the first that is not 1.
+        Sum of the signs of det(I - monodromy matrix) over these motions and those whose period divides theirs, each counted
+        once per turn. It is 1 if every motion stays clear of the limit of assembly, since motions come and go in pairs of
+        opposite signs: another sum means that one was missed, or lost at that limit. For several numbers of turns it is the
+        first sum other than 1.
     """
 
     orbits: tuple[PeriodicOrbit, ...]
@@ -249,7 +257,7 @@ class Orbits(Shown):
 
     @property
     def stable(self) -> tuple[PeriodicOrbit, ...]:
-        """Those that a machine can stay in."""
+        """The motions that a machine can stay in: all but the unstable ones."""
         return tuple(orbit for orbit in self.orbits if orbit.verdict().stability is not Stability.UNSTABLE)
 
 
@@ -266,42 +274,42 @@ def find_orbit(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find a periodic motion of the full nonlinear plant: of several, the one that a machine meets.
+    """Find a periodic motion of the full nonlinear mechanism: of several, the one that a machine meets.
 
     Parameters
     ----------
     parameters : parameters of a mechanism
         Or a published set or its name, which brings its crank speed, unless another drive is given.
     inputs : Inputs, optional
-        What acts, all of it constant; a motor may drive the crank.
+        Constant inputs; a motor may drive the crank.
     speed : float or str, optional
-        Prescribed crank speed (rad/s, or text such as "420 rpm"), in the place of what drives the crank in the inputs.
+        Prescribed crank speed (rad/s, or text such as "420 rpm"); replaces the drive of the crank in the inputs.
     torque : float, InductionMotor, or both in a sequence, optional
-        Torque on the crank (N.m), in the place of a speed. The mean speed is then part of the solution.
+        Torque on the crank (N.m), instead of a speed. The mean speed is then part of the solution.
     initial : state at the start, optional
-        Where freedoms are held that are neither free nor the crank's: see `Drive`.
+        Positions of the freedoms that are held: see `Drive`.
     turns : int
-        Turns of the crank in one period; where no motion has it, one that repeats itself after fewer is found.
+        Turns of the crank in one period; if there is no such motion, one of fewer turns is returned.
     start : array_like, shape (n,), optional
-        Guess of y at crank angle 0: coordinates and rates of what is free beside the crank, of a five-bar u (m) and u' (m/s),
-        and under a torque the crank speed (rad/s), which is needed there unless it follows from a motor's synchronous speed.
-        At prescribed speed the motion is then the one that Newton's method leads to from there.
+        Guess of y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and
+        u' (m/s), and under a torque the crank speed (rad/s), which is needed unless it follows from a motor's synchronous
+        speed. At prescribed speed the result is then the motion to which Newton's method leads from there.
     settle : bool
-        Whether other motions are sought, and other ways are tried where Newton's method fails from the guess; without it the
-        motion is the one that Newton's method leads to.
+        Whether other motions are sought, and other starts are tried if Newton's method fails from the guess; without it the
+        result is the motion to which Newton's method leads.
 
     Returns
     -------
     PeriodicOrbit
-        The one that a machine meets which is run up slowly from rest, if several are stable; ``others`` says how many others
-        there are: see `find_orbits`. Whether it is stable is not asked for here: see ``verdict``.
+        If several are stable, the one that a machine meets when it is run up slowly from rest; ``others`` is the number of
+        others: see `find_orbits`. It may be unstable: see ``verdict``.
 
     Raises
     ------
     OrbitError
         If none is found; `OrbitAssemblyError` if the links come to the limit of assembly on the way.
     InputError
-        If what was given is not usable.
+        If an argument is not usable.
 
     Examples
     --------
@@ -323,7 +331,7 @@ def find_orbit(
             raise failure
         # it repeats itself after fewer turns, and so after these
         return replace(first, others=0)
-    return replace(_met(parameters, drive, found, first, start), others=len(found) - 1)
+    return replace(_met(found, first, start), others=len(found) - 1)
 
 
 @takes_published(inputs=driven, initial=started)
@@ -338,11 +346,10 @@ def find_orbits(
     turns: int | Sequence[int] = 1,
     start: ArrayLike | None = None,
 ) -> Orbits:
-    """Find all periodic motions of a period of so many turns.
+    """Find all periodic motions with a given number of turns in the period.
 
-    Motions of several turns need not branch off those of one: beside a weakly damped motion there may be some of three or four
-    turns that appear by a fold, in a range of speeds of some rpm (subharmonic resonance). They are found only where ``turns``
-    asks for them.
+    Motions of several turns need not branch off those of one: next to a weakly damped motion, motions of three or four turns
+    may appear by a fold, in a range of speeds of some rpm (subharmonic resonance). Only those that ``turns`` names are found.
 
     Parameters
     ----------
@@ -350,19 +357,19 @@ def find_orbits(
         See `find_orbit`.
     turns : int or sequence of int
         Turns of the crank in one period, or several numbers, such as (1, 2, 3, 4). A motion that repeats itself after fewer
-        turns is none of these.
+        turns does not count.
     start : array_like, shape (n,), optional
-        A further start; under a torque one is needed for the crank speed, unless it follows from a motor.
+        A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
 
     Returns
     -------
     Orbits
-        Empty where none was found.
+        Empty if none was found.
 
     Raises
     ------
     InputError
-        If what was given is not usable.
+        If an argument is not usable.
 
     Examples
     --------
@@ -387,7 +394,7 @@ def orbits_of(
     start: ArrayLike | None = None,
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
-    """The same as `find_orbits`, from a `Drive`; the ``known`` motions are among them."""
+    """Find all periodic motions under a `Drive`, ``known`` ones included: see `find_orbits`."""
     if not isinstance(turns, int):
         parts = [orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
         return Orbits(
@@ -395,13 +402,14 @@ def orbits_of(
             agreed=all(part.agreed for part in parts),
             index=next((part.index for part in parts if part.index != 1), 1),
         )
-    require_turns(turns)
-    guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
-    many, deflated = (_Found(parameters, drive, turns, guess) for _ in range(2))
+    point = operating_point(parameters, drive)
+    guess = first_guess(point.flow, drive, start)
+    require_turns(turns, point, guess)
+    many, deflated = (_Found(point, turns, guess) for _ in range(2))
     for orbit in known:
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
-    settled = settle_from(parameters, drive, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
+    settled = settle_motion(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
     if settled[0] is Status.DONE:
         places.append(settled[1])
     for number in range(ROUNDS):
@@ -422,51 +430,42 @@ def orbits_of(
     return Orbits(orbits=tuple(orbits), agreed=agreed, index=many.index)
 
 
-def passages(orbit: PeriodicOrbit) -> NDArray[np.float64]:
-    """y at the beginning of each turn of a period, any of which may be its start; shape (turns, n)."""
-    passed = [orbit.start]
-    for _ in range(orbit.turns - 1):
-        passed.append(passed[-1] + period_from(orbit.parameters, orbit.drive, passed[-1], 1).shift)
-    return np.array(passed)
-
-
 class _Found:
-    """The motions that one method has found at a point, from its starts."""
+    """The motions that one method has found at a point."""
 
-    def __init__(self, parameters: Parameters, drive: Drive, turns: int, guess: NDArray[np.float64]) -> None:
-        self.parameters, self.drive, self.turns, self.guess = parameters, drive, turns, guess
-        self.scale = scale_of(parameters, drive, guess)
+    def __init__(self, point: OperatingPoint, turns: int, guess: FloatArray) -> None:
+        self.point, self.turns, self.guess, self.scale = point, turns, guess, point.scale(guess)
         self.orbits: list[PeriodicOrbit] = []
-        #: Starts of all of them: of a motion of several turns one for each, those of shorter periods too.
+        #: Starts of all of them, of a motion of several turns one for each turn; motions of shorter periods included.
         self.known = np.empty((0, len(guess)))
         #: See `Orbits`.
         self.index = 0
 
-    def places(self, count: int, number: int) -> list[NDArray[np.float64]]:
-        """Starts of a set: see `starts_of`."""
-        return list(starts_of(self.parameters, self.drive, self.guess, count, number))
+    def places(self, count: int, number: int) -> list[FloatArray]:
+        """Return the starts of a set: see `starts_of`."""
+        return list(starts_of(self.point.parameters, self.point.drive, self.guess, count, number))
 
-    def knows(self, start: NDArray[np.float64], near: float = SAME) -> bool:
-        """Whether a start is of a known motion."""
+    def knows(self, start: FloatArray, near: float = SAME) -> bool:
+        """Return whether a start belongs to a known motion."""
         away = np.abs(self.known - start) / self.scale
         return bool((away.max(axis=1) < near).any()) if len(away) else False
 
-    def seek(self, place: NDArray[np.float64], *, divide: bool) -> bool:
-        """Search from a place; whether a new motion was found."""
-        start = approach(self.parameters, self.drive, self.turns, place, self.known if divide else None)
+    def seek(self, place: FloatArray, *, divide: bool) -> bool:
+        """Search from a place; return whether a new motion was found."""
+        start = approach(self.point, self.turns, place, self.known if divide else None)
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
         try:
-            return self.add(orbit_of(self.parameters, self.drive, turns=self.turns, start=start, settle=False))
+            return self.add(solve_orbit(self.point, self.turns, start))
         except OrbitError:
             return False
 
     def add(self, orbit: PeriodicOrbit) -> bool:
-        """Add a motion; whether it is new."""
+        """Add a motion; return whether it is new."""
         if self.knows(orbit.start):
             return False
-        passed = passages(orbit)
-        # back at the start before its last turn, it is of a shorter period
+        passed = orbit.passages()
+        # a motion that is back at its start before the last turn has a shorter period
         away = np.abs(passed - orbit.start) / self.scale
         period = next((n for n in range(1, orbit.turns) if away[n].max() < SAME), orbit.turns)
         self.known = np.vstack([self.known, passed[:period]])
@@ -476,13 +475,13 @@ class _Found:
         return True
 
     def same_as(self, other: _Found) -> bool:
-        """Whether both have the same motions."""
+        """Return whether both have the same motions."""
         if len(self.orbits) != len(other.orbits):
             return False
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
-    def between(self) -> list[NDArray[np.float64]]:
-        """Places between each two motions, and around each: where a pair is, the third is often between."""
+    def between(self) -> list[FloatArray]:
+        """Return places between each two motions, where a third often is, and around each."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]
@@ -490,27 +489,25 @@ class _Found:
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 
-def _met(
-    parameters: Parameters, drive: Drive, found: Orbits, first: PeriodicOrbit | None, start: ArrayLike | None
-) -> PeriodicOrbit:
-    """The motion that a machine meets; where it meets none, the one that Newton's method leads to, else the smallest."""
+def _met(found: Orbits, first: PeriodicOrbit | None, start: ArrayLike | None) -> PeriodicOrbit:
+    """Return the motion that a machine meets; if none is stable, ``first``, or else the smallest."""
     stable = found.stable
     if len(stable) == 1:
         return stable[0]
     if not stable:
         return first if first is not None else found.orbits[0]
-    guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
+    point, drive = stable[0].point, stable[0].drive
+    guess = first_guess(point.flow, drive, start)
     arrived = None
     if drive.speed is not None and found.orbits[0].turns == 1:
         speeds = np.geomspace(_FIRST_SPEED * drive.speed, drive.speed, _SPEEDS)
-        last = sweep(parameters, speeds, drive=drive).orbits[-1]
+        last = sweep(point.parameters, speeds, drive=drive).orbits[-1]
         if last is not None and last.turns == 1:
             arrived = last.start
     if arrived is None:
-        status, settled = settle_from(parameters, drive, guess, tolerance=1e-8, change=1e-6, turns=2000)
+        status, settled = settle_motion(point, guess, tolerance=1e-8, change=1e-6, turns=2000)
         arrived = settled if status is Status.DONE else None
     if arrived is None:
         return stable[0]
-    scale = scale_of(parameters, drive, guess)
-    nearest = min(stable, key=lambda orbit: float(np.abs((orbit.start - arrived) / scale).max()))
-    return nearest
+    scale = point.scale(guess)
+    return min(stable, key=lambda orbit: float(np.abs((orbit.start - arrived) / scale).max()))

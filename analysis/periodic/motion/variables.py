@@ -24,7 +24,6 @@ from .flow import Flow, crank_of, cranks_of
 
 #: A mechanism and what drives it.
 Operation = tuple[Parameters, Drive]
-
 #: The operation at a point of a chart.
 Plane = Callable[[float, float], Operation]
 
@@ -232,7 +231,6 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
 #: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
 _DIFFERENCE = 1e-6
-
 #: What varies: an FMI name, or a function of one number.
 Vary = str | Callable[[float], Operation]
 

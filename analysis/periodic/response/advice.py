@@ -1,4 +1,8 @@
-"""Which values of a parameter to avoid and why, what follows at folds, and where the amplitude is greatest."""
+"""Advice from branches: values of the parameter to avoid, jumps at folds, and greatest amplitudes.
+
+An arc is a part of a branch along which the parameter goes one way and stability stays the same. Where a stable arc ends at a
+fold the machine jumps to another one; where several overlap, its past decides; where there is none, it shakes.
+"""
 
 from __future__ import annotations
 
@@ -23,26 +27,21 @@ from ..stability.nonlinear import SpecialPoint
 from ..stability.sensitivity import PointGradient, crossing_gradient, extremum_gradient, extremum_orbit
 from .branch import Branch
 
-#: A resonance reaches from a peak to where the amplitude is less than this part of it: the half-power points.
+#: A resonance extends to the half-power points, at which the amplitude is this share of the peak.
 HALF_POWER = 1.0 / sqrt(2.0)
-
-#: How far a peak stands out, relative to its height, to count as one.
+#: Prominence of a peak, relative to its height, from which on it counts.
 _PROMINENCE = 1e-3
-
-#: Relative difference up to which two arcs are one curve, followed twice.
+#: Relative difference up to which two arcs are one curve that was followed twice.
 _SAME = 1e-2
-
-#: Relative difference of values of the parameter that is a rounding error; part of the range below which an interval is none:
-#: a doubled branch begins a step beyond its doubling.
+#: Relative rounding error of the parameter; share of the range below which an interval does not count, as a doubled branch
+#: begins a step beyond its doubling.
 _ROUNDING, _SLIVER = 1e-6, 1e-4
-
 FloatArray = NDArray[np.float64]
-
 Interval = tuple[float, float]
 
 
 class Risk(Enum):
-    """Why a value of the parameter is to be avoided."""
+    """Reason to avoid a value of the parameter."""
 
     RESONANCE = "resonance, above 0.71 of the peak"
     SEVERAL = "several stable motions, jumps between them"
@@ -52,7 +51,7 @@ class Risk(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Avoided:
-    """A range of the parameter, of a speed in rad/s, that a machine had better not stay in, and why."""
+    """A range of the parameter, of a speed in rad/s, that a machine should avoid, and the reason."""
 
     low: float
     high: float
@@ -61,18 +60,17 @@ class Avoided:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoldJump:
-    """What a machine does that comes to a fold on the stable motion that ends there.
+    """The jump of a machine at a fold at which its stable motion ends.
 
     Attributes
     ----------
     parameter : float
     direction : int
-        +1 if the motion is there below the fold and ends as the parameter rises, -1 if it ends as it falls.
+        +1 if the motion exists below the fold and ends as the parameter rises, -1 if it ends as the parameter falls.
     before : float
         Amplitude of the motion that ends.
     after : tuple of float
-        Amplitudes of the stable motions there are beyond; more than one where the branches do not tell which it will be, none
-        where none was followed.
+        Amplitudes of the stable motions beyond; several if the branches do not decide between them, none if none was followed.
     """
 
     parameter: float
@@ -83,7 +81,7 @@ class FoldJump:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Arc:
-    """A part of a branch with one way of the parameter and one stability.
+    """A part of a branch with one direction of the parameter and one stability.
 
     Attributes
     ----------
@@ -96,7 +94,7 @@ class Arc:
     start : ndarray, shape (m, n)
         Starts of the orbits.
     cut : (bool, bool)
-        Whether the branch goes on beyond the low and the high end, on another arc.
+        Whether the branch continues on another arc beyond the low and the high end.
     """
 
     turns: int
@@ -112,7 +110,7 @@ class Arc:
         return float(self.parameter[0]), float(self.parameter[-1])
 
     def same_as(self, other: Arc) -> bool:
-        """Whether two arcs are one curve where they overlap: a branch that was followed from both of its ends is."""
+        """Return whether two arcs are one curve where they overlap, as when a branch was followed from both ends."""
         low, high = _overlap(self, other)
         if self.turns != other.turns or low >= high:
             return False
@@ -128,11 +126,11 @@ class Arc:
 
 
 def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
-    """The arcs of branches, in their order."""
-    return tuple(arc for branch in branches for arc in _arcs_of(branch))
+    """Return the arcs of branches, in their order."""
+    return tuple(arc for branch in branches for arc in _branch_arcs(branch))
 
 
-def _arcs_of(branch: Branch) -> list[Arc]:
+def _branch_arcs(branch: Branch) -> list[Arc]:
     places = [special.after + 1 for special in branch.special]
     special = [special.orbit for special in branch.special]
     parameter = np.insert(branch.parameter, places, [s.parameter for s in branch.special])
@@ -169,7 +167,7 @@ def _arcs_of(branch: Branch) -> list[Arc]:
 
 
 def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
-    """What happens at the folds at which a stable motion ends, by parameter."""
+    """Return the jumps at the folds at which a stable motion ends, by parameter."""
     stable = [arc for arc in arcs(branches) if arc.stable]
     found: list[FoldJump] = []
     # a motion of twice the period begins at a doubling, where its branch turns back on itself: no motion ends there
@@ -198,7 +196,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
 
 
 def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tuple[Avoided, ...]:
-    """Where a machine resonates, may jump, doubles its period or has no stable motion, between two values of the parameter."""
+    """Return the ranges in which a machine resonates, may jump, doubles its period or has no stable motion."""
     least = _SLIVER * (high - low)
     stable = [arc for arc in arcs(branches) if arc.stable]
     without = _gaps(_union((arc.span for arc in stable if arc.turns == 1), least), low, high)
@@ -215,16 +213,16 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
 
 
 def _overlap(a: Arc, b: Arc) -> Interval:
-    """Where both arcs are; the end is not above the beginning where that is nowhere."""
+    """Return the range of both arcs; its end lies below its beginning if there is none."""
     return max(a.span[0], b.span[0]), min(a.span[1], b.span[1])
 
 
 def _resonances(arc: Arc) -> list[Interval]:
-    """The half-power bands of the peaks of an arc, and of where it is largest at its end and loses its stability."""
+    """Return the half-power bands of the peaks of an arc, and of an end at which it is largest and loses its stability."""
     a = arc.amplitude
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
     bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]
-    # at an end the amplitude must have fallen for it to be more than a place on a slope
+    # at an end the amplitude must have fallen, or it may be no more than a place on a slope
     for end, cut, way in ((0, arc.cut[0], 1), (len(a) - 1, arc.cut[1], -1)):
         if arc.turns == 1 and cut and a[end] == a.max() and a.min() < HALF_POWER * a[end]:
             bands.append(tuple(sorted((float(arc.parameter[end]), _band_end(arc, end, way)))))
@@ -232,7 +230,7 @@ def _resonances(arc: Arc) -> list[Interval]:
 
 
 def _band_end(arc: Arc, top: int, way: int) -> float:
-    """The half-power point of a peak to one side; infinite if the amplitude rises above the peak before."""
+    """Return the half-power point of a peak to one side; infinite if the amplitude rises above the peak before."""
     a, x = arc.amplitude, arc.parameter
     level, i = HALF_POWER * a[top], top
     while 0 <= i + way < len(a):
@@ -249,7 +247,7 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
 
 
 def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
-    """Intervals that overlap or are less apart than ``least`` become one."""
+    """Join intervals that overlap or are closer than ``least``."""
     joined: list[Interval] = []
     for low, high in sorted((low, high) for low, high in intervals if low < high):
         if joined and low <= joined[-1][1] + least:
@@ -260,20 +258,17 @@ def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
 
 
 def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
-    """What intervals leave free between two values."""
+    """Return the gaps between intervals in a range."""
     ends = [low, *(v for interval in intervals for v in interval), high]
     return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
 
 
 def _within(intervals: Iterable[Interval], low: float, high: float) -> list[Interval]:
-    """The parts of intervals between two values."""
+    """Return the parts of intervals in a range."""
     return [(max(a, low), min(b, high)) for a, b in intervals if max(a, low) < min(b, high)]
 
 
-#: How far a maximum of the amplitude stands out, relative to its height, to count as one.
-PROMINENCE = 1e-3
-
-#: Error of an amplitude that is read from samples, relative to it.
+#: Relative error of an amplitude from samples.
 _SAMPLED = 1e-6
 
 
@@ -284,7 +279,7 @@ class Extremum:
     Attributes
     ----------
     parameter : float
-        Speed (rad/s), or what else varies.
+        Speed (rad/s), or the other parameter that varies.
     amplitude : float
         m.
     stability : Stability
@@ -300,32 +295,31 @@ class Extremum:
 
 
 def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
-    """Local maxima (sign +1) or minima (-1) of the amplitude along a branch, each brought to rest.
+    """Find the local maxima (sign +1) or minima (-1) of the amplitude along a branch.
 
-    The place is that of `extremum_gradient`: where the derivative of the amplitude with respect to the parameter, which is
-    exact, is zero. What varies by a function, or has a kink there, is searched by Brent's method on the orbits at fixed
-    parameters: since the amplitude hardly changes there, the place is then good to 1e-4 of the parameter.
+    The place is that of `extremum_gradient`, where the exact derivative of the amplitude by the parameter is zero. If the
+    parameter is a function's, or the amplitude has a kink, Brent's method on the orbits finds it to 1e-4 of the parameter.
     """
     amplitude = sign * branch.amplitude
     found = []
     for i, prominence in peaks(amplitude):
-        if prominence < PROMINENCE * abs(amplitude[i]):
+        if prominence < _PROMINENCE * abs(amplitude[i]):
             continue
         a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
-        # at a fold the parameter turns back, and the greatest amplitude of the neighbours stands
+        # at a fold the parameter turns back: it is no extremum over the parameter
         if not a < branch.parameter[i] < c:
             continue
-        place, orbit = _at_rest(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
+        place, orbit = _locate_extremum(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
         found.append(
             Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability, orbit=orbit)
         )
     return tuple(found)
 
 
-def _at_rest(
+def _locate_extremum(
     family: Family, orbit: PeriodicOrbit, a: float, begin: float, c: float, sign: int
 ) -> tuple[float, PeriodicOrbit]:
-    """The extremum between a and c and the motion there, from a motion between them."""
+    """Find the extremum between a and c and the motion there, from a motion between them."""
     if isinstance(family.vary, str):
         try:
             rested = extremum_orbit(orbit, family.vary)
@@ -349,14 +343,14 @@ def _at_rest(
         )
         return float(best.x), near(float(best.x))
     except OrbitError:
-        # next to the limit of assembly a neighbour at a fixed parameter may not be found: the point itself stands
+        # near the limit of assembly a neighbour at a fixed parameter may not be found: keep the point itself
         return begin, orbit
 
 
 def special_gradient(
     family: Family, point: SpecialPoint | Extremum, names: Sequence[str] | None = None
 ) -> PointGradient:
-    """How a special point of a branch, or a maximum or minimum of its amplitude, moves with the other parameters.
+    """Compute how a special point of a branch, or an extremum of its amplitude, moves with the other parameters.
 
     Parameters
     ----------

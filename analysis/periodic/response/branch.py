@@ -1,9 +1,9 @@
 """Branches of periodic motions: how an orbit changes with a parameter, where it loses its stability, and what branches off.
 
-The parameter is the speed, the torque, a force, any parameter of the FMI contract, or whatever a function of one number
-says. A branch is followed by arclength, past its folds; between its points are located where a Floquet multiplier crosses the
-unit circle: at +1 (fold), at -1 (period doubling), or as a complex pair (torus). From a period doubling one switches to the
-motion of twice the period.
+The parameter is the speed, the torque, a force, any parameter of the FMI contract, or any number from which a function makes
+mechanism and drive. A branch is followed by arclength, past its folds. Between its points the special points are located, at
+which a Floquet multiplier crosses the unit circle: at +1 (fold), at -1 (period doubling), or as a complex pair (torus). From a
+period doubling one switches to the motion of twice the period.
 """
 
 from __future__ import annotations
@@ -19,32 +19,25 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ...display import Shown, format_count, format_range
 from ...files import write_csv
 from ...mechanisms import mechanism_of
-from ...notebook import Shown, format_count, format_range
 from ...numerics.continuation import ContinuationError, Curve, Follower, Point, Reason, Settings
-from ..motion.discretisation import OrbitError, growths, period_from, pieces_from
-from ..motion.drive import scale_of
+from ..motion.discretisation import AIM, GROWTH, PLACES, OrbitError, choose_pieces
 from ..motion.floquet import TOLERANCE, Crossing, Stability, crossing_test
 from ..motion.flow import label
-from ..motion.orbit import PeriodicOrbit, Turn, orbit_equations
+from ..motion.orbit import OrbitEquations, PeriodicOrbit, Turn
 from ..motion.variables import Family
 from ..stability.nonlinear import SpecialPoint
 
-#: First step along a branch, in scaled arc length, the greatest where the parameter hardly changes, and the angle between the
-#: tangents of two points (rad) up to which steps grow: where a curve is round, 150 points a turn are enough to draw it.
+#: First step along a branch in scaled arc length; greatest step while the parameter hardly changes; angle between the tangents
+#: of two points (rad) up to which steps grow: 150 points are enough to draw a full circle.
 _FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
-
 #: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
 _SWITCH = 2e-3
-
-#: A branch is left where the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or where its
-#: largest multiplier passes this.
+#: A branch ends when the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or when its largest
+#: multiplier passes this value.
 LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
-
-#: Growth over a period, or over one of its pieces, from which a period is followed in (more) pieces; growth aimed at for each,
-#: pieces at least and at most a turn, and places of a turn from which their ends are chosen.
-_GROWTH, _AIM, _FEWEST, _PLACES = 1e3, 10.0, 8, 64
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -60,9 +53,10 @@ class Branch(Shown):
     orbits : tuple of PeriodicOrbit
     special : tuple of SpecialPoint
     reached, closed : bool
-        Whether it ended at an end of the range, where it began, or at a branch of half its period; where it began.
+        Whether it ended as it should: at an end of the range, at its own beginning, or at a branch of half its period; and
+        whether at its own beginning.
     reason : str
-        Why it ended. Where the branch was lost, its last point is the last good one.
+        Why it ended. If the branch was lost, its last point is the last good one.
     """
 
     family: Family
@@ -73,7 +67,7 @@ class Branch(Shown):
     reached: bool
     closed: bool
     reason: str
-    # what `columns` has computed
+    # computed by `columns`
     _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
     def __repr__(self) -> str:
@@ -96,19 +90,19 @@ class Branch(Shown):
         return np.array([orbit.largest for orbit in self.orbits])
 
     def stability(self, tolerance: float = TOLERANCE) -> tuple[Stability, ...]:
-        """Verdict at each point."""
+        """Return the verdict at each point."""
         return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
 
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
-        """What varies along the branch, by name with unit, each of shape (m,).
+        """Return what varies along the branch, by name with unit, each of shape (m,).
 
-        The parameter, mean speed (under a torque), turns in a period, and of the first free coordinate, a five-bar's u,
-        amplitude, mean and first harmonics; largest multiplier, stability; of what the mechanism has, mean and greatest crank
-        torque, greatest forces in pins, guide and bearings, least transmission sine.
+        The parameter, mean speed, turns in a period; amplitude, mean and first harmonics of the first free coordinate, a
+        five-bar's u; largest multiplier, stability; and of the outputs that the mechanism has, mean and greatest crank torque,
+        greatest forces in pins, guide and bearings, least transmission sine.
         """
         if not self._table:
             turns = [orbit.turn() for orbit in self.orbits]
-            values = _of_a_turn(self.orbits[0], turns[0])
+            values = _turn_columns(self.orbits[0], turns[0])
             self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in values.items()})
         unit = f" [{self.family.unit}]" if self.family.unit else ""
         largest = self.largest_multiplier
@@ -122,7 +116,7 @@ class Branch(Shown):
         return first | self._table
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the branch as a table, a row a point; see `columns`."""
+        """Write the branch as a table, one row per point; see `columns`."""
         return write_csv(path, self.columns())
 
 
@@ -130,8 +124,8 @@ class Branch(Shown):
 FORCE = "greatest force in "
 
 
-def _of_a_turn(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
-    """Columns of a branch that come from the outputs over a period, of those outputs that the mechanism has."""
+def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
+    """Return the columns that come from the outputs over a period, each with the function that computes it."""
     mechanism = mechanism_of(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
     swing, what = first.swing, "{} [{}]".format(*orbit.swing)
@@ -195,7 +189,7 @@ def follow(
     watch : callable, optional
         Called with the parameter of every point.
     stop : callable, optional
-        Asked with the orbit of every point whether to leave it at that.
+        Called with the orbit of every point; the branch ends if it returns true.
 
     Returns
     -------
@@ -224,7 +218,7 @@ def switch(
     watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
-    """The branch of twice the period that leaves a branch at a period doubling.
+    """Switch to the branch of twice the period at a period doubling, and follow it.
 
     Parameters
     ----------
@@ -232,7 +226,7 @@ def switch(
         See `follow`.
     doubling : SpecialPoint
     largest : float
-        The branch is left where its largest multiplier passes this.
+        The branch ends when its largest multiplier passes this value.
 
     Raises
     ------
@@ -249,14 +243,14 @@ def switch(
     settings = _settings(low, high, greatest, most_points)
     doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
     follower = _follower(family, doubled, settings)
-    # the eigenvector of the multiplier -1 is the direction in which every second period differs
+    # every second period differs in the direction of the eigenvector of the multiplier -1
     scale = follower.scale[:-1]
     scaled = (orbit.monodromy + np.eye(len(scale))) * scale / scale[:, None]
     vector = np.linalg.svd(scaled)[2][-1] * scale
     base = follower.along(orbit.start, doubling.parameter, np.append(vector, 0.0))
     for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
         taken = follower.step(base, length)
-        # back on the undoubled branch the start repeats itself after half the period
+        # a step back to the undoubled branch does not count
         if taken is not None and abs(float((taken.y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length:
             return _branch(family, doubled.turns, follower, taken, watch, stop, largest)
     raise ContinuationError(
@@ -265,7 +259,7 @@ def switch(
 
 
 def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
-    """The whole branch through an orbit, to both sides of it: see `follow`."""
+    """Follow the whole branch through an orbit, to both sides: see `follow`."""
     up = follow(family, orbit, value, low=low, high=high, **how)
     if up.closed:
         return up
@@ -299,41 +293,29 @@ def _settings(low: float, high: float, greatest: float, most_points: int) -> Set
 def _follower(
     family: Family, orbit: PeriodicOrbit, settings: Settings, angles: NDArray[np.float64] | None = None
 ) -> Follower:
-    ends = [family.at(value) for value in (settings.low, settings.high)]
-    scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
-    if angles is not None:
-        # an arc has the length of the mean square over the pieces
-        scale = np.tile(scale * np.sqrt(len(angles) - 1), len(angles) - 1)
-    return Follower(orbit_equations(family, orbit.turns, settings.low, settings.high, angles), scale, settings)
+    equations = OrbitEquations(family, orbit.turns, settings.low, settings.high, angles)
+    return Follower(equations, equations.scale(orbit.start), settings)
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
-    """Growth of a deviation over a period, or over one of its pieces where it is followed in pieces."""
+    """Return the growth of a deviation over the period, or over one of its pieces if it has several."""
     return orbit.largest if orbit.stations is None else orbit.stations.growth
 
 
-def _in_pieces(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
-    """The same curve from its last point on, the period followed in pieces in each of which deviations grow alike."""
+def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
+    """Return a follower of the same curve by multiple shooting, and its first point, from the last point so far."""
     orbit: PeriodicOrbit = last.data
-    count = _PLACES * orbit.turns
-    places = orbit.flow.unknowns(orbit.turn(count).states, orbit.drive.vector(orbit.flow.mechanism))
-    angles = np.linspace(0.0, orbit.flow.period * orbit.turns, count + 1)
-    matrices = pieces_from(orbit.parameters, orbit.drive, angles, places)[1]
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
-    growth = np.log(growths(matrices, scale).clip(1.0))
-    # half of the pieces by growth, half by angle
-    pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(_AIM)), _FEWEST * orbit.turns, count))
-    share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
-    chosen = np.unique(np.searchsorted(share, np.linspace(0.0, share[-1], pieces + 1)).clip(0, count))
-    refined = _follower(family, orbit, settings, angles[chosen])
-    n, k = len(orbit.start), len(chosen) - 1
-    ahead = np.zeros(n * k + 1)
+    places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.turns).states, orbit.point.vector)
+    angles, starts = choose_pieces(orbit.point, places, orbit.turns)
+    divided = _follower(family, orbit, settings, angles)
+    n = len(orbit.start)
+    ahead = np.zeros(starts.size + 1)
     ahead[:n], ahead[-1] = last.tangent[:n], last.tangent[-1]
-    return refined, refined.resume(places[chosen[:-1]].ravel(), last.parameter, ahead)
+    return divided, divided.resume(starts.ravel(), last.parameter, ahead)
 
 
 def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
-    """Why a branch is not followed beyond a point; empty where it is."""
+    """Return why a branch is not followed beyond a point; empty if it is."""
     orbit = point.data
     if orbit.largest > largest:
         return f"its largest multiplier passes {largest:g}"
@@ -367,7 +349,7 @@ def _branch(
             if stop is not None and stop(point.data):
                 return "it was interrupted"
             reason = reason_to_leave(point, largest)
-            if not reason and _growth(point.data) > _GROWTH:
+            if not reason and _growth(point.data) > GROWTH:
                 refine = True
                 return "deviations grow too fast to be followed over a whole period"
             return reason
@@ -380,12 +362,12 @@ def _branch(
             curve = replace(curve, points=curve.points[:-1], steps=curve.steps[:-1])
         pieces.append((follower, curve))
         last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
-        lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > _AIM and last.data.stations is None
+        lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > AIM and last.data.stations is None
         if not (refine or lost) or left < 2 or (len(curve.points) == 1 and len(pieces) > 1):
             break
         settings = replace(settings, most_points=left)
         try:
-            follower, first = _in_pieces(family, last, settings)
+            follower, first = _divided(family, last, settings)
         except OrbitError:
             break
     special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]
@@ -404,22 +386,19 @@ def _branch(
 
 
 def _meets_half(before: Point, after: Point) -> bool:
-    """Whether a branch meets one of half the period between two points: there it turns back, and the halves change places."""
+    """Return whether a branch meets one of half the period between two points: it turns back there with halves exchanged."""
     turns = after.data.turns
     if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
         return False
     try:
-        halves = [
-            period_from(o.parameters, o.drive, o.start, turns // 2).shift / scale_of(o.parameters, o.drive, o.start)
-            for o in (before.data, after.data)
-        ]
+        halves = [o.point.period(o.start, turns // 2).shift / o.scale for o in (before.data, after.data)]
     except OrbitError:
         return False
     return bool(halves[0] @ halves[1] < 0.0)
 
 
 def _tests(point: Point) -> dict[Crossing, float]:
-    """What changes its sign along a branch where a multiplier crosses the unit circle."""
+    """Return functions of a point that change sign where a multiplier crosses the unit circle."""
     # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
     return {
         kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
@@ -430,7 +409,7 @@ def _tests(point: Point) -> dict[Crossing, float]:
 def _special_points(
     curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
 ) -> list[SpecialPoint]:
-    """The special points of a piece of a branch, numbered after the pieces before it."""
+    """Locate the special points of a piece of a branch, numbered after the pieces before it."""
     passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]
@@ -455,7 +434,7 @@ def _special_points(
 
 
 def describe(branches: Sequence[Branch]) -> str:
-    """One line on branches of a family: range, orbits, stability and greatest amplitude, and where."""
+    """Return one line on branches of a family: range, orbits, stability, greatest amplitude and its place."""
     family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
     span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
     words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
@@ -470,13 +449,12 @@ def describe(branches: Sequence[Branch]) -> str:
 
 #: Largest multiplier with which a motion is followed.
 GREATEST = 1e3
-
-#: Distance in scaled arc length at which a motion lies on a branch: the straight pieces are as near to it.
+#: Distance from the polygon of a branch, in scaled arc length, up to which a motion lies on it.
 _ON = 2e-3
 
 
 def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
-    """Least distance of a place, shape (n,), from the straight pieces between points, shape (m, n)."""
+    """Return the least distance of a place, shape (n,), from the polygon through points, shape (m, n)."""
     s = points - place
     pieces = np.diff(s, axis=0)
     squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
@@ -486,8 +464,8 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 
 
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
-    """Whether a branch passes a motion, given by its start."""
+    """Return whether a branch passes through a motion, given by its start."""
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
-    scale = np.append(np.max([scale_of(o.parameters, o.drive, o.start) for o in ends], axis=0), width)
+    scale = np.append(np.max([o.scale for o in ends], axis=0), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
     return distance(points / scale, np.append(motion, value) / scale) < _ON

@@ -1,8 +1,9 @@
-"""Where the slider resonates, how large, and which harmonics: the true periodic motion over the speed.
+"""Frequency response: where the mechanism resonates, how strongly, and with which harmonics.
 
-`frequency_response` follows the periodic motions of the full nonlinear plant over a range of speeds, past folds, from both
-ends of the range, and switches to the motions of twice the period, and from those again. `natural_frequency` is the classical
-estimate, from the mean effective mass.
+`frequency_response` follows the periodic motions of the full nonlinear mechanism over a range of speeds, past folds, from both
+ends of the range, and switches to the motions of twice the period, and from those again. `with_isolas` adds the motions that
+no branch leads to: isolas, closed curves over the parameter, and branches that both ends of the range miss.
+`natural_frequency` is the classical estimate, from the mean effective mass.
 """
 
 from __future__ import annotations
@@ -20,20 +21,20 @@ from linkwork.errors import InputError, Interrupted, ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
+from ...display import Shown, format_count
 from ...files import write_csv
 from ...mechanisms import Parameters, mechanism_of
-from ...notebook import Shown, format_count
 from ...numerics import symbolic
 from ...numerics.continuation import ContinuationError
 from ...numerics.workers import interruptible
 from ...run import at_rest, shown, takes_published
 from ...units import Amount, si
 from ..motion.discretisation import OrbitError
-from ..motion.drive import SAME, Drive, published_drive, scale_of
+from ..motion.drive import SAME, Drive, published_drive
 from ..motion.floquet import Crossing
 from ..motion.flow import crank_of
 from ..motion.orbit import PeriodicOrbit, orbit_of, require_turns
-from ..motion.search import orbits_of, passages
+from ..motion.search import orbits_of
 from ..motion.variables import Family, unit_of
 from ..stability.nonlinear import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
@@ -44,7 +45,7 @@ MASS_SAMPLES = 1024
 
 
 def first_freedom(mechanism: Mechanism) -> int:
-    """Number of the first freedom that is not the crank's; raises ParameterError if there is none."""
+    """Return the number of the first freedom that is not a crank's; raises ParameterError if there is none."""
     crank = crank_of(mechanism).freedom
     for number in range(len(mechanism.freedoms)):
         if number != crank:
@@ -58,7 +59,7 @@ def stiffness_name(mechanism: Mechanism) -> str:
 
 
 def _means(parameters: Parameters) -> tuple[float, float]:
-    """Effective mass (kg) and stiffness (N/m) of the first freedom at its zero, as means over a turn."""
+    """Return mean effective mass (kg) and stiffness (N/m) of the first freedom at its zero over a turn."""
     mechanism = mechanism_of(parameters)
     crank = crank_of(mechanism).freedom
     angles = np.linspace(0.0, mechanism.freedoms[crank].period, MASS_SAMPLES, endpoint=False)
@@ -74,7 +75,7 @@ def _means(parameters: Parameters) -> tuple[float, float]:
 
 @takes_published()
 def mean_effective_mass(parameters: Parameters) -> float:
-    """Mean over a turn of what moves with the first freedom beside the crank, at its zero (kg): a five-bar's m22 at u = 0.
+    """Return the mean effective mass of the first freedom beside the crank over a turn, at its zero (kg): a five-bar's m22.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def mean_effective_mass(parameters: Parameters) -> float:
 
 @takes_published()
 def natural_frequency(parameters: Parameters) -> float:
-    """Natural frequency of the first freedom beside the crank on its spring (rad/s), from the mean effective mass over a turn.
+    """Compute the natural frequency of the first freedom beside the crank on its spring (rad/s), from its mean effective mass.
 
     A spring's stiffness is that of the parameter of this name, such as ``slider.stiffness``; where the mechanism has none, it
     is the mean over a turn of the second derivative of the energy.
@@ -117,8 +118,8 @@ def natural_frequency(parameters: Parameters) -> float:
     return sqrt(stiffness / mass)
 
 
-#: A branch of four times the period and more is left where its largest multiplier passes this: it has doubled once more, or
-#: folded, and will not be met by a machine again before another motion has been.
+#: A branch of four times the period and more ends when its largest multiplier passes this value: it has doubled once more, or
+#: folded, and a machine will have left it for another motion.
 STRAYED = 4.0
 
 
@@ -129,12 +130,12 @@ class Response(Shown):
     Attributes
     ----------
     branches : tuple of Branch
-        The one from the low end first, then, where it is another, the one from the high end, then those of twice the
-        period, of four times and so on, then those that are connected with none of these; each says whether it is ``closed``.
+        First the one from the low end, then the one from the high end if it is another, then those of twice the period, of four
+        times and so on, then those connected with none of these.
     low, high : float
         The range asked for.
     problems : tuple of str
-        What could not be followed, a sentence each with the last good parameter; empty where everything was.
+        What could not be followed, a sentence each with the last good parameter; empty if all was followed.
     """
 
     branches: tuple[Branch, ...]
@@ -148,31 +149,31 @@ class Response(Shown):
 
     @property
     def family(self) -> Family:
-        """What varies."""
+        """The motions as the parameter varies."""
         return self.branches[0].family
 
     @property
     def speeds_to_avoid(self) -> tuple[Avoided, ...]:
-        """Ranges of the speed, or of what else varies, that a machine had better not stay in, each with its reason."""
+        """Ranges of the speed, or of the parameter that varies, that a machine should avoid, each with its reason."""
         return ranges_to_avoid(self.branches, self.low, self.high)
 
     @property
     def jumps(self) -> tuple[FoldJump, ...]:
-        """What happens at the folds at which a stable motion ends."""
+        """The jumps at folds at which a stable motion ends."""
         return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
-        """Local maxima of the amplitude on the branches of the simple period, by parameter."""
+        """Return the local maxima of the amplitude on the branches of the simple period, by parameter."""
         return self._extrema(1)
 
     def minima(self) -> tuple[Extremum, ...]:
-        """Local minima of the amplitude on the branches of the simple period, by parameter."""
+        """Return the local minima of the amplitude on the branches of the simple period, by parameter."""
         return self._extrema(-1)
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
         found = [e for branch in self.branches if branch.turns == 1 for e in extrema(branch, sign)]
         found.sort(key=lambda e: (e.parameter, e.amplitude))
-        # a curve that is followed from both ends and arrives at neither has its extrema on both branches
+        # a curve that was followed from both ends and reached neither has its extrema on both branches
         reach = 1e-5 * (self.high - self.low)
         return tuple(
             e
@@ -191,7 +192,7 @@ class Response(Shown):
 
 
 class ResponseInterrupted(Interrupted):
-    """Ctrl-C: the branches that had been followed are in ``response``."""
+    """A response was interrupted by Ctrl-C; ``response`` has the branches followed so far."""
 
     def __init__(self, response: Response) -> None:
         self.response = response
@@ -214,7 +215,7 @@ def frequency_response(
     greatest_step: float = 5e-3,
     progress: bool = False,
 ) -> Response:
-    """Follow the periodic motions of the full nonlinear plant over a range of speeds, or of another parameter.
+    """Follow the periodic motions of the full nonlinear mechanism over a range of speeds, or of another parameter.
 
     Parameters
     ----------
@@ -223,26 +224,25 @@ def frequency_response(
     low, high : float or str
         Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract; or text such as "420 rpm".
     drive : Drive, optional
-        What drives the plant; needed where another parameter than the speed varies. A published set is driven at its speed.
+        Needed if another parameter than the speed varies. A published set is driven at its speed.
     vary : str
-        ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or whatever
-        `Family` can vary.
+        ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or any
+        parameter that `Family` can vary.
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
     doublings : int
-        How often in a row the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for those
-        of four times as well, and so on. From the second on a branch is left where its multiplier passes `STRAYED`.
+        How often the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for those of four
+        times as well, and so on. From the second on a branch ends when its multiplier passes `STRAYED`.
     most_points : int
         Points of a branch at most.
     greatest_step : float
         Greatest step of the parameter, relative to the range. Narrow resonances need small ones.
     progress : bool
-        Show a progress bar.
 
     Returns
     -------
     Response
-        What could not be followed is in ``problems``: never a silent gap.
+        ``problems`` has what could not be followed: there are no silent gaps.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def frequency_response(
     InputError
         If the range is not one.
     ResponseInterrupted
-        On Ctrl-C, with the branches that there are.
+        On Ctrl-C, with the branches followed so far.
 
     Examples
     --------
@@ -286,7 +286,7 @@ def frequency_response(
 
 @dataclass(slots=True)
 class _Search:
-    """The branches of a response as they are followed, and what went wrong on the way."""
+    """The branches of a response as they are followed, with the problems on the way."""
 
     family: Family
     low: float
@@ -298,7 +298,7 @@ class _Search:
     failures: list[OrbitError] = field(default_factory=list)
 
     def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
-        """The branch from the low end, and that from the high end if it is another."""
+        """Follow the branch from the low end, and the one from the high end if it is another."""
         done = 0.0
 
         def watch(value: float) -> None:
@@ -337,12 +337,12 @@ class _Search:
                 break
 
     def follow_doublings(self, times: int) -> None:
-        """The branches of twice the period, so often in a row; one that ends at another doubling is not followed back."""
+        """Follow the branches of twice the period, so many times in a row, each from one of its ends only."""
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
             orbit, reach = special.orbit, 1e-3 * (self.high - self.low)
-            scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+            scale = orbit.scale
             return any(
                 turns == 2 * orbit.turns
                 and abs(value - special.parameter) < reach
@@ -377,23 +377,56 @@ class _Search:
                 if self.stop():
                     return
 
+    def seek(self, value: float, turns: int) -> None:
+        """Find the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
+        parameters, drive = self.family.at(value)
+        start = None
+        if not drive.speed_drive:
+            # under a torque only a known motion gives a guess of the speed
+            simple = [b for b in self.branches if b.turns == 1]
+            points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
+            start = min(points, key=lambda point: float(point[0]))[1].start
+        limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
+        for orbit in orbits_of(parameters, drive, turns=turns, start=start).orbits:
+            if self.stop() or orbit.largest > limit or self._knows(orbit, value):
+                continue
+            branch = follow_both(
+                self.family,
+                orbit,
+                value,
+                low=self.low,
+                high=self.high,
+                greatest=self.greatest,
+                stop=lambda orbit: self.stop() or (turns > 1 and orbit.largest > limit),
+            )
+            self.branches.append(branch)
+            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
+            if not (branch.reached or strayed):
+                self.problems.append(ending(branch))
+
+    def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
+        """Return whether a branch passes through a motion, begun with any of its turns."""
+        own = [branch for branch in self.branches if branch.turns == orbit.turns]
+        starts = orbit.passages()
+        return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)
+
     def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
         self.branches.append(branch)
         left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
         if not (branch.reached or left):
-            self.problems.append(ended(branch))
+            self.problems.append(ending(branch))
 
 
-def ended(branch: Branch) -> str:
-    """That a branch was not followed to its end, and why."""
+def ending(branch: Branch) -> str:
+    """Return a sentence on a branch that was not followed to its end."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
-    """Whether a branch goes through an orbit at one of its ends."""
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    """Return whether a branch has an orbit at one of its ends."""
+    scale = orbit.scale
     return any(
         abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
         and float(np.abs((branch.orbits[i].start - orbit.start) / scale).max()) < SAME
@@ -401,21 +434,21 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     )
 
 
-#: Largest multiplier with which a motion of several turns is followed.
+#: Largest multiplier up to which a motion of several turns is followed.
 GREATEST_OF_SEVERAL = 100.0
 
 
 def with_isolas(
     response: Response, *, places: int = 5, turns: int = 1, greatest_step: float = 5e-3, progress: bool = False
 ) -> Response:
-    """A response with the motions that are connected with none of its branches.
+    """Add to a response the motions that are connected with none of its branches.
 
     All motions are sought at some values of the parameter; one that lies on no branch begins another, which is followed to both
-    sides until it closes or ends. None is begun from a motion so unstable that deviations grow a thousandfold in a turn.
+    sides until it closes or ends. Motions with deviations that grow more than a thousandfold per turn are left out.
 
     Motions of several turns are stable in narrow ranges only, between a fold and a period doubling. Beyond the doubling they go
-    on, less and less stable, over a range some ten times as wide: what has to be met is that. None of these is followed where
-    deviations grow more than `GREATEST_OF_SEVERAL` times in a period.
+    on, less and less stable, over a range some ten times as wide, in which the search can meet them. They are followed as long
+    as deviations grow less than `GREATEST_OF_SEVERAL` times per period.
 
     Parameters
     ----------
@@ -423,7 +456,7 @@ def with_isolas(
     places : int
         Values of the parameter, evenly spaced inside the range, at which all motions are sought.
     turns : int
-        Motions of up to so many turns of the crank are sought.
+        Greatest number of turns in the period of the motions that are sought.
     greatest_step, progress
         See `frequency_response`.
 
@@ -432,7 +465,7 @@ def with_isolas(
     InputError
         If there are no places, or no turns.
     ResponseInterrupted
-        On Ctrl-C, with the branches that there are.
+        On Ctrl-C, with the branches followed so far.
 
     Examples
     --------
@@ -444,58 +477,18 @@ def with_isolas(
     if places < 1:
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
     require_turns(turns)
-    search = _Isolas(response, greatest_step)
+    branches, problems = list(response.branches), list(response.problems)
     with interruptible() as interrupted, shown(progress, float(places * turns), "seeking closed branches") as show:
         values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
+        search = _Search(
+            response.family, response.low, response.high, greatest_step, lambda: bool(interrupted), branches, problems
+        )
         for number, (value, period) in enumerate(product(values, range(1, turns + 1)), start=1):
-            search.seek(value, period, lambda: bool(interrupted))
+            search.seek(value, period)
             show(float(number))
             if interrupted:
                 break
-    result = replace(response, branches=tuple(search.branches), problems=tuple(search.problems))
+    result = replace(response, branches=tuple(branches), problems=tuple(problems))
     if interrupted:
         raise ResponseInterrupted(result)
     return result
-
-
-class _Isolas:
-    """The branches of a response, to which are added those that no other leads to."""
-
-    def __init__(self, response: Response, greatest: float) -> None:
-        self.response, self.greatest = response, greatest
-        self.branches, self.problems = list(response.branches), list(response.problems)
-
-    def seek(self, value: float, turns: int, stop: Callable[[], bool]) -> None:
-        """Seek the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
-        family = self.response.family
-        parameters, drive = family.at(value)
-        start = None
-        if not drive.speed_drive:
-            # under a torque there is no guess of the speed but that of a known motion
-            simple = [b for b in self.branches if b.turns == 1]
-            points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
-            start = min(points, key=lambda point: float(point[0]))[1].start
-        limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
-        for orbit in orbits_of(parameters, drive, turns=turns, start=start).orbits:
-            if stop() or orbit.largest > limit or self._knows(orbit, value):
-                continue
-            branch = follow_both(
-                family,
-                orbit,
-                value,
-                low=self.response.low,
-                high=self.response.high,
-                greatest=self.greatest,
-                stop=lambda orbit: stop() or (turns > 1 and orbit.largest > limit),
-            )
-            self.branches.append(branch)
-            strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
-            if not (branch.reached or strayed):
-                self.problems.append(ended(branch))
-
-    def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Whether a branch passes a motion, whichever of its turns that begins with."""
-        width = self.response.high - self.response.low
-        starts = passages(orbit)
-        own = [branch for branch in self.branches if branch.turns == orbit.turns]
-        return any(passes(branch, value, start, width) for branch in own for start in starts)

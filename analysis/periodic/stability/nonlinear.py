@@ -1,4 +1,11 @@
-"""What the nonlinear mechanism does where its linearisation does not decide: normal forms, and long runs."""
+"""Normal forms at a loss of stability, and long runs: the mechanism beyond its linearisation.
+
+On the centre manifold of a special point the map over a period is one of three normal forms (Y. A. Kuznetsov, Elements of
+Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
+supercritical period doubling or torus point a stable motion grows out of the old one; beyond a subcritical one the mechanism
+jumps. The second and third derivatives of the map are differences of it along eigenvectors. `confirm_form` and `confirm`
+compare normal form and verdict with long runs of the mechanism.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from math import exp, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -13,10 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-from ...mechanisms import Parameters, mechanism_of
+from ...mechanisms import Parameters
 from ...run import simulate, takes_published
-from ..motion.discretisation import OrbitError, period_from
-from ..motion.drive import Drive, scale_of
+from ..motion.discretisation import OperatingPoint, OrbitError, operating_point
+from ..motion.drive import Drive
 from ..motion.floquet import TOLERANCE, Crossing, Stability, StabilityVerdict
 from ..motion.orbit import PeriodicOrbit, orbit_of
 from ..motion.variables import Family
@@ -24,7 +32,7 @@ from ..motion.variables import Family
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SpecialPoint:
-    """Where a multiplier crosses the unit circle on a branch.
+    """A point of a branch at which a multiplier crosses the unit circle.
 
     Attributes
     ----------
@@ -42,25 +50,19 @@ class SpecialPoint:
     after: int
 
 
-#: Step of the differences, relative to the scale of y, the relative uncertainty down to which it is halved, and how often at
-#: most: the map over many turns bends within a thousandth of the scale, that next to the limit of assembly within a millionth.
+#: Step of the differences, relative to the scale of y, the relative uncertainty down to which it is halved, and halvings at
+#: most: the map over many turns bends within a thousandth of the scale, near the limit of assembly within a millionth.
 _STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
-
-#: Distance of the multiplier from where it crosses the unit circle up to which the point counts as located: next to the limit
-#: of assembly it crosses from -1 to 1 within the rounding of the parameter.
+#: Distance of the multiplier from its crossing of the unit circle up to which the point counts as located: next to the limit of
+#: assembly the multiplier crosses from -1 to 1 within the rounding of the parameter.
 _LOCATED = 1e-2
-
-#: Relative difference of the coefficients with the whole and the half step above which its sign is not settled.
+#: Relative uncertainty of a coefficient above which its sign is not settled.
 UNSETTLED = 0.5
-
 _UNSETTLED = "not settled"
-
-#: Distance of the multiplier from the unit circle at which a run confirms a normal form, at least and at most, the square of
-#: the distance from the old motion that it is chosen for, and turns.
+#: Run that confirms a normal form: distance of the multiplier from the unit circle, at least and at most; square of the
+#: distance from the old motion aimed at; turns.
 _BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
-
 FloatArray = NDArray[np.float64]
-
 Form = Callable[..., NDArray[np.complex128]]
 
 
@@ -72,13 +74,13 @@ class NormalForm:
     ----------
     kind : Crossing
     coefficient : float
-        In the scale of y: of a fold half the second derivative along the eigenvector, of a period doubling the cubic
-        coefficient, positive where it is supercritical, of a torus the first Lyapunov coefficient, negative where it is.
+        In the scale of y: of a fold half the second derivative along the eigenvector; of a period doubling the cubic
+        coefficient, positive if it is supercritical; of a torus the first Lyapunov coefficient, negative if it is so.
     uncertainty : float
-        Change of the coefficient when the step of the differences is halved; infinite where the point is not located.
+        Change of the coefficient when the step of the differences is halved; infinite if the point is not located.
     words : str
-        "supercritical", "subcritical", or "not settled", where the coefficient is not certain or the multiplier crosses the
-        circle too fast for the point to be located; of a fold on which side of it the two motions are.
+        "supercritical", "subcritical", or "not settled" if the coefficient is uncertain or the multiplier crosses the circle
+        too fast for the point to be located; of a fold, on which side of it the two motions exist.
     """
 
     kind: Crossing
@@ -87,10 +89,10 @@ class NormalForm:
     words: str
 
 
-class Forms:
+class Forms(NamedTuple):
     """The multilinear forms of a map about its fixed point at zero, by differences.
 
-    Parameters
+    Attributes
     ----------
     of : callable
         The map, (n,) to (n,).
@@ -98,21 +100,20 @@ class Forms:
         Its derivative at zero.
     """
 
-    def __init__(self, of: Callable[[FloatArray], FloatArray], matrix: FloatArray) -> None:
-        self.of = of
-        self.matrix = matrix
+    of: Callable[[FloatArray], FloatArray]
+    matrix: FloatArray
 
     def second(self, x: FloatArray, h: float) -> FloatArray:
-        """B(x, x)."""
+        """Return B(x, x)."""
         return (self.of(h * x) + self.of(-h * x) - 2.0 * self.of(0.0 * x)) / h**2
 
     def third(self, x: FloatArray, h: float) -> FloatArray:
-        """C(x, x, x)."""
+        """Return C(x, x, x)."""
         of = self.of
         return (of(2.0 * h * x) - 2.0 * of(h * x) + 2.0 * of(-h * x) - of(-2.0 * h * x)) / (2.0 * h**3)
 
     def complex(self, h: float) -> tuple[Form, Form]:
-        """B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real ones."""
+        """Return B(u, v) and C(u, v, w) of complex vectors, by polarisation of the real forms."""
 
         def b_real(u: FloatArray, v: FloatArray) -> FloatArray:
             return (self.second(u + v, h) - self.second(u - v, h)) / 4.0
@@ -125,21 +126,21 @@ class Forms:
                 + self.third(u - v - w, h)
             ) / 24.0
 
-        return _of_complex(b_real, 2), _of_complex(c_real, 3)
+        return _complex_form(b_real, 2), _complex_form(c_real, 3)
 
 
 def _forms(orbit: PeriodicOrbit) -> Forms:
-    """Those of the map over a period, in scaled components from the orbit."""
-    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    """Return the forms of the map over a period, in scaled components relative to the orbit."""
+    scale, point = orbit.scale, orbit.point
 
     def after(x: FloatArray) -> FloatArray:
-        return x + period_from(orbit.parameters, orbit.drive, orbit.start + scale * x, orbit.turns).shift / scale
+        return x + point.period(orbit.start + scale * x, orbit.turns).shift / scale
 
     return Forms(after, orbit.monodromy * scale / scale[:, None])
 
 
-def _of_complex(form: Callable[..., FloatArray], count: int) -> Form:
-    """A real multilinear form of complex vectors."""
+def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
+    """Extend a real multilinear form to complex vectors."""
 
     def of(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         total = np.zeros(len(vectors[0]), dtype=complex)
@@ -153,7 +154,7 @@ def _of_complex(form: Callable[..., FloatArray], count: int) -> Form:
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
-    """Right and left eigenvectors of the multiplier nearest to ``value``, the right of length 1, their product 1; it."""
+    """Return right and left eigenvectors of the multiplier nearest to ``value``, with product 1, and this multiplier."""
     values, right = np.linalg.eig(matrix.astype(complex))
     n = int(np.abs(values - value).argmin())
     adjoint, left = np.linalg.eig(matrix.T.astype(complex))
@@ -164,7 +165,7 @@ def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.comple
 
 
 def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
-    """The normal form at a special point of a branch.
+    """Compute the normal form at a special point of a branch.
 
     Raises
     ------
@@ -176,7 +177,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
     if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
         return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
-    coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
+    coefficient, uncertainty = _extrapolated(lambda h: form_coefficient(of, special.kind, multiplier, h))
     if not uncertainty < UNSETTLED * abs(coefficient):
         words = _UNSETTLED
     elif special.kind is Crossing.FOLD:
@@ -188,7 +189,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
 
 
 def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
-    """A coefficient at the step zero and its uncertainty, from that at a step and half of it: the most certain of them."""
+    """Extrapolate a coefficient to the step zero from halved steps; return the most certain value with its uncertainty."""
     found: list[tuple[float, float]] = []
     values: list[float] = []
     change = 0.0
@@ -211,8 +212,8 @@ def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
     return min(found, key=lambda pair: pair[1] / max(abs(pair[0]), 1e-300))
 
 
-def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
-    """Kuznetsov's (5.25), (5.27) and (5.28): see `NormalForm`.
+def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
+    """Compute the coefficient of a normal form by Kuznetsov's (5.25), (5.27) or (5.28): see `NormalForm`.
 
     Parameters
     ----------
@@ -248,13 +249,13 @@ def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> 
 
 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
-    """Derivative of the map with respect to the parameter along the left eigenvector of a fold."""
+    """Return the derivative of the map by the parameter along the left eigenvector of a fold."""
     _, p, _ = _eigenvectors(of.matrix, 1.0)
-    parameters, drive = family.at(special.parameter)
+    point, start = operating_point(*family.at(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
     direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
-    slope = period_from(parameters, drive, special.orbit.start, special.orbit.turns, direction).slope
-    return float(p.real @ (slope / scale_of(parameters, drive, special.orbit.start)))
+    slope = point.period(start, special.orbit.turns, direction).slope
+    return float(p.real @ (slope / point.scale(start)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,11 +265,11 @@ class FormRun:
     Attributes
     ----------
     parameter : float
-        Where it was run.
+        Its value in the run.
     distance : float
-        Greatest distance from the old motion, in the scale of y, over the last turns; infinite if the run ended before.
+        Greatest distance from the old motion over the last turns, in the scale of y; infinite if the run ended early.
     expected : float
-        The distance that the normal form gives for a supercritical point.
+        Distance by the normal form of a supercritical point.
     """
 
     parameter: float
@@ -276,7 +277,7 @@ class FormRun:
     expected: float
 
     def agrees(self, form: NormalForm) -> bool:
-        """Whether the run does what the normal form says: stays at the distance, to a factor of two, or leaves."""
+        """Return whether the run stays at the distance of the normal form, to a factor of two, or leaves if it should."""
         if form.words == "supercritical":
             return 0.5 * self.expected < self.distance < 2.0 * self.expected
         return form.words == "subcritical" and self.distance > 3.0 * self.expected
@@ -288,9 +289,9 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     Raises
     ------
     InputError
-        If the point is a fold, beyond which there is no old motion.
+        If the point is a fold: beyond it there is no old motion.
     LinkworkError
-        If the old motion does not become unstable to either side.
+        If the old motion becomes unstable on neither side.
     """
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold there is no old motion to deviate from")
@@ -310,14 +311,14 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
     value = special.parameter + sign * beyond / rate
     parameters, drive = family.at(value)
     old = orbit_of(parameters, drive, turns=special.orbit.turns, start=special.orbit.start, settle=False)
-    scale = scale_of(parameters, drive, old.start)
+    scale = old.scale
     expected = sqrt((old.largest - 1.0) / abs(form.coefficient))
     q = _eigenvectors(_forms(old).matrix, complex(old.multipliers[0]))[0].real
     y = old.start + 0.2 * expected * scale * q / np.linalg.norm(q)
     distances = []
     for _ in range(_TURNS):
         try:
-            y = y + period_from(parameters, drive, y, old.turns).shift
+            y = y + old.point.period(y, old.turns).shift
         except LinkworkError:
             return FormRun(parameter=value, distance=np.inf, expected=expected)
         distances.append(float(np.linalg.norm((y - old.start) / scale)))
@@ -330,7 +331,7 @@ def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> For
 
 
 class Outcome(Enum):
-    """What a deviation did in a long run."""
+    """The behaviour of a deviation in a long run."""
 
     DECAYS = "decays"
     BOUNDED = "stays bounded"
@@ -339,7 +340,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Confirmation:
-    """A verdict beside a long run of the nonlinear mechanism from close to its periodic orbit.
+    """A verdict and a long run of the nonlinear mechanism from near its periodic orbit.
 
     Attributes
     ----------
@@ -347,11 +348,10 @@ class Confirmation:
         By the multipliers of the orbit.
     outcome : Outcome
     growth : float
-        Factor a turn of the deviation along the leading multiplier's direction, by regression over the turns up to the first
-        at which it is lost in noise or greater than a hundredth of the crank.
+        Factor per turn of the deviation along the leading multiplier's direction, by regression over the turns before it is
+        lost in noise or exceeds a hundredth of the crank.
     deviations : ndarray, shape (n,)
-        Distance from the orbit at the crank angle 0 of each turn, relative to that at the start. It ends before the others
-        if the run does.
+        Distance from the orbit at crank angle 0 of each turn, relative to the first; as far as the run went.
     message : str
         Why the run ended early; empty if it did not.
     """
@@ -364,9 +364,9 @@ class Confirmation:
 
     @property
     def agrees(self) -> bool:
-        """Whether the run does what the verdict says; a marginal motion must neither decay nor grow.
+        """Whether the run does what the verdict says; the deviation of a marginal motion must neither decay nor grow.
 
-        A margin too small for the turns that were run is judged by the measured growth, which must be that of the multiplier.
+        If the margin is too small for the number of turns, the measured growth must be that of the multiplier.
         """
         expected = {
             Stability.STABLE: Outcome.DECAYS,
@@ -381,11 +381,9 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
-
 #: Turns of a run at least, and at most.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
-
-#: Growth or decay over a run, of the envelope, from which it counts.
+#: Growth or decay of the deviation over a run from which on it counts.
 NOTABLE = 3.0
 
 
@@ -406,11 +404,11 @@ def confirm(
     parameters : parameters of a mechanism
     drive : Drive
     turns : int, optional
-        At least 20. Without it 1000, and up to 20000 where the margin is too small to distinguish growth from decay.
+        At least 20. By default 1000, and up to 20000 if the margin is too small to distinguish growth from decay.
     start : array_like, shape (n,), optional
         Guess of the orbit.
     disturbance : float
-        Distance from the orbit at the start relative to the crank's length, in the direction that grows most.
+        Distance from the orbit at the start relative to the crank's length, in the direction of greatest growth.
     tolerance : float
         Of the verdict.
 
@@ -430,12 +428,12 @@ def confirm(
     orbit = orbit_of(parameters, drive, start=start)
     verdict = orbit.verdict(tolerance)
     if turns is None:
-        # as many as change the deviation by more than NOTABLE, where that can be had
+        # enough to change the deviation by more than NOTABLE, if possible
         turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
-    scale = scale_of(parameters, drive, orbit.start)
+    scale = orbit.scale
     direction, measure = _leading(orbit, scale)
     begin = orbit.start + disturbance * scale * direction
-    passed, message = _passages(parameters, drive, begin, turns)
+    passed, message = _passages(orbit.point, begin, turns)
     away = (passed - orbit.start) / scale
     size = np.linalg.norm(away, axis=1)
     outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
@@ -449,21 +447,18 @@ def confirm(
     return Confirmation(verdict=verdict, outcome=outcome, growth=growth, deviations=size / size[0], message=message)
 
 
-def _passages(
-    parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int
-) -> tuple[NDArray[np.float64], str]:
-    """y at crank angle 0 of each turn, and why the run ended early, if it did."""
-    if drive.speed is not None:
-        mechanism = mechanism_of(parameters)
-        flow = drive.flow(mechanism)
-        x, count = flow.state(start, drive.vector(mechanism)), len(mechanism.freedoms)
+def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[FloatArray, str]:
+    """Run the mechanism and return y at crank angle 0 of each turn, and why the run ended early."""
+    if point.drive.speed is not None:
+        mechanism, flow = point.mechanism, point.flow
+        x, count = flow.state(start, point.vector), len(mechanism.freedoms)
         initial: dict[str, float] = {}
         for number, freedom in enumerate(mechanism.freedoms):
             initial |= dict(zip(freedom.initial, (x[number], x[count + number])))
-        vector, turn = drive.vector(mechanism), flow.period / drive.speed
+        turn = flow.period / point.drive.speed
         run = simulate(
-            parameters,
-            drive.inputs(mechanism),
+            point.parameters,
+            point.drive.inputs(mechanism),
             initial=mechanism.initial(**initial),
             samples=turn * np.arange(turns + 1),
             stop_time=turn * turns,
@@ -471,21 +466,21 @@ def _passages(
         )
         names = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
         states = np.column_stack([run[name] for name in (*names[::2], *names[1::2])])
-        return flow.unknowns(states, vector), run.message
+        return flow.unknowns(states, point.vector), run.message
     passed = [start]
     for _ in range(turns):
         try:
-            passed.append(passed[-1] + period_from(parameters, drive, passed[-1], 1).shift)
+            passed.append(passed[-1] + point.period(passed[-1], 1).shift)
         except OrbitError as error:
             return np.array(passed), str(error)
     return np.array(passed), ""
 
 
 def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Direction that grows most, of unit length, and what its growth is measured with, both in scaled components.
+    """Return the direction of greatest growth, of unit length, and the vector that measures it, both scaled.
 
-    The product with the left eigenvector of the largest multiplier takes that factor each turn, of a complex pair too, where
-    the distance itself swings.
+    The vector is the left eigenvector of the largest multiplier: the product with it grows by the same factor each turn, though
+    of a complex pair the distance itself oscillates.
     """
     scaled = orbit.monodromy * scale / scale[:, None]
     values, left, right = scipy.linalg.eig(scaled, left=True)
@@ -495,7 +490,7 @@ def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[
 
 
 def _growth(size: NDArray[np.float64]) -> float:
-    """Factor a turn, by regression of the logarithms."""
+    """Return the factor per turn, by regression of the logarithms."""
     if len(size) < 2:
         raise LinkworkError("the deviation leaves the range of linear growth within a turn: take a smaller disturbance")
     return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

@@ -1,9 +1,9 @@
-"""How periodic motions, and the speeds at which they resonate or lose their stability, change with every parameter.
+"""Sensitivity of periodic motions, resonances and losses of stability to every parameter.
 
-By the implicit function theorem on the variational equations (`variations`): a motion moves so that it stays periodic, the
-place of a fold, a period doubling or a torus point so that the multiplier stays on the unit circle, that of a resonance so
-that the amplitude stays stationary. For the conditions see Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed.,
-Springer 2004, chapter 10. All derivatives are exact, up to the resolution of the collocation; none is a difference.
+By the implicit function theorem on the variational equations (`variations`): a motion stays periodic; at a fold, a period
+doubling or a torus point the multiplier stays on the unit circle; at a resonance the amplitude stays stationary. For the
+conditions see Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, chapter 10. All derivatives are
+exact, up to the resolution of the collocation; none is a difference.
 """
 
 from __future__ import annotations
@@ -19,24 +19,22 @@ from linkwork.errors import InputError, LinkworkError
 
 from ...files import unknown_name
 from ...mechanisms import mechanism_of
-from ..motion.discretisation import period_from
+from ..motion.discretisation import operating_point
 from ..motion.floquet import Crossing
-from ..motion.orbit import PeriodicOrbit, orbit_from, orbit_of
+from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
 from ..motion.variables import along_parameters, gradient_names, require_variable, stacked, value_of, with_values
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
-
-#: Newton's steps to a special point at most, the step that is the last, and how far it may be, relative to the parameter.
+#: Newton steps to a special point at most, relative size of the last step, and greatest relative distance of the point.
 _STEPS, _LAST, _FAR = 12, 1e-7, 0.25
-
-#: Product of unit eigenvectors below which a multiplier is a double one, and has no derivative.
+#: Product of unit left and right eigenvectors below which a multiplier is double and has no derivative.
 _DOUBLE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Gradient:
-    """A quantity with its derivatives with respect to parameters.
+    """A quantity with its derivatives by parameters.
 
     Attributes
     ----------
@@ -65,7 +63,7 @@ class Gradient:
 
     @property
     def elasticities(self) -> dict[str, float]:
-        """Percent by which the quantity changes for a percent of each parameter; 0 for a parameter that is 0.
+        """Change of the quantity in percent per percent of each parameter; 0 for a parameter that is 0.
 
         Raises
         ------
@@ -77,23 +75,23 @@ class Gradient:
         return dict(zip(self.names, (self.by * self.at / self.value).tolist()))
 
     def movers(self, count: int = 3) -> tuple[str, ...]:
-        """The parameters that move the quantity most, by their elasticities, the strongest first."""
+        """Return the parameters with the greatest elasticities, the greatest first."""
         shares = {name: abs(value) for name, value in self.elasticities.items() if value != 0.0}
         return tuple(sorted(shares, key=lambda name: -shares[name])[:count])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PointGradient:
-    """How a special point of a branch moves: a resonance, a fold, a period doubling or a torus point.
+    """The derivatives of a special point of a branch: a resonance, a fold, a period doubling or a torus point.
 
     Attributes
     ----------
     along : str
-        FMI name of the parameter of the branch, such as ``drive.speed``.
+        FMI name of the branch's parameter, such as ``drive.speed``.
     place : Gradient
-        Its value there, by the other parameters.
+        Its value at the point, by the other parameters.
     amplitude : Gradient
-        Of the motion there, which moves with the point.
+        Of the motion at the point.
     orbit : PeriodicOrbit
         The motion.
     """
@@ -105,7 +103,7 @@ class PointGradient:
 
 
 class MotionGradient:
-    """How a periodic motion changes with parameters; see `motion_gradient`. Each quantity is computed when it is asked for.
+    """Derivatives of a periodic motion by parameters; see `motion_gradient`. Each is computed when it is asked for.
 
     Attributes
     ----------
@@ -113,9 +111,9 @@ class MotionGradient:
     names : tuple of str
         FMI names of the m parameters.
     values : ndarray, shape (m,)
-        What they are.
+        Their values.
     along : ndarray, shape (c, m)
-        Derivatives of the numbers of the drive and, after them, of the constants of the equations.
+        Derivatives of the numbers of the drive, followed by the constants of the equations.
     """
 
     def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
@@ -138,7 +136,7 @@ class MotionGradient:
 
     @property
     def forcing(self) -> FloatArray:
-        """Derivatives of the rates with respect to the parameters, the motion held; shape (k, s, n, m)."""
+        """Derivatives of the rates by the parameters at fixed y; shape (k, s, n, m)."""
         return self.variations.forcing
 
     @cached_property
@@ -152,12 +150,12 @@ class MotionGradient:
 
     @property
     def start(self) -> FloatArray:
-        """Derivatives of y at the crank angle 0, shape (n, m)."""
+        """Derivatives of y at crank angle 0, shape (n, m)."""
         return self._solution[1]
 
     @cached_property
     def period(self) -> Gradient:
-        """Of the period (s)."""
+        """Gradient of the period (s)."""
         v, flow = self.variations, self.orbit.flow
         if flow.command is not None:
             speed, by = np.full(v.angles.shape, float(self.orbit.drive.speed or 0.0)), self.along[flow.command]
@@ -167,13 +165,13 @@ class MotionGradient:
 
     @property
     def speed(self) -> Gradient:
-        """Of the mean speed of the crank (rad/s), which is part of the motion under a torque."""
+        """Gradient of the crank's mean speed (rad/s), which is part of the motion under a torque."""
         way = self.orbit.flow.period * self.orbit.turns
         return self._gradient(way / self.period.value, -way / self.period.value**2 * self.period.by)
 
     @cached_property
     def _swing(self) -> tuple[tuple[float, float, Place], ...]:
-        """Sign, value and place of the greatest and the least of the first component of y."""
+        """Sign, value and place of the greatest and of the least value of the first component of y."""
         found = []
         for sign in (1.0, -1.0):
             value, place = self.variations.greatest(sign * self.variations.y[..., 0])
@@ -182,22 +180,26 @@ class MotionGradient:
 
     @cached_property
     def amplitude(self) -> Gradient:
-        """Of half the range of the first free coordinate over the period, as `PeriodicOrbit.amplitude`."""
+        """Gradient of half the range of the first free coordinate, as `PeriodicOrbit.amplitude`."""
         return self.amplitude_along(self._solution[0])
 
     def amplitude_along(self, solution: FloatArray) -> Gradient:
-        """The same, the derivatives of the motion given, shape (k, s, n, m)."""
-        # where a value is greatest its place does not count
+        """Return the gradient of the amplitude for given derivatives of the motion, shape (k, s, n, m)."""
+        # the place of an extremum does not count to first order
         by = [0.5 * sign * place.weights @ solution[place.panel, :, 0, :] for sign, _, place in self._swing]
         return self._gradient(0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
 
     def amplitude_curvature(self, along: str) -> Gradient:
-        """Of the derivative of the amplitude with respect to one of the parameters."""
+        """Return the gradient of the amplitude's derivative by one of the parameters."""
         v, solution = self.variations, self._solution[0]
         number = self.names.index(along)
         by_y, by_constant = v.second(solution[..., number], self.along[:, number])
         twice = along_parameters(self.orbit.parameters, self.names, along).p_along
-        forcing = by_y @ solution + by_constant @ self.along + v.by_constant @ stacked(self.orbit.drive, self.orbit.flow, (), twice)
+        forcing = (
+            by_y @ solution
+            + by_constant @ self.along
+            + v.by_constant @ stacked(self.orbit.drive, self.orbit.flow, (), twice)
+        )
         second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
@@ -210,15 +212,15 @@ class MotionGradient:
     # Outputs
 
     def greatest(self, name: str) -> Gradient:
-        """Of the greatest value of an output over the period, by its FMI name."""
+        """Return the gradient of the greatest value of an output over the period, by its FMI name."""
         return self._extreme(self._numbers(name, False), 1.0)
 
     def least(self, name: str) -> Gradient:
-        """Of the least value of an output."""
+        """Return the gradient of the least value of an output."""
         return self._extreme(self._numbers(name, False), -1.0)
 
     def peak(self, name: str) -> Gradient:
-        """Of the greatest modulus of an output, or of the force in a joint, such as ``drive.applied_torque`` or ``pin.A``."""
+        """Return the gradient of the greatest modulus of an output or a joint's force: ``drive.applied_torque``, ``pin.A``."""
         return self._extreme(self._numbers(name, True), 0.0)
 
     def _numbers(self, name: str, joints: bool) -> list[int]:
@@ -235,14 +237,14 @@ class MotionGradient:
         return self.variations.outputs()
 
     def _extreme(self, numbers: list[int], sign: float) -> Gradient:
-        """Of the greatest (sign 1) or least (-1) of an output, or of the greatest modulus (0) of one or several together."""
+        """Return the gradient of the greatest (sign 1) or least (-1) value of an output, or of the greatest modulus (0)."""
         values = self._outputs[..., numbers]
         value, place = self.variations.greatest(sign * values[..., 0] if sign else values)
         by = np.zeros(len(self.names))
         for column, number in enumerate(numbers):
             by_y, by_constant = self.variations.output_derivatives(place.panel, number)
             change = np.einsum("sn,snm->sm", by_y, self._solution[0][place.panel]) + by_constant @ self.along
-            # where a value is greatest its place does not count
+            # the place of an extremum does not count to first order
             share = sign or place.weights @ values[place.panel, :, column] / value
             by += share * (place.weights @ change)
         return self._gradient(value, by) if sign == 0.0 else self._gradient(sign * value, sign * by)
@@ -279,7 +281,7 @@ class MotionGradient:
         return np.asarray(found[order])
 
     def test(self, kind: Crossing) -> Gradient:
-        """Of a function that is zero where a multiplier crosses the unit circle in this way: see `crossing_test`.
+        """Return the gradient of a function that is zero where a multiplier crosses the unit circle: see `crossing_test`.
 
         It is smooth where two multipliers meet too, as their moduli are not.
         """
@@ -294,13 +296,13 @@ class MotionGradient:
 
     @property
     def largest(self) -> Gradient:
-        """Of the modulus of the largest multiplier."""
+        """Gradient of the modulus of the largest multiplier."""
         value = self.orbit.multipliers[0]
         return self._gradient(abs(value), np.real(np.conj(value) * self.multipliers[0]) / abs(value))
 
 
 def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
-    """How a periodic motion changes with parameters.
+    """Compute how a periodic motion changes with parameters.
 
     Parameters
     ----------
@@ -330,17 +332,17 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
 
 
 def extremum_orbit(orbit: PeriodicOrbit, along: str) -> PeriodicOrbit:
-    """The motion at an extremum of the amplitude over a parameter, from one near to it; see `extremum_gradient`."""
-    return _located(orbit, along, _to_extremum, "extremum of the amplitude")
+    """Return the motion at an extremum of the amplitude over a parameter, from a motion near it; see `extremum_gradient`."""
+    return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude")
 
 
 def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None) -> PointGradient:
-    """How a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
+    """Compute how a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
 
     Parameters
     ----------
     orbit : PeriodicOrbit
-        A motion near to it: Newton's method leads from it to where the derivative of the amplitude is zero.
+        A motion near the extremum, from which Newton's method begins.
     along : str
         FMI name of the parameter, such as ``drive.speed``.
     names : sequence of str, optional
@@ -366,25 +368,27 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
 def crossing_gradient(
     orbit: PeriodicOrbit, kind: Crossing, along: str, names: Sequence[str] | None = None
 ) -> PointGradient:
-    """How a fold, a period doubling or a torus point, a point of a boundary of a chart, moves along one parameter with others.
+    """Compute how a fold, a period doubling or a torus point moves along one parameter as others change.
 
     Parameters
     ----------
     orbit : PeriodicOrbit
-        A motion near to it: Newton's method leads from it to where a multiplier is on the unit circle.
+        A motion near the point, from which Newton's method begins.
     kind : Crossing
     along : str
-        FMI name of the parameter along which it moves.
+        FMI name of that parameter.
     names : sequence of str, optional
 
     Raises
     ------
     LinkworkError
         If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
-        two folds meet, or a branch is crossed.
+        two folds meet, or two branches cross.
     """
     others = _others(orbit, along, names)
-    orbit = _located(orbit, along, _to_fold if kind is Crossing.FOLD else partial(_to_crossing, kind=kind), kind.value)
+    orbit = _locate_motion(
+        orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
+    )
     motion = MotionGradient(orbit, (*others, along))
     test = _test(motion, kind)
     if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
@@ -402,7 +406,7 @@ def crossing_gradient(
 
 
 def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
-    """Normal of the boundary on which a multiplier stays on the unit circle, in the space of parameters, at one of its points.
+    """Compute the normal of the stability boundary in the space of parameters, at one of its points.
 
     Parameters
     ----------
@@ -410,7 +414,7 @@ def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]
         The motion with a multiplier on the unit circle, as a `CrossingCurve` has them.
     kind : Crossing
     names : sequence of str
-        The parameters, such as both of a chart's axes.
+        The parameters, such as both axes of a chart.
 
     Returns
     -------
@@ -428,12 +432,12 @@ def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tu
     return tuple(name for name in names if name != along)
 
 
-#: One of Newton's steps from a motion to a special point along a parameter: of the start and of the parameter.
+#: A Newton step from a motion towards a special point along a parameter: changes of the start and of the parameter.
 _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 
 
-def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
-    """The motion at the special point near a motion, by Newton's method.
+def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
+    """Find the special point near a motion by Newton's method and return the motion there.
 
     Raises LinkworkError if Newton's method goes elsewhere.
     """
@@ -450,10 +454,8 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
             break
         parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
         start = orbit.start + change
-        if step_of is _to_fold:
-            orbit = orbit_from(
-                parameters, drive, start, orbit.turns, period_from(parameters, drive, start, orbit.turns)
-            )
+        if step_of is _fold_step:
+            orbit, _ = trial_orbit(operating_point(parameters, drive), start, orbit.turns)
         else:
             orbit = orbit_of(parameters, drive, turns=orbit.turns, start=start, settle=False)
         if abs(step) <= _LAST * abs(value):
@@ -461,23 +463,23 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
     raise LinkworkError(f"no {what} along {along} was found near {begun:.9g}")
 
 
-def _to_extremum(motion: MotionGradient) -> tuple[FloatArray, float]:
+def _extremum_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     (along,) = motion.names
     size, slope, curvature = motion.amplitude.value, motion.amplitude[along], motion.amplitude_curvature(along)[along]
-    # on the flanks of a resonance 1 / amplitude^2 is nearly a parabola, about a minimum amplitude^2 is
+    # near a resonance 1 / amplitude^2 is nearly a parabola, near a minimum amplitude^2 is
     peaked = 3.0 * slope**2 - size * curvature
     step = slope * size / (peaked if peaked > 0.0 else -(slope**2) - size * curvature)
     return motion.start[:, 0] * step, step
 
 
-def _to_crossing(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, float]:
+def _crossing_step(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, float]:
     test = motion.test(kind)
     step = -test.value / float(test.by[0])
     return motion.start[:, 0] * step, step
 
 
-def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
-    """To where the map over a period has a fixed point and the least singular value of its derivative less one is zero."""
+def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
+    """Step to the fold: the map over a period has a fixed point, and the matrix M - I the singular value zero."""
     v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
     left, right = _null_vectors(v)
     by_y, by_constant = v.second(v.fundamental @ right)
@@ -490,14 +492,14 @@ def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
             left @ v.after(by_y @ columns + by_constant @ along),
         ]
     )
-    shift = period_from(orbit.parameters, orbit.drive, orbit.start, orbit.turns).shift
+    shift = orbit.point.period(orbit.start, orbit.turns).shift
     test = left @ (v.monodromy - np.eye(n)) @ right
     step = np.linalg.solve(matrix, -np.append(shift, test))
     return step[:n], float(step[n])
 
 
 def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
-    """Derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
+    """Return the derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
         return left @ motion.variations.after(motion.forcing)
@@ -505,7 +507,7 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
 
 
 def _singular(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
-    """A matrix that is singular at a crossing, and its derivatives, from the monodromy matrix and its: (n, n), (n, n, m)."""
+    """Return a matrix, (n, n), that is singular at a crossing, and its derivatives, (n, n, m), from the monodromy matrix."""
     if kind is not Crossing.TORUS:
         sign = 1.0 if kind is Crossing.FOLD else -1.0
         return np.eye(len(matrix)) - sign * matrix, -sign * by
@@ -520,16 +522,16 @@ def _singular(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[Float
 
 
 def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
-    """Left and right eigenvectors of the monodromy matrix for the multiplier +1."""
+    """Return left and right eigenvectors of the monodromy matrix for the multiplier +1."""
     left, _, right = np.linalg.svd(v.monodromy * v.scale / v.scale[:, None] - np.eye(len(v.scale)))
     return left[:, -1] / v.scale, right[-1] * v.scale
 
 
 def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
-    """Derivatives of the motion at a fold that moves with the parameters by ``shift`` along the last; shape (k, s, n, m).
+    """Return the derivatives of the motion at a fold that moves by ``shift`` along the last parameter; shape (k, s, n, m).
 
-    The equations of the first order leave a multiple of the eigenvector open, which those of the second settle: the multiplier
-    stays +1. The last column is zero.
+    The equations of first order leave a multiple of the eigenvector open; those of second order settle it: the multiplier stays
+    +1. The last column is zero.
     """
     v, n, m = motion.variations, len(motion.variations.scale), len(shift)
     left, right = _null_vectors(v)

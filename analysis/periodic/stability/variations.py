@@ -1,11 +1,12 @@
-"""The variational equations of a periodic motion, with parameters and to second order, by Gauss's collocation.
+"""The variational equations of a periodic motion, with parameters and to second order, by Gauss collocation.
 
-The turn is divided into panels in each of which the motion is a polynomial as far as the numbers can tell. On a panel the
-linear equations d' = A d + r are solved at Gauss's points for any number of right-hand sides at once, by the implicit Runge-
-Kutta method of those points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section
-II.7); the panels are joined by the condition that the motion is periodic, so that a motion is no harder for being unstable.
-The derivatives A of the rates, those with respect to what is constant, and the second derivatives along a direction are
-traced from the equations.
+The turn is divided into panels on which the motion is a polynomial to within rounding. On a panel the linear equations
+d' = A d + r are solved at Gauss's points for any number of right-hand sides at once, by the implicit Runge-Kutta method of
+those points (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.7). The panels are
+joined by the condition that the motion is periodic, which works as well for unstable motions. The motion itself is that of the
+orbit, sampled: in contrast to `motion.collocation`, which solves for the motion, these equations take any forcing r, friction
+and torques. The derivatives A of the rates, those by constants, and the second derivatives along a direction are traced from
+the equations.
 """
 
 from __future__ import annotations
@@ -20,45 +21,33 @@ from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ...mechanisms import mechanism_of
 from ...numerics import symbolic
 from ...numerics.codegen import MAKING, MachineCode
 from ...numerics.gauss import gauss
 from ...run import expressions
 from ...run.compiled import rows
-from ..motion import kernels
-from ..motion.discretisation import failure, section_of
-from ..motion.drive import scale_of
 from ..motion.flow import PLAIN, STATE, Flow
-from ..motion.kernels import Status
 from ..motion.orbit import PeriodicOrbit
 
 FloatArray = NDArray[np.float64]
-
-#: Gauss's points of a panel; panels of a turn to begin with; how often a panel is halved at most.
+#: Gauss points of a panel; panels of a turn to begin with; halvings of a panel at most.
 _POINTS, _PANELS, _HALVINGS = 8, 32, 16
-
 #: Size of the last coefficients over a panel above which it is halved: of the rates and their derivatives, in the scale of y,
 #: and of the effect of a parameter, relative to its greatest.
 _RESOLVED, _EFFECT = 1e-10, 1e-8
-
-#: Imaginary part below which a root is a real one.
+#: Imaginary part below which a root counts as real.
 _REAL = 1e-9
-
-#: Difference of the monodromy matrix from that of the orbit, relative to its greatest entry, above which something is wrong.
+#: Difference of the monodromy matrix from the orbit's, relative to its greatest entry, that is an error.
 _AGREES = 1e-6
-
-#: Least singular value, relative to the norm, up to which a matrix has none but of rounding.
+#: Least singular value, relative to the norm, up to which a matrix is singular to within rounding.
 _ROUNDING = 1e-15
-
 _GAUSS = gauss(_POINTS)
-
 #: Legendre's polynomials on a grid of a panel with both ends.
 _GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
 
 
 class Place(NamedTuple):
-    """A place of the turn: its panel, where in that on -1 to 1, and the weights of the panel's nodes in what is there."""
+    """A place of the turn: its panel, the position on it from -1 to 1, and the weights of the panel's nodes in its value."""
 
     panel: int
     position: float
@@ -72,10 +61,9 @@ class Variations:
     ----------
     orbit : PeriodicOrbit
     switched : bool
-        Whether the mechanism's switch is taken as on: as it is, or because a derivative with respect to it is wanted.
+        Whether the mechanism's switch counts as on, because it is or because a derivative by it is wanted.
     along : ndarray, shape (c, m)
-        Derivatives of the numbers of the drive and, after them, of the constants with respect to parameters: what is to be
-        resolved beside the motion.
+        Derivatives of the numbers of the drive, followed by the constants, by parameters, which the panels must resolve too.
 
     Attributes
     ----------
@@ -96,9 +84,7 @@ class Variations:
 
     def __init__(self, orbit: PeriodicOrbit, switched: bool, along: FloatArray) -> None:
         self.orbit, self.switched, self.flow = orbit, switched, orbit.flow
-        mechanism = mechanism_of(orbit.parameters)
-        self._drive, self._p = orbit.drive.vector(mechanism), np.array(orbit.parameters.constants())
-        self.scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        self._drive, self._p, self.scale = orbit.point.vector, orbit.point.constants, orbit.scale
         self._divide(along)
         self._solve_panels()
         wrong = float(np.abs(self.monodromy - orbit.monodromy).max() / max(1.0, np.abs(orbit.monodromy).max()))
@@ -108,7 +94,7 @@ class Variations:
             )
 
     def _divide(self, along: FloatArray) -> None:
-        """Choose the panels."""
+        """Choose panels on which motion, derivatives and forcing are resolved."""
         flow = self.flow
         edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.turns + 1)
         if self.orbit.stations is not None:
@@ -136,21 +122,19 @@ class Variations:
             edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
 
     def _sampled(self) -> FloatArray:
-        """The motion at the nodes, shape (k, s, n)."""
-        orbit, flow = self.orbit, self.flow
-        stations, starts = np.zeros(1), orbit.start[None, :].copy()
-        if orbit.stations is not None:
-            stations, starts = orbit.stations.angles[:-1].copy(), orbit.stations.starts
-        found = np.empty((self.angles.size, flow.mechanism.size + flow.inputs))
-        section = section_of(orbit.parameters, orbit.drive, orbit.start, PLAIN, STATE)
-        status = kernels.sample(section, stations, starts, self.angles.ravel(), found)
-        if status != Status.DONE:
-            raise failure(status, flow, orbit.start)
-        return flow.unknowns(found, self._drive).reshape(*self.angles.shape, flow.size)
+        """Return the motion at the nodes, shape (k, s, n)."""
+        found = self.orbit.sample(self.angles.ravel())
+        return self.flow.unknowns(found, self._drive).reshape(*self.angles.shape, self.flow.size)
 
-    def _call(self, name: str, rows_of_arguments: FloatArray, along: FloatArray, size: int) -> FloatArray:
-        """A function of `_code` at the nodes: its values, shape (k s, size)."""
-        count, d = len(rows_of_arguments), self.flow.drive_size
+    def _call(
+        self, name: str, size: int, direction: FloatArray | None = None, along: FloatArray | None = None
+    ) -> FloatArray:
+        """Evaluate a function of `_code` at the nodes, along a direction of y and of the constants; shape (k, s, size)."""
+        direction = np.zeros_like(self.y) if direction is None else direction
+        along = np.zeros(self.constants) if along is None else along
+        arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1)
+        rows_of_arguments = arguments.reshape(self.angles.size, -1)
+        count, d = self.angles.size, self.flow.drive_size
         drive = np.concatenate([self._drive, along[:d]])
         values = np.empty((count, size))
         rows(
@@ -161,22 +145,21 @@ class Variations:
             np.tile(drive, (count, 1)),
             values,
         )
-        return values
+        return values.reshape(*self.angles.shape, size)
 
     @property
     def constants(self) -> int:
-        """How many numbers of the drive and constants there are."""
+        """Number of numbers of the drive and of constants."""
         return self.flow.drive_size + len(self._p)
 
     def _first(self) -> tuple[FloatArray, FloatArray]:
-        n, shape = self.flow.size, self.angles.shape
-        arguments = np.concatenate([self.y, np.zeros_like(self.y), self.angles[..., None]], axis=-1)
-        width = n + self.constants
-        found = self._call("first", arguments.reshape(-1, 2 * n + 1), np.zeros(self.constants), n * (1 + width))
-        return found[:, :n].reshape(*shape, n), found[:, n:].reshape(*shape, width, n).swapaxes(-1, -2)
+        """Return the rates at the nodes and their first derivatives."""
+        n, width = self.flow.size, self.flow.size + self.constants
+        found = self._call("first", n * (1 + width))
+        return found[..., :n], found[..., n:].reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
 
     def second(self, direction: FloatArray, along: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of ``by_y`` and of ``by_constant`` along a direction.
+        """Return the derivatives of ``by_y`` and of ``by_constant`` along a direction.
 
         Parameters
         ----------
@@ -185,17 +168,15 @@ class Variations:
         along : ndarray, shape (c,), optional
             Of the numbers of the drive and the constants.
         """
-        n, shape = self.flow.size, self.angles.shape
-        arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1).reshape(-1, 2 * n + 1)
-        width = n + self.constants
-        along = np.zeros(self.constants) if along is None else along
-        found = self._call("second", arguments, along, n * width).reshape(*shape, width, n).swapaxes(-1, -2)
+        n, width = self.flow.size, self.flow.size + self.constants
+        found = self._call("second", n * width, direction, along)
+        found = found.reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
         return found[..., :n], found[..., n:]
 
     # Linear equations
 
     def _solve_panels(self) -> None:
-        """Solve d' = A d + r on each panel, for what d is at its beginning and for r."""
+        """Solve d' = A d + r on each panel for d at its beginning and for r."""
         n, k = self.flow.size, len(self.h)
         size = _POINTS * n
         integrals = self.h[:, None, None] * _GAUSS.integrals
@@ -231,7 +212,7 @@ class Variations:
         return np.asarray(found.reshape(k, _POINTS, n, -1))
 
     def after(self, forcing: FloatArray) -> FloatArray:
-        """d after the period, shape (n, m), for d' = A d + r from d = 0; r has the shape (k, s, n, m)."""
+        """Return d after the period, shape (n, m), for d' = A d + r from d = 0; r has the shape (k, s, n, m)."""
         gains = self._gains(forcing)
         d = np.zeros_like(gains[0])
         for step, gain in zip(self.steps, gains):
@@ -239,7 +220,7 @@ class Variations:
         return np.asarray(d)
 
     def from_start(self, start: FloatArray, forcing: FloatArray) -> FloatArray:
-        """d at the nodes, shape (k, s, n, m), for d' = A d + r from d = ``start``, (n, m)."""
+        """Return d at the nodes, shape (k, s, n, m), for d' = A d + r from d = ``start``, (n, m)."""
         gains = self._gains(forcing)
         starts = np.empty((len(self.h), *start.shape))
         d = start
@@ -249,30 +230,30 @@ class Variations:
         return self._at_nodes(starts, forcing)
 
     def periodic(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The periodic solution of d' = A d + r: at the nodes, shape (k, s, n, m), and at the crank angle 0, (n, m).
+        """Return the periodic solution of d' = A d + r: at the nodes, (k, s, n, m), and at crank angle 0, (n, m).
 
         Raises
         ------
         LinkworkError
             If there is none, exactly at a fold.
         """
-        starts = _round(self.steps, self._gains(forcing))
+        starts = _solve_cyclic(self.steps, self._gains(forcing))
         return self._at_nodes(starts, forcing), starts[0]
 
-    # What is read off
+    # Results
 
     def integral(self, values: FloatArray) -> FloatArray:
-        """Integral over the period of what has the shape (k, s, ...)."""
+        """Integrate values at the nodes, shape (k, s, ...), over the period."""
         found: FloatArray = np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
         return found
 
     def slope(self, panel: int, values: FloatArray, position: float) -> float:
-        """Derivative by the angle of values at the nodes of a panel, shape (s,)."""
+        """Return the derivative by the angle of values at the nodes of a panel, shape (s,)."""
         series = legendre.legder(_GAUSS.coefficients @ values)
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
     def greatest(self, values: FloatArray) -> tuple[float, Place]:
-        """The greatest value over the period of what has the values (k, s) at the nodes, and its place.
+        """Return the greatest value over the period of values (k, s) at the nodes, and its place.
 
         Of vectors, shape (k, s, c), the greatest modulus.
         """
@@ -296,14 +277,11 @@ class Variations:
         return sqrt(value) if vectors else value, Place(panel, position, weights)
 
     def outputs(self) -> FloatArray:
-        """All outputs at the nodes, shape (k, s, outputs)."""
-        n, count = self.flow.size, len(self.flow.mechanism.output_names)
-        arguments = np.concatenate([self.y, np.zeros_like(self.y), self.angles[..., None]], axis=-1)
-        found = self._call("outputs", arguments.reshape(-1, 2 * n + 1), np.zeros(self.constants), count)
-        return found.reshape(*self.angles.shape, count)
+        """Return all outputs at the nodes, shape (k, s, outputs)."""
+        return self._call("outputs", len(self.flow.mechanism.output_names))
 
     def output_derivatives(self, panel: int, number: int) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of an output at the nodes of a panel with respect to y, (s, n), and to what is constant, (s, c)."""
+        """Return the derivatives of an output at the nodes of a panel by y, (s, n), and by constants, (s, c)."""
         n = self.flow.size
         function = _output_derivatives(self.flow, self.switched, number)
         found = [
@@ -313,14 +291,13 @@ class Variations:
         return np.array(found)[:, :n], np.array(found)[:, n:]
 
 
-def _round(steps: FloatArray, gains: FloatArray) -> FloatArray:
-    """What d is at the beginning of each panel, shape (k, n, m), if it is at the end of each what it is at the next, and round.
+def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
+    """Solve for d at the beginning of each panel, shape (k, n, m), so that each panel ends where the next one begins.
 
-    Two panels at a time become one: rotations take what is between them out of their equations, so that neither what grows
-    nor what decays is multiplied up.
+    Two panels at a time become one: rotations eliminate d between them, so that neither growth nor decay accumulates.
     """
     count, n, _ = gains.shape
-    # panels on which nothing happens make their number a power of two
+    # empty panels make their number a power of two
     more = (1 << (count - 1).bit_length()) - count
     whole = np.broadcast_to(np.eye(n), (count + more, n, n))
     # a d + b (d at the next) = right
@@ -383,7 +360,7 @@ def _symbols(flow: Flow, switched: bool) -> _Symbols:
 
 @cache
 def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
-    """Machine code of the rates with their first derivatives, of these along a direction, or of the outputs.
+    """Return machine code of the rates with their first derivatives, of these along a direction, or of the outputs.
 
     All are functions of (y, a direction of it, the angle), modes, drive and constants with their directions.
     """

@@ -1,5 +1,8 @@
-"""Rahman's thesis, listed here: `table` says which figure shows what and `figures` computes them; `printed` has the thesis's
-equations to the letter and `method` judges them."""
+"""List of the figures of Rahman's thesis.
+
+`table` assigns quantities to figures and `figures` computes them; `printed` has the thesis's equations to the letter and
+`method` judges them.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ _DRAWINGS = (
     ("Planar slider-crank when the crank angle is zero", "section 2.6.1, L156, L439"),
 )
 
-#: Each figure by its number in the thesis with an R before it, then the studies of what is in no figure.
+#: Each figure by its number in the thesis with an R before it, then the studies without a figure.
 FIGURES: Mapping[str, Entry] = MappingProxyType(
     {f"R{n}": Entry(title, place=place) for n, (title, place) in enumerate(_DRAWINGS, start=1)}
     | {number: Entry(figure.title, "rahman.figures", figure.place) for number, figure in table.FIGURES.items()}

@@ -1,13 +1,13 @@
-"""Rahman's figures 5 to 38: displacement and joint forces of the generalised slider-crank, one family of studies.
+"""Rahman's figures 5 to 38: displacement and joint forces of the generalised slider-crank.
 
-The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, with the offset a4, the shift S1 or the twist
-alpha4 in three sizes, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). What is sought is the force on
-the slider, and with it every joint force and moment. It has no finite value at the dead centres, where it has no lever on
-the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a curve
-is therefore told at whole degrees that are more than `CLEAR_DEG` from a dead centre.
+The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, with three values of the offset a4, the
+shift S1 or the twist alpha4, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). The unknown is the
+force on the slider, and with it every joint force and moment. It is infinite at the dead centres, where it has no lever
+on the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a
+curve is therefore taken at whole degrees more than `CLEAR_DEG` from a dead centre.
 
-What sections 3.2 and 3.3 state is held against the right mechanism where the quantity concerned is shown. All forces are
-computed a second time by dual vectors, which share no equation with the plant.
+Statements of sections 3.2 and 3.3 are judged with the figure that shows the quantity. All forces are computed a second
+time by dual vectors, which share no equation with the plant.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, POUND_FORCE, POUND_INCH, parameters
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...slider_crank import (
@@ -35,7 +35,8 @@ from ...slider_crank import (
     joint_loads,
     ranges,
 )
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from ...units import INCH
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
 from .table import (
     AXIAL_LB,
     COMPONENTS,
@@ -56,19 +57,19 @@ from .table import (
 
 FloatArray = NDArray[np.float64]
 
-#: Crank angles of the curves (deg): half degrees, the whole ones among them.
+#: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
 ANGLE = "crank angle theta1 [deg]"
-#: Step (deg) in which the loop closed by dual matrices is followed round the turn.
+#: Step (deg) in which the loop is continued over the turn by dual matrices.
 FOLLOW_DEG = 20.0
-#: Largest force or moment (lb, lb.in) that is taken for none, and largest relative difference of two ways of computing.
+#: Largest force or moment (lb, lb.in) that counts as zero, and largest relative difference of two methods.
 NOTHING, SAME = 1e-6, 1e-9
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
-#: How far (deg) "near" is taken to reach in "spikes near 100 and 300 degrees", and by what share of half the stroke a curve may
-#: depart from a sine to be "almost" one: ours, the source gives no range.
+#: Our range (deg) of "near" in "spikes near 100 and 300 degrees", and our largest departure from a sine, relative to half the
+#: stroke, of a curve that is "almost" one. The source gives no range.
 SPIKES_TO, ALMOST = 25.0, 0.2
-#: By how much the values on both sides of a spike exceed all that are clear of the dead centres.
+#: Ratio by which the values beside a spike exceed all values clear of the dead centres.
 SPIKE = 2.0
 
 _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
@@ -76,7 +77,7 @@ _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
 
 @cache
 def turn(case: Case, given: str = "torque") -> ForceTurn:
-    """A turn of the crank, with the ``torque`` given and the slider's force sought, or with no ``load`` on the slider."""
+    """Compute a turn of the crank with a given ``torque`` and unknown slider force, or without ``load`` on the slider."""
     return force_turn(
         parameters(case.offset_in, case.twist_deg),
         crank_speed=CRANK_SPEED,
@@ -87,12 +88,12 @@ def turn(case: Case, given: str = "torque") -> ForceTurn:
 
 
 def dead_centres_deg(case: Case) -> FloatArray:
-    """Crank angles of the dead centres (deg)."""
+    """Return the crank angles of the dead centres (deg)."""
     return np.degrees([centre.crank_angle for centre in turn(case).dead_centres])
 
 
 def values(case: Case, component: Component, given: str = "torque") -> FloatArray:
-    """A component over the turn in the unit as printed, NaN at a dead centre."""
+    """Return a component over the turn in the printed unit, NaN at a dead centre."""
     found = turn(case, given)
     if component.source in ("axial_force", "slider_force"):
         si = getattr(found, component.source)
@@ -102,27 +103,27 @@ def values(case: Case, component: Component, given: str = "torque") -> FloatArra
 
 
 def position(case: Case) -> FloatArray:
-    """Slider position (in)."""
+    """Return the slider position (in)."""
     return turn(case).slider_position / INCH
 
 
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
-    """Which of the angles are whole degrees and clear of the dead centres."""
-    # an angle at just this distance is not clear, however it is rounded
+    """Return a mask of the whole degrees that are clear of the dead centres."""
+    # an angle at exactly this distance is not clear, whatever its rounding
     return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG + 1e-6))
 
 
 def greatest(case: Case, quantity: FloatArray) -> float:
-    """Greatest magnitude of a quantity over the turn, clear of the dead centres."""
+    """Return the greatest magnitude of a quantity over the turn, clear of the dead centres."""
     return float(np.abs(quantity[clear(case)]).max())
 
 
 def spikes_deg(case: Case, component: Component) -> FloatArray:
-    """Crank angles (deg) of the poles of a component: where its reciprocal, which is smooth there, goes through zero."""
+    """Find the crank angles (deg) of the poles of a component, as zeros of its reciprocal."""
     value = values(case, component)
     (changes,) = np.nonzero(value[:-1] * value[1:] < 0.0)
-    # a zero of the component changes its sign too, between small values
+    # a zero of the component changes its sign too, but between small values
     size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
     found = []
     for at in changes[size > SPIKE * greatest(case, value)].tolist():
@@ -134,7 +135,7 @@ def spikes_deg(case: Case, component: Component) -> FloatArray:
 
 @cache
 def dual(case: Case) -> JointLoads:
-    """All joint forces by dual vectors, at the angles that are clear of the dead centres.
+    """Compute all joint forces by dual vectors at the angles that are clear of the dead centres.
 
     The loop is closed by continuation round the turn in steps of `FOLLOW_DEG`, and from these points in between.
     """
@@ -146,7 +147,7 @@ def dual(case: Case) -> JointLoads:
 
 
 def difference_from_dual(case: Case, component: Component) -> float:
-    """Greatest difference between a component and that by dual vectors, clear of the dead centres, relative to T/a1 or T."""
+    """Return the greatest difference of a component from dual vectors, clear of the dead centres, relative to T/a1 or T."""
     loads = dual(case)
     if component.source in ("axial_force", "slider_force"):
         si = loads.axial if component.source == "axial_force" else loads.slider_force
@@ -158,7 +159,7 @@ def difference_from_dual(case: Case, component: Component) -> float:
 
 
 def _motion(family: str) -> list[Verdict]:
-    """Stroke, shape and dead centres of the slider's motion, and the power that it takes."""
+    """Judge stroke, shape and dead centres of the slider's motion, and its power."""
     cases, place = FAMILIES[family].cases, "section 3.3, L1125"
     verdicts = []
     for case in cases:
@@ -166,15 +167,15 @@ def _motion(family: str) -> list[Verdict]:
         sine = (first * np.exp(1j * np.radians(ANGLES_DEG))).real
         away = np.abs(position(case) - np.mean(position(case)[:-1]) - sine).max() / (0.5 * _stroke(case))
         statement = f"greatest departure of the displacement from a sine, relative to half the stroke; {case.name}"
-        verdicts.append(at_most(statement, TEXT, ALMOST, away, place=place))
+        verdicts.append(at_most(statement, text(place), ALMOST, away))
         if case.twist_deg == IDEAL.twist_deg:
             longer, name = _stroke(case) / _stroke(IDEAL), f"stroke relative to the ideal one's; {case.name}"
-            verdicts.append(at_most(name, TEXT, 1.0, longer, place=place, why="a4 lengthens it"))
+            verdicts.append(at_most(name, text(place), 1.0, longer, why="a4 lengthens it"))
     if family == "offset":
         power = [float(np.mean(_torque(case)[:-1]) * CRANK_SPEED) for case in (IDEAL, *cases)]
         saved, name = power[0] - min(power[1:]), "mean power that an offset saves at the same RPM without a load"
         why = "a motion without friction takes none"
-        verdicts.append(at_least(name, TEXT, NOTHING, saved, "lb.in/s", place=place, why=why))
+        verdicts.append(at_least(name, text(place), NOTHING, saved, "lb.in/s", why=why))
         for a4, stroke in STROKES_IN.items():
             planar = Case("", a4, 0.0, 270.0)
             verdicts.append(near(f"stroke; a4 = {a4:g} in with S1 = 0", OURS, stroke, _stroke(planar), 5e-4, "in"))
@@ -192,19 +193,19 @@ def _motion(family: str) -> list[Verdict]:
 
 
 def _stroke(case: Case) -> float:
-    """Stroke (in) of a mechanism of section 3.1 at its shift."""
+    """Return the stroke (in) of a mechanism of section 3.1 at its shift."""
     mechanism = parameters(case.offset_in, case.twist_deg)
     (whole,) = ranges(mechanism, constant_shift(case.shift_in * INCH))
     return whole.stroke / INCH
 
 
 def _torque(case: Case) -> FloatArray:
-    """Crank torque (lb.in) that the motion takes without a load on the slider."""
+    """Return the crank torque (lb.in) without a load on the slider."""
     return np.asarray(turn(case, "load").torque / POUND_INCH)
 
 
 def _force_verdicts(family: str, component: Component) -> list[Verdict]:
-    """What is said of any component: its spikes, that the offset raises it; and that it is computed twice."""
+    """Judge the spikes of a component, the influence of the offset, and its agreement with dual vectors."""
     cases, symbol = FAMILIES[family].cases, component.symbol
     verdicts = []
     found = [spikes_deg(case, component) for case in cases]
@@ -212,20 +213,18 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
         stated, counts = SPIKES.get(symbol, 2), [spikes.size for spikes in found]
         count = max(counts, key=lambda n: abs(n - stated))
         why = "3F3j, 3F3k have none, the others two" if count != stated else ""
-        verdicts.append(
-            near(f"spikes of {symbol} in a turn", TEXT, stated, count, 0.0, place="section 3.3, L1125", why=why)
-        )
+        verdicts.append(near(f"spikes of {symbol} in a turn", text("section 3.3, L1125"), stated, count, 0.0, why=why))
     if any(spikes.size for spikes in found):
         distance = max(float(np.abs(spikes - SPIKES_DEG).max()) for spikes in found)
         name = f"distance of the spikes of {symbol} from 100 and 300 deg"
-        verdicts.append(at_most(name, TEXT, SPIKES_TO, distance, "deg", place="sections 3.2, 3.3, L1115, L1125"))
+        verdicts.append(at_most(name, text("sections 3.2, 3.3, L1115, L1125"), SPIKES_TO, distance, "deg"))
         distance = max(float(np.abs(spikes - dead_centres_deg(case)).max()) for case, spikes in zip(cases, found))
         verdicts.append(at_most(f"distance of the spikes of {symbol} from dead centres", OURS, 0.005, distance, "deg"))
     if family == "offset":
         name = f"greatest magnitude of {symbol}, least gain from one a4 to the next"
         gain, with_load = (_offsets_gain(component, given) for given in ("torque", "load"))
         why = "nearer to a dead centre than the others" if gain < 0.0 else ""
-        verdicts.append(at_least(name, TEXT, 0.0, gain, component.unit, place="section 3.3, L1125", why=why))
+        verdicts.append(at_least(name, text("section 3.3, L1125"), 0.0, gain, component.unit, why=why))
         # along the guide nothing acts without a load
         if component.source != "slider_force":
             verdicts.append(at_least(f"{name}, with the slider's load given", OURS, 0.0, with_load, component.unit))
@@ -240,13 +239,13 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
 
 
 def _offsets_gain(component: Component, given: str) -> float:
-    """Least gain of a component's greatest magnitude from each case of variable offset to the next, the ideal one first."""
+    """Return the least gain of a component's greatest magnitude from one offset to the next, the ideal case first."""
     peaks = [greatest(case, values(case, component, given)) for case in (IDEAL, *FAMILIES["offset"].cases)]
     return min(after - before for before, after in pairwise(peaks))
 
 
 def moment_by_forces(case: Case, axis: str) -> tuple[FloatArray, FloatArray]:
-    """1T1i or 1T1j (lb.in) by the forces on the crank: as section 3.2 has it, and with the axial force."""
+    """Return 1T1i or 1T1j (lb.in) from the forces on the crank, as in section 3.2 and with the axial force."""
     angle = np.radians(ANGLES_DEG)
     fi, fj, fk = (values(case, COMPONENTS[name]) for name in ("1F1i", "1F1j", "1F1k"))
     if axis == "i":
@@ -255,7 +254,7 @@ def moment_by_forces(case: Case, axis: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict]:
-    """1T1i or 1T1j by the forces, and whether they are there."""
+    """Judge 1T1i or 1T1j against the forces, and whether the shift causes it."""
     symbol, axis, place = component.symbol, component.symbol[-1], "section 3.2, L1119"
     short, lacking = ("-1F1j S1", " + 1F1k a1 sin(theta1)") if axis == "i" else ("1F1i S1", " - 1F1k a1 cos(theta1)")
     verdicts = []
@@ -263,16 +262,16 @@ def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict
         moment = values(case, component)
         printed, full = (greatest(case, moment - formula) for formula in moment_by_forces(case, axis))
         name, why = f"greatest magnitude of {symbol} - ({short}); {case.name}", f"lacks{lacking}"
-        verdicts.append(near(name, TEXT, 0.0, printed, NOTHING, "lb.in", place=place, why=why))
+        verdicts.append(near(name, text(place), 0.0, printed, NOTHING, "lb.in", why=why))
         name = f"greatest magnitude of {symbol} - ({short}{lacking}); {case.name}"
         verdicts.append(near(name, OURS, 0.0, full, NOTHING, "lb.in"))
     least = min(greatest(case, values(case, component)) for case in cases)
     name = f"greatest magnitude of {symbol}, which S1 brings about, least of the cases"
-    return [*verdicts, at_least(name, TEXT, NOTHING, least, "lb.in", place="section 3.3, L1125-1127")]
+    return [*verdicts, at_least(name, text("section 3.3, L1125-1127"), NOTHING, least, "lb.in")]
 
 
 def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
-    """Values from an independent derivation."""
+    """Compare the slider force with values from an independent derivation."""
     verdicts = []
     for case in cases:
         if case.shift_in == 0.0 and case.twist_deg == IDEAL.twist_deg:
@@ -292,13 +291,13 @@ def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
 
 
 def _constant() -> list[Verdict]:
-    """What section 3.2 finds to be constant or zero, and what the equations take for given."""
+    """Judge the components that section 3.2 finds constant or zero, and the assumptions of the equations."""
     cases, place, verdicts = FAMILIES["all"].cases, "section 3.2, L1117", []
     about = {name: [values(case, COMPONENTS[name]) for case in cases] for name in ("1F1k", "2F2j", "2F2k", "1T1k")}
 
     def none(name: str, case: Case, size: float, unit: str, place: str, why: str) -> Verdict:
         what = f"greatest magnitude of {name}; {case.name}"
-        return near(what, TEXT, 0.0, size, NOTHING, unit, place=place, why=why if size > NOTHING else "")
+        return near(what, text(place), 0.0, size, NOTHING, unit, why=why if size > NOTHING else "")
 
     for case, axial, pin in zip(cases, about["1F1k"], about["2F2k"]):
         size, given = greatest(case, pin), "section 2.8, after eq 64, L945-949"
@@ -320,14 +319,12 @@ def _constant() -> list[Verdict]:
     )
     for which, pick in (("least", np.nanmin), ("greatest", np.nanmax)):
         pin, torque = (pick([pick(found) for found in about[name]]) for name in ("2F2j", "1T1k"))
-        verdicts.append(near(f"{which} 2F2j of all cases", TEXT, -8.33, pin, 0.005, "lb", place=place))
+        verdicts.append(near(f"{which} 2F2j of all cases", text(place), -8.33, pin, 0.005, "lb"))
         given = "section 3.1, L1079"
-        verdicts.append(near(f"{which} 1T1k of all cases", TEXT, TORQUE, torque, NOTHING, "lb.in", place=given))
+        verdicts.append(near(f"{which} 1T1k of all cases", text(given), TORQUE, torque, NOTHING, "lb.in"))
     for symbol in ("4T4i", "4T4j", "4T4k"):
         size = max(float(np.abs(values(case, COMPONENTS[symbol])).max()) for case in (IDEAL, *cases))
-        verdicts.append(
-            near(f"greatest magnitude of {symbol} in all cases", TEXT, 0.0, size, NOTHING, "lb.in", place=place)
-        )
+        verdicts.append(near(f"greatest magnitude of {symbol} in all cases", text(place), 0.0, size, NOTHING, "lb.in"))
     return verdicts
 
 
@@ -340,7 +337,7 @@ def _dead_centre_name(case: Case) -> str:
 
 
 def compute(number: str) -> StudyResult:
-    """Curves of all cases of a figure, their dead centres, and what is stated of them."""
+    """Compute the curves of all cases of a figure, their dead centres, and the verdicts."""
     family, symbols, *_ = FIGURES[number]
     components = [COMPONENTS[symbol] for symbol in symbols]
     cases = (IDEAL, *FAMILIES[family].cases)
@@ -365,18 +362,18 @@ def compute(number: str) -> StudyResult:
 
 
 def printed(text: str) -> str:
-    """A case or a list of dimensions as it stands in a plot."""
+    """Format a case or a list of dimensions for a plot."""
     text = re.sub(r"\b([aS])(\d)", r"$\1_\2$", text.replace("alpha4", r"$\alpha_4$"))
     return re.sub(r" deg\b", "°", text)
 
 
 def printed_symbol(symbol: str) -> str:
-    """A symbol of the thesis, such as 1F1k, as it stands in a plot."""
+    """Format a symbol of the thesis, such as 1F1k, for a plot."""
     return re.sub(r"^(\d)([FT])(\d)([ijk])$", r"$^\1\2_{\3\4}$", symbol)
 
 
 def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, FloatArray]:
-    """A curve that is interrupted at its dead centres."""
+    """Return a curve that is interrupted at its dead centres."""
     centres = result.columns[_dead_centre_name(case)]
     centres = centres[np.isfinite(centres)]
     where = np.searchsorted(ANGLES_DEG, centres)
@@ -384,7 +381,7 @@ def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, Flo
 
 
 def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
-    """Range in which all values lie that are clear of the dead centres, with some room; at least a lb or lb.in each way."""
+    """Return a range with all values clear of the dead centres, at least 1 lb or 1 lb.in each way."""
     joined = np.concatenate(list(curves))
     low, high = float(joined.min()), float(joined.max())
     room = max(0.08 * (high - low), 1.0 if high - low < NOTHING else 0.0)
@@ -392,7 +389,7 @@ def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
 
 
 def draw(result: StudyResult) -> Figure:
-    """A panel a component; the ideal case dashed over the others, dead centres dotted."""
+    """Draw one panel a component, the ideal case dashed over the others, dead centres dotted."""
     family, symbols, *_ = FIGURES[result.number]
     looks = [
         (case, printed(case.name), colour, line)

@@ -1,7 +1,7 @@
-"""Rahman's method judged: his loop closure and its iteration, his rates, his force equations in the plane.
+"""Verdicts on Rahman's method: loop closure and its iteration, rates, force equations in the plane.
 
-`printed` has the equations to the letter. What they state is held against other formulations: dual matrices, difference
-quotients, the plant. The errata are numbered as in docs/rahman.md.
+`printed` has the equations to the letter. They are compared with other formulations: dual matrices, difference quotients,
+the plant. The errata are numbered as in docs/rahman.md.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
+from linkwork.slider_crank.published import CRANK_SPEED, parameters
 
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...numerics.dual import Dual, about_i, about_j, about_k, axial
 from ...slider_crank import CLEAR_DEG, Settled, assembly_margin, constant_shift, greatest_shift, settle
-from ...slider_crank.closure import residuals
-from ...slider_crank.two_rotations import Rows, chain, equations, freedoms, planar
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ...slider_crank.closure import Rows, chain, equations, freedoms, planar, residuals
+from ...units import INCH
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .figures import ANGLE, ANGLES_DEG, CRANK, NOTHING, TORQUE, clear, dead_centres_deg, printed, printed_symbol, values
 from .printed import (
     GRID_DEG,
@@ -49,50 +49,49 @@ OPEN = {
     Case("alpha4 = 232 deg", 20.0, 0.0, 232.0): (37.84, 3.78),
     Case("alpha4 = 310 deg", 20.0, 0.0, 310.0): (37.90, 2.74),
 }
-#: The same for the first of these by other iterations: which equations, from the angle before or not, and how far the number of
-#: the independent reconstruction is given.
+#: Results of other iterations for the first case: equations used, start from the previous angle or not, and digits given.
 VARIANTS: tuple[tuple[str, Rows, bool, float, float, float], ...] = (
     ("from the planar estimate at every angle", "printed", False, 23.0, 4.62, 0.05),
     ("without the diagonal of eq 22", "upper", True, 20.3, 2.31, 0.05),
     ("by all eighteen equations", "all", True, 20.26, 1.71, 0.005),
 )
-#: Cases whose row 37f is looked at, and what it lacks (in/s) by an independent reconstruction: as printed where |sin theta2| is
-#: above `CLEAR_SINE`, since eq 41 divides by it, and with erratum 2 mended.
+#: Cases for row 37f, with its residuals (in/s) by an independent reconstruction: as printed where |sin theta2| is above
+#: `CLEAR_SINE`, since eq 41 divides by it, and with erratum 2 mended.
 ROW_F = {
     Case("a4 = 30 in at S1 = 9 in", 30.0, 9.0, 270.0): (84.0, 40.0),
     Case("alpha4 = 310 deg", 20.0, 0.0, 310.0): (215.0, 66.0),
 }
 CLEAR_SINE = 0.15
-#: A configuration in general position, theta2' (rad/s) there as printed and as it is right by an independent derivation.
+#: A configuration in general position, with its theta2' (rad/s) as printed and by an independent derivation.
 GENERAL = Joints(*(np.array(value) for value in (2.1, 0.35, -1.3, 0.2, 40.0)))
 THETA2_RATE_PRINTED, THETA2_RATE = -4.3389, -4.3743
-#: Step of difference quotients, and the relative difference that they have at most.
+#: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
-#: Weight of water (lb/in3), which a specific gravity is relative to.
+#: Weight of water (lb/in3), the reference of specific gravities.
 WATER = 62.43 / 12.0**3
 
 
 @cache
 def followed(case: Case, rows: Rows = "printed", from_before: bool = True) -> Turn:
-    """The iteration over a turn in a case."""
+    """Run the iteration over a turn in a case."""
     return turn(parameters(case.offset_in, case.twist_deg), case.shift_in, rows, from_before=from_before)
 
 
 def joints(unknowns: FloatArray) -> Joints:
-    """Unknowns (..., 5) of the loop by name."""
+    """Return the unknowns (..., 5) of the loop by name."""
     return Joints(*np.moveaxis(unknowns, -1, 0))
 
 
 def _nothing(name: str, size: ArrayLike, unit: str, place: str, why: str = "") -> Verdict:
-    """A verdict on what the thesis has for zero: mostly the difference of an equation from what it should give."""
-    return near(name, TEXT, 0.0, float(np.abs(size)), NOTHING, unit, place=place, why=why)
+    """Judge that a quantity vanishes, usually the difference between an equation and its correct value."""
+    return near(name, text(place), 0.0, float(np.abs(size)), NOTHING, unit, why=why)
 
 
 # ---------------------------------------------------------------- the loop
 
 
 def _operators() -> float:
-    """Greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
+    """Return the greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
     th, eta = float(GENERAL.th2), float(GENERAL.eta2)
     about = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     tilting = np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
@@ -112,12 +111,12 @@ def _operators() -> float:
 
 
 def _limits() -> list[Verdict]:
-    """Up to where the iteration settles, as the thesis states it, and that these are no limits of the mechanism."""
+    """Judge the stated limits of the iteration, and show that they are not limits of the mechanism."""
     place = "section 3.2, L1121"
     within = "the thesis does not say how many corrections it allows"
     rounding = "where the iteration ends there depends on rounding: 1e-9 in more or less of S1 decide it"
     verdicts = [
-        unjudged(statement, TEXT, rounding, place=place)
+        unjudged(statement, text(place), rounding)
         for statement in (
             f"the iteration converges up to S1 = {SHIFTS_REACHED_IN[0.0]:g} in at a4 = 0",
             "beyond its limits closure is lost, or the slider goes to the opposite side",
@@ -127,26 +126,26 @@ def _limits() -> list[Verdict]:
         settled = turn(parameters(a4), stated + np.array([0.0, 0.5, 1.0])).settled
         reached = stated + 0.5 * (int(np.cumprod(settled).sum()) - 1)
         name = f"greatest S1, by halves, at which the printed iteration settles, to within 1 in; a4 = {a4:g} in"
-        verdicts.append(near(name, TEXT, stated, reached, 1.0, "in", place=place, why=within))
+        verdicts.append(near(name, text(place), stated, reached, 1.0, "in", why=within))
     for which, stated, way in zip(("least", "greatest"), TWISTS_REACHED_DEG, (-1.0, 1.0)):
         reached = stated
         while turn(parameters(20.0, reached + way), 0.0).settled.all():
             reached += way
         name = f"{which} alpha4, by degrees, at which the printed iteration settles, to within 1 deg"
         why = within if reached != stated else ""
-        verdicts.append(near(name, TEXT, stated, reached, 1.0, "deg", place=place, why=why))
+        verdicts.append(near(name, text(place), stated, reached, 1.0, "deg", why=why))
     shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in GREATEST_SHIFTS_IN}
     for a4, stated in SHIFTS_REACHED_IN.items():
         name, why = f"greatest S1 at which the mechanism works; a4 = {a4:g} in", "a limit of the iteration alone"
-        verdicts.append(near(name, TEXT, stated, shifts[a4], 0.5, "in", place=place, why=why))
+        verdicts.append(near(name, text(place), stated, shifts[a4], 0.5, "in", why=why))
     gain = min(after - before for before, after in pairwise(shifts.values()))
     name = "gain of the greatest S1 from one a4 to the next, least of all"
-    verdicts.append(at_least(name, TEXT, 0.0, gain, "in", place=place, why="it falls with a4"))
+    verdicts.append(at_least(name, text(place), 0.0, gain, "in", why="it falls with a4"))
     rest, (least, most) = constant_shift(0.0), TWISTS_REACHED_DEG
     margins = [assembly_margin(parameters(20.0, twist), rest).length / INCH for twist in range(0, 360, 5)]
     name, works = "range of alpha4 in which the mechanism works", 5.0 * sum(margin > 0.0 for margin in margins)
     why = "it turns fully at every alpha4"
-    verdicts.append(near(name, TEXT, most - least, works, 5.0, "deg", place=place, why=why))
+    verdicts.append(near(name, text(place), most - least, works, 5.0, "deg", why=why))
     verdicts.append(at_least("least margin of assembly at every 5 deg of alpha4", OURS, 0.0, min(margins), "in"))
     return verdicts + [
         near(f"greatest S1 at which the crank turns fully; a4 = {a4:g} in", OURS, stated, shifts[a4], 5e-4, "in")
@@ -155,7 +154,7 @@ def _limits() -> list[Verdict]:
 
 
 def _in_the_plane() -> list[Verdict]:
-    """The planar mechanism, where the chain is right."""
+    """Judge the planar mechanism, for which the chain is right."""
     offsets, grid, zero = (0.0, 10.0, 20.0, 30.0), np.radians(GRID_DEG), np.zeros(1)
     flat = [followed(Case("", a4, 0.0, 270.0)) for a4 in offsets]
     loops = []
@@ -166,7 +165,7 @@ def _in_the_plane() -> list[Verdict]:
         loops += [float(left[0]) for left in residuals(chain(parameters(a4), zero, zero, estimate)[0])]
 
     def ended(off: float) -> list[Settled]:
-        """The iteration from estimates of theta2 and theta3 that are off (deg)."""
+        """Run the iteration from estimates of theta2 and theta3 that are off by given angles (deg)."""
         away = np.radians([off, 0.0, -off, 0.0, 0.0])
         planes = [parameters(a4) for a4 in offsets]
         return [settle(p, grid, 0.0, rows="printed", start=planar(p, grid) + away) for p in planes]
@@ -185,21 +184,21 @@ def _in_the_plane() -> list[Verdict]:
     )
     least = f"fewest {many}, in the plane, from estimates 20 deg off"
     return [
-        at_least(least, TEXT, 3.0, np.min(close_by), place=place),
-        *(at_most(name, TEXT, most, size, unit, place=where, why=why) for name, most, size, unit, where, why in rows),
+        at_least(least, text(place), 3.0, np.min(close_by)),
+        *(at_most(name, text(where), most, size, unit, why=why) for name, most, size, unit, where, why in rows),
     ]
 
 
 def closure() -> StudyResult:
-    """The iteration, and by how much the loop is open where it ends."""
+    """Compute the iteration and the closure error at which it ends."""
     columns, verdicts = {ANGLE: GRID_DEG}, []
     name, why = "freedoms of the chain, of which theta1 and S1 are given", "erratum 1: two rotations to a ball joint"
     (first, *_) = OPEN
     p, ended = parameters(first.offset_in), followed(first).unknowns[4, 0] * [1.0, 1.0, 1.0, 1.0, INCH]
     left = freedoms(p, float(np.radians(GRID_DEG[4])), first.shift_in * INCH, ended)
-    verdicts.append(near(name, TEXT, 2.0, left, 0.0, place="eqs 1 to 5, L193, L358, L465-471", why=why))
+    verdicts.append(near(name, text("eqs 1 to 5, L193, L358, L465-471"), 2.0, left, 0.0, why=why))
     name = "operators times matrices less difference quotients"
-    verdicts.append(at_most(name, TEXT, ROUGH, _operators(), place="eqs 2a to 4a, L320-352"))
+    verdicts.append(at_most(name, text("eqs 2a to 4a, L320-352"), ROUGH, _operators()))
     smallest, unmet = np.inf, 0.0
     for case, reference in OPEN.items():
         found, mechanism = followed(case), parameters(case.offset_in, case.twist_deg)
@@ -223,7 +222,7 @@ def closure() -> StudyResult:
     name = "greatest entry of A Delta - V where the iteration ends"
     verdicts.append(_nothing(name, unmet, "", "eqs 23, 23a, L457-463", "erratum 1: there A'V = 0 alone"))
     name = "least singular value of A relative to its greatest, over the turns"
-    verdicts.append(at_least(name, TEXT, NOTHING, smallest, place="section 3.3, L1131"))
+    verdicts.append(at_least(name, text("section 3.3, L1131"), NOTHING, smallest))
     for words, rows, from_before, rotation, error, digit in VARIANTS:
         other, name = followed(first, rows, from_before), f"loop open by a rotation, {words}"
         verdicts.append(near(name, OURS, rotation, np.max(other.rotation_deg), digit, "deg"))
@@ -240,7 +239,7 @@ def closure() -> StudyResult:
 
 
 def _row_f(case: Case) -> tuple[FloatArray, FloatArray]:
-    """What row 37f lacks (in/s) on the grid: as printed, NaN where eq 41 has no bound, and with erratum 2 mended."""
+    """Return the residual of row 37f (in/s) on the grid: as printed, NaN where eq 41 is unbounded, and by erratum 2."""
     p, q = parameters(case.offset_in, case.twist_deg), joints(followed(case).unknowns[:, 0])
     lacking = loop_rates(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))[5]
     shift = np.full(GRID_DEG.size, case.shift_in * INCH)
@@ -249,7 +248,7 @@ def _row_f(case: Case) -> tuple[FloatArray, FloatArray]:
 
 
 def _angular_velocity() -> float:
-    """Difference (rad/s) of eqs 30 and 31 from the angular velocity of Z(theta) Y(eta), by a difference quotient."""
+    """Return the difference (rad/s) of eqs 30 and 31 from the angular velocity of Z(theta) Y(eta), by a difference quotient."""
     th, eta, th_rate, eta_rate = 0.8, 0.3, 1.7, -2.1
     before, now, after = (about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-H, 0.0, H))
     omega = axial(Dual((after - before) / (2.0 * H) @ now.T)).real
@@ -257,7 +256,7 @@ def _angular_velocity() -> float:
 
 
 def _printed_rates() -> list[Verdict]:
-    """Eqs 28a, 30, 31 and 38 to 43, 38a to 42a in the general position, with the shift at rest or at 1.3 in/s."""
+    """Judge eqs 28a, 30, 31 and 38 to 43, 38a to 42a in the general position, with the shift at rest or at 1.3 in/s."""
     crank, still = CRANK_AT_SPEED._replace(shift_rate=1.3), CRANK_AT_SPEED
     right = loop_rates(crank, GENERAL, Joints(*np.zeros(5)))
     matrix = np.stack([loop_rates(crank, GENERAL, Joints(*unit)) - right for unit in np.eye(5)], -1)
@@ -265,7 +264,7 @@ def _printed_rates() -> list[Verdict]:
     solved, rates = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
     as_printed, mended = (float(joint_rates(still, GENERAL, erratum_4=erratum).th2) for erratum in (False, True))
     left = abs(float(joint_rates(crank, GENERAL, erratum_4=True).th2 - solved.th2))
-    # the derivative along the motion by a step into the complex plane, which has no rounding
+    # derivative along the motion by a complex step, which has no rounding error
     moved = Joints(*(q + 1e-20j * r for q, r in zip(GENERAL, rates)))
     seconds = joint_accelerations(crank, GENERAL, rates)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(crank, moved)))
@@ -275,7 +274,7 @@ def _printed_rates() -> list[Verdict]:
     slip = shift_rate - ratio * shift * np.cos(ratio * angle)
     coefficients, less = "rank of the coefficients of eq 38", "less the solution of 37a to 37e"
     verdicts = [
-        near(name, TEXT, 5.0, rank, 0.0, place="eq 38, L561-563", why=why)
+        near(name, text("eq 38, L561-563"), 5.0, rank, 0.0, why=why)
         for name, rank, why in (
             (coefficients, ranks[0], ""),
             (f"{coefficients} with its right side", ranks[1], "erratum 3: six equations, of which five are solved"),
@@ -305,7 +304,7 @@ def _printed_rates() -> list[Verdict]:
 
 
 def _dead_centres() -> list[Verdict]:
-    """What section 3.2 gives for the cause of the spikes, in the plane."""
+    """Judge the cause that section 3.2 gives for the spikes, in the plane."""
     place, verdicts, worst = "section 3.2, L1115", [], 0.0
     for a4 in (10.0, 20.0, 30.0):
         case, p = Case("", a4, 0.0, 270.0), parameters(a4)
@@ -324,11 +323,11 @@ def _dead_centres() -> list[Verdict]:
         "greatest accelerations by eqs 38a, 39a, 42a within 10 deg of a spike relative to elsewhere, ten being abnormal"
     )
     why = "the spikes are not of roundoff: at dead centres the torque has no lever on the slider"
-    return [*verdicts, at_least(name, TEXT, 10.0, worst, place=place, why=why)]
+    return [*verdicts, at_least(name, text(place), 10.0, worst, why=why)]
 
 
 def velocities() -> StudyResult:
-    """The rates as printed, and the row that is not solved."""
+    """Compute the rates as printed, and the residual of the unsolved row."""
     columns, verdicts = {ANGLE: GRID_DEG}, _printed_rates()
     for case, (stated, mended_stated) in ROW_F.items():
         lacking, mended = _row_f(case)
@@ -345,7 +344,7 @@ def velocities() -> StudyResult:
         name = f"row 37f with erratum 2 mended, independent reconstruction; {case.name}"
         verdicts.append(near(name, OURS, mended_stated, float(np.abs(mended).max()), 0.5, "in/s"))
     lost = "the scan has lost the second dots; the thesis computes with eqs 57 and 58 in their place (L859)"
-    verdicts.append(unjudged("eqs 55 and 56 are the rates of 50a and 51a", TEXT, lost, place="eqs 55, 56, L758-846"))
+    verdicts.append(unjudged("eqs 55 and 56 are the rates of 50a and 51a", text("eqs 55, 56, L758-846"), lost))
     return StudyResult(
         number="rahman-rates",
         claim="Eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
@@ -361,7 +360,7 @@ _PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
 
 def planar_forces(*, erratum_5: bool, erratum_6: bool) -> dict[str, FloatArray]:
-    """Forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not."""
+    """Return the forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not."""
     p, angle = parameters(_PLANE.offset_in), np.radians(ANGLES_DEG)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
     r = joint_rates(CRANK_AT_SPEED, q)
@@ -372,7 +371,7 @@ def planar_forces(*, erratum_5: bool, erratum_6: bool) -> dict[str, FloatArray]:
 
 
 def _slips(right: dict[str, FloatArray]) -> list[Verdict]:
-    """Erratum 9 in the force equations, 63b and 69k."""
+    """Judge erratum 9 in the force equations, 63b and 69k."""
     angle, at = np.radians(ANGLES_DEG), clear(_PLANE)
     crank, b = CRANK_AT_SPEED, bodies(parameters())
     r = joint_rates(crank, GENERAL)
@@ -407,7 +406,7 @@ def _slips(right: dict[str, FloatArray]) -> list[Verdict]:
 
 
 def forces() -> StudyResult:
-    """The force equations in the plane, as printed and mended."""
+    """Compute the force equations in the plane, as printed and mended."""
     columns, verdicts, at = {ANGLE: ANGLES_DEG}, [], clear(_PLANE)
     right = {symbol: values(_PLANE, COMPONENTS[symbol]) for symbol in _PLANAR}
     columns["4F4k right [lb]"] = right["4F4k"]
@@ -415,20 +414,8 @@ def forces() -> StudyResult:
     mended = planar_forces(erratum_5=True, erratum_6=True)
     for words, five, six, place, why in (
         ("as printed", False, False, "section 3.2, L1111", "errata 5 and 6"),
-        (
-            "erratum 6 mended",
-            False,
-            True,
-            "eqs 62, 64, L887-891",
-            "erratum 5: signs of f1 and f3",
-        ),
-        (
-            "erratum 5 mended",
-            True,
-            False,
-            "section 3.1, L1085-1087",
-            "erratum 6: signs of g1 and g2",
-        ),
+        ("erratum 6 mended", False, True, "eqs 62, 64, L887-891", "erratum 5: signs of f1 and f3"),
+        ("erratum 5 mended", True, False, "section 3.1, L1085-1087", "erratum 6: signs of g1 and g2"),
         ("both mended", True, True, "", ""),
     ):
         found = planar_forces(erratum_5=five, erratum_6=six)
@@ -446,9 +433,7 @@ def forces() -> StudyResult:
         verdicts=(
             *verdicts,
             *_slips(mended),
-            unjudged(
-                "with an offset fatigue failure is likely at high speed", TEXT, strength, place="section 3.3, L1125"
-            ),
+            unjudged("with an offset fatigue failure is likely at high speed", text("section 3.3, L1125"), strength),
         ),
     )
 
@@ -456,18 +441,18 @@ def forces() -> StudyResult:
 # ---------------------------------------------------------------- plots
 
 
-#: What columns of a unit have in common, by which a panel's axis is called.
+#: Labels of the axes by the unit of their columns.
 _SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "row 37f", "[lb]": "4F4k"}
-#: What columns are drawn dashed, over the others.
+#: Columns drawn dashed, over the others.
 _DASHED = ("37f mended", "both mended", "all eighteen")
 
 
 def draw(result: StudyResult) -> Figure:
-    """A panel for each unit of the columns; dashed what is mended."""
+    """Draw one panel for each unit of the columns, mended equations dashed."""
     panels = []
     for unit, label in _SHOWN.items():
         shown = {name: column for name, column in result.columns.items() if name.endswith(unit) and name != ANGLE}
-        # the forces have no bound at the dead centres
+        # the forces are infinite at the dead centres
         inside = clear(_PLANE) if unit == "[lb]" else slice(None)
         limit = 1.05 * max((float(np.nanmax(np.abs(column[inside]))) for column in shown.values()), default=0.0)
         curves = [

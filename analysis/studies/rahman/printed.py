@@ -1,7 +1,7 @@
 """Rahman's equations as printed, in pounds, inches and seconds: the iteration of section 2.6.1, and eqs 37 to 43, 46 to 69.
 
-They are kept to the letter, errors included, so that what they give can be set beside what is right; the erratum that a
-switch mends is that of docs/rahman.md. An angle's name with ``_t`` is its rate, with ``_tt`` its second rate.
+They are kept to the letter with their errors, to be compared with correct values. A switch ``erratum_N`` mends the erratum of
+that number in docs/rahman.md. The suffix ``_t`` of an angle's name is its rate, ``_tt`` its second rate.
 """
 
 from __future__ import annotations
@@ -12,26 +12,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import INCH, POUND_FORCE
+from linkwork.slider_crank.published import POUND_FORCE
 
 from ...numerics.dual import Dual, about_i, about_j, about_k, cross
 from ...slider_crank import settle
-from ...slider_crank.two_rotations import Rows, chain
+from ...slider_crank.closure import Rows, chain
+from ...units import INCH
 
 FloatArray = NDArray[np.float64]
 
-#: Step of the crank angle (deg) in the continuation, and how many corrections are made at an angle at most: ours.
+#: Step of the crank angle (deg) in the continuation, and most corrections at an angle: our choice.
 STEP_DEG, MAX_STEPS = 5.0, 200
 #: Crank angles of the continuation (deg).
 GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
 
 
 class Turn(NamedTuple):
-    """Where the iteration ends, at the angles `GRID_DEG` (m) for n shifts.
+    """Result of the iteration at the angles `GRID_DEG` (m) for n shifts.
 
-    ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in); ``rotation_deg`` and ``error_in`` (m, n) say by how
-    much the loop is open and S4 off; ``steps`` (m, n) how many corrections were made; ``settled`` (n,) whether the last of them
-    was small at every angle. The turn ends, and the rest is NaN, where no shift settles.
+    ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in). ``rotation_deg`` and ``error_in`` (m, n) are the
+    closure error and the error of S4; ``steps`` (m, n) the numbers of corrections; ``settled`` (n,) whether the last correction
+    was small at every angle. The turn ends where no shift settles; the rest is NaN.
     """
 
     unknowns: FloatArray
@@ -42,7 +43,7 @@ class Turn(NamedTuple):
 
 
 def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", *, from_before: bool = True) -> Turn:
-    """The iteration over a turn, from the planar estimate at theta1 = 0, then ``from_before`` or from it at every angle."""
+    """Iterate over a turn, from the planar estimate at theta1 = 0 and then from the previous angle or from that estimate."""
     shifts = np.atleast_1d(np.asarray(shift_in, dtype=float))
     shape = (GRID_DEG.size, shifts.size)
     blank = np.full(shape, np.nan)
@@ -65,7 +66,7 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", 
 
 
 class Crank(NamedTuple):
-    """Lengths a1 and a2 (in), theta1' (rad/s) and S1' (in/s); at constant speed and rate of the shift."""
+    """Lengths a1 and a2 (in), theta1' (rad/s) and S1' (in/s), the rates being constant."""
 
     a1: float
     a2: float
@@ -84,7 +85,7 @@ class Joints(NamedTuple):
 
 
 def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
-    """Eqs 39 to 43; ``erratum_4`` mends 39."""
+    """Return the joint rates by eqs 39 to 43; ``erratum_4`` mends 39."""
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v = c.speed, c.shift_rate
     factor = ce**2 if erratum_4 else 1.0
@@ -100,7 +101,10 @@ def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
 
 
 def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
-    """Eqs 38a to 42a for constant theta1' and S1'; what they repeat, the bracket of 40 to 42 and its rate, has a name here."""
+    """Return the second rates by eqs 38a to 42a for constant theta1' and S1'.
+
+    The bracket shared by 40 to 42 and its rate have names here.
+    """
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v, a1, a2 = c.speed, c.shift_rate, c.a1, c.a2
     bracket = a1 * w * (c2 * s3 + s2 * c3 * ce) - v * se * c3
@@ -139,7 +143,7 @@ def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
 
 
 def loop_rates(c: Crank, q: Joints, r: Joints) -> FloatArray:
-    """What rows 37a to 37f lack (6, ...): three in rad/s (a, c, e), three in in/s (b, d, f)."""
+    """Return the residuals of rows 37a to 37f (6, ...): a, c, e in rad/s, and b, d, f in in/s."""
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v = c.speed, c.shift_rate
     return np.array(
@@ -155,13 +159,15 @@ def loop_rates(c: Crank, q: Joints, r: Joints) -> FloatArray:
 
 
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
-    """What the last of rows 37 lacks (in/s) with erratum 2 mended, when the others are solved: eta's rate is about the axis j
-    that theta has turned."""
+    """Return the residual of the last of rows 37 (in/s) with erratum 2 mended, when the others are solved.
+
+    The mended row takes the rate of eta about the axis j as turned by theta.
+    """
     _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
     zero = np.zeros_like(angle)
     pin = about_k(Dual(angle, shift)) @ about_i(Dual(zero, p.crank_length))
     front = pin @ about_k(q.th2) @ about_j(q.eta2) @ about_i(Dual(zero, p.rod_length))
-    # of a dual rotation the inverse is the transpose
+    # the inverse of a dual rotation is its transpose
     to_rod = Dual(np.swapaxes(front.real, -1, -2), np.swapaxes(front.dual, -1, -2))
     local = to_rod @ screws
     matrix = np.concatenate([local.real, local.dual / INCH], -2)
@@ -182,7 +188,7 @@ class Bodies(NamedTuple):
 
 
 def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
-    """The bodies of section 3.1, g3 = 0; ``erratum_6`` mends the signs of g1 and g2."""
+    """Return the bodies of section 3.1, g3 = 0; ``erratum_6`` mends the signs of g1 and g2."""
     side = -1.0 if erratum_6 else 1.0
     a1, a2 = p.crank_length / INCH, p.rod_length / INCH
     masses = [mass * INCH / POUND_FORCE for mass in (p.crank_mass, p.rod_mass, p.slider_mass)]
@@ -190,7 +196,7 @@ def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
 
 
 def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
-    """A dual vector (..., 3) of components that are numbers or arrays."""
+    """Build a dual vector (..., 3) of components that are numbers or arrays."""
     joined = np.stack(np.broadcast_arrays(*real, *dual), -1).astype(float)
     return Dual(joined[..., :3], joined[..., 3:])
 
@@ -198,10 +204,10 @@ def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
 def joint_forces(
     c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, torque: float, *, erratum_5: bool = False
 ) -> dict[str, FloatArray]:
-    """Components of all joint forces (lb) and moments (lb.in) by eqs 49a, 52a, 53a, 54, 57 to 61 and 69a to 69q.
+    """Return all joint forces (lb) and moments (lb.in) by eqs 49a, 52a, 53a, 54, 57 to 61 and 69a to 69q.
 
-    For a constant shift, in the plane, or but for the slip of 52a (g3 for g2), which is mended. ``erratum_5`` mends the signs
-    of f1 and f3 in eqs 62 and 64. 1F1k is 0, as the thesis has it.
+    The shift is constant. The equations hold in the plane, and otherwise but for the slip of 52a (g3 for g2), which is mended.
+    ``erratum_5`` mends the signs of f1 and f3 in eqs 62 and 64. 1F1k is 0, as in the thesis.
     """
     (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))
     w = c.speed
@@ -248,6 +254,6 @@ def joint_forces(
 
 
 def on_crank(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """1F1i and 1F1j by eqs 69i and 69j."""
+    """Return 1F1i and 1F1j by eqs 69i and 69j."""
     s, c = np.sin(angle), np.cos(angle)
     return f["along crank"] * c - f["across crank"] * s, f["along crank"] * s + f["across crank"] * c

@@ -1,13 +1,13 @@
-"""Which of Rahman's figures shows what: figures 5 to 38 as twelve quantities in two or three families of cases.
+"""Assignment of Rahman's figures 5 to 38: twelve quantities in two or three families of cases.
 
-Section 3.2 names the families by their figures: variable offset, variable axial shift, variable twist; the two torques have no
-figure of variable twist. The captions that are left, each above its number, say displacement, force or torque and what is held
-constant. Which force and which component stands under which number is our inference: in the order of section 3.2 the families
-leave one place for each component that it does not find to be constant.
+Section 3.2 assigns figures to the families: variable offset, variable axial shift, variable twist; the two torques have no
+figure of variable twist. The surviving captions, each above its number, name displacement, force or torque and the
+constant dimensions. The component of each figure is our inference: in the order of section 3.2, the families leave one
+place for each component that it does not find constant.
 
-The symbols are the thesis's: nFni is the force in joint n along i of frame n, nTni the moment. 1F1 and 1T1 are those of the
-ground on the crank and 2F2 is the force of the rod on the crank, since 2F2j = -T/a1; eq 63 then makes 3F3 that of the rod on
-the slider, and eq 64 makes 4F4 that of the ground on the slider.
+The symbols are the thesis's: nFni is the force in joint n along i of frame n, nTni the moment. 1F1 and 1T1 act from the
+ground on the crank, and 2F2 from the rod on the crank, since 2F2j = -T/a1. Then 3F3 acts from the rod on the slider by
+eq 63, and 4F4 from the ground on the slider by eq 64.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ INFERRED = (
 
 
 class Spot(NamedTuple):
-    """Values at theta1 = 30 deg, 50 rpm, branch +; the last two: slider force along -k4 at a torque of 100 lb.in, and the
-    torque that no slider force takes."""
+    """Values at theta1 = 30 deg, 50 rpm, branch +.
+
+    The last two are the slider force along -k4 at a torque of 100 lb.in, and the torque without a slider force.
+    """
 
     offset_in: float
     shift_in: float
@@ -36,12 +38,12 @@ class Spot(NamedTuple):
     torque_lb_in: float
 
 
-# The curves of the thesis's figures are not in the copy there is. Reference numbers are from an independent derivation of the
-# closed form, to the digits shown; nothing here is the output of this program.
+# The available copy lacks the curves of the figures. Reference numbers are from an independent derivation of the closed form,
+# to the digits shown; none is an output of this program.
 
-#: Where sections 3.2 and 3.3 see spikes (deg).
+#: Crank angles of the spikes in sections 3.2 and 3.3 (deg).
 SPIKES_DEG = (100.0, 300.0)
-#: How many spikes section 3.3 sees in a component (L1125); two in those not named here.
+#: Numbers of spikes that section 3.3 finds in a component (L1125): two in all others.
 SPIKES: Mapping[str, int] = MappingProxyType({"3F3j": 0, "3F3k": 1, "4F4k": 1})
 #: Shifts (in) up to which the thesis's iteration converges by a4 (in), and twists (deg) between which (L1121).
 SHIFTS_REACHED_IN: Mapping[float, float] = MappingProxyType({0.0: 1.5, 10.0: 3.5, 30.0: 9.0})
@@ -55,21 +57,21 @@ SPOTS = (
 DEAD_CENTRES_DEG: Mapping[float, tuple[float, float]] = MappingProxyType(
     {10.0: (99.28, 285.26), 20.0: (108.82, 301.76), 30.0: (118.94, 322.14)}
 )
-#: Strokes likewise.
+#: Strokes (in) at S1 = 0 and 270 deg, by the offset in inches.
 STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935})
 #: Strokes at a4 = 20 in and S1 = 0, by the twist in degrees.
 STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
 #: Greatest shifts at which the crank turns fully at 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2).
 GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})
-#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). That it is meant
-#: more than 10 deg from a dead centre is our reading: nearer to it there is no bound.
+#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). We read it as the
+#: greatest more than 10 deg from a dead centre, since it is unbounded there.
 AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = MappingProxyType(
     {(10.0, 3.5, 270.0): (4.1, 0.05), (20.0, 0.0, 310.0): (27.0, 0.5)}
 )
 
 
 class Case(NamedTuple):
-    """A mechanism of section 3.1: its name in titles and legends, a4 and S1 (in), alpha4 (deg)."""
+    """Mechanism of section 3.1: its name in titles and legends, a4 and S1 (in), alpha4 (deg)."""
 
     name: str
     offset_in: float
@@ -78,7 +80,7 @@ class Case(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Cases that differ in one dimension: what stands in the titles, what heads the legends, the cases."""
+    """Cases that differ in one dimension, with the texts of titles and legends."""
 
     title: str
     legend: str
@@ -86,11 +88,10 @@ class Family(NamedTuple):
 
 
 class Component(NamedTuple):
-    """A component of a force or moment: its symbol, what it is, its unit as printed, and where it comes from.
+    """Component of a force or moment: symbol, meaning, printed unit, and source.
 
-    ``source`` is a joint's vector of `analysis.slider_crank.ForceTurn`, of which it is the component along ``axis`` of
-    ``frame``, or one of the two forces that are along an axis, "axial_force" and "slider_force". ``sign`` turns the sense of
-    that one into the thesis's.
+    ``source`` is a vector of `analysis.slider_crank.ForceTurn`, of which this is the component along ``axis`` of ``frame``, or
+    one of the two axial forces, "axial_force" and "slider_force". ``sign`` converts its sense to the thesis's.
     """
 
     symbol: str
@@ -120,7 +121,7 @@ def _components() -> Iterator[Component]:
         for axis in "ijk":
             yield Component(symbol + axis, what, unit, source, sign)
     yield Component("1F1k", "ground on crank", "lb", "axial_force")
-    # along the guide it is the slider force that is sought, counted against k4 where it is a load
+    # along the guide the unknown slider force acts; as a load it is positive against k4
     yield Component("4F4k", "slider force sought", "lb", "slider_force", -1.0)
 
 
@@ -128,7 +129,7 @@ COMPONENTS: Mapping[str, Component] = MappingProxyType({component.symbol: compon
 
 
 class Figure(NamedTuple):
-    """A figure: the family of its cases, the components it shows (none for the slider's displacement), its place."""
+    """Figure: the family of its cases, its components (none for the slider displacement), its place."""
 
     family: str
     symbols: tuple[str, ...]
@@ -153,12 +154,12 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
 )
 #: The quantities in the order of section 3.2; the torques are not shown for variable twist.
 QUANTITIES = ("S4", "1F1i", "1F1j", "1T1i", "1T1j", "2F2i", *(f"{n}F{n}{axis}" for n in (3, 4) for axis in "ijk"))
-#: Lines of the scanned text with the captions that are left.
+#: Lines of the scanned text with the surviving captions.
 CAPTIONS: Mapping[int, int] = MappingProxyType(
     {6: 1153, 9: 1164, 10: 1170, 13: 1181, 14: 1187, 16: 1196, 19: 1208, 20: 1214, 24: 1229, 25: 1235, 26: 1241}
     | {28: 1249, 29: 1254, 31: 1262, 32: 1268, 33: 1273, 34: 1279, 35: 1284, 37: 1292, 38: 1298}
 )
-#: The study of what the thesis finds to be constant, and shows in no figure.
+#: The study of the components that the thesis finds constant and shows in no figure.
 CONSTANT = "rahman-constant"
 
 
@@ -175,7 +176,7 @@ def _figures() -> Iterator[Figure]:
             number += 1
 
 
-#: The figures by their number in the registry of studies, R and the thesis's, and what no figure shows.
+#: The figures by their number in the registry of studies (R and the thesis's), and the study without a figure.
 FIGURES: Mapping[str, Figure] = MappingProxyType(
     {f"R{number}": figure for number, figure in enumerate(_figures(), start=5)}
     | {

@@ -19,12 +19,13 @@ from math import asin, log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, DYN_CM_PER_NEWTON_METRE, RAD_S_PER_RPM
+from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import mean_effective_mass
 from ...run import Event, Inputs, Trajectory, simulate
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, text
 from . import free_crank
 from .runs import (
     LINEAR,
@@ -47,12 +48,12 @@ DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
 PERIOD = 60.0 / SPEED
 #: Transmission at which the coupler and the rocker count as collinear: |sin(th4 - th3)|.
 COLLINEAR_SINE = 0.3
-#: Turns over which the drift is followed.
+#: Turns of a run without a spring.
 DRIFT_TURNS = 40
 SAMPLES_PER_DRIFT_TURN = 120
 #: By damping (dyn.s/cm): turns at which coupler and rocker are collinear, and half a unit of the last figure given.
 COLLINEAR = {1e4: (3.0, 0.05), 5e4: (4.9, 0.05), 1e5: (8.0, 0.05), 5e5: (36.0, 0.5)}
-#: Dampers (dyn.s/cm) with which the drift has a rate.
+#: Dampers (dyn.s/cm) with which the drift is nearly linear.
 NEAR_LINEAR = (5e5, 1e6)
 #: By stiffness (dyn/cm): crank angle of the least position (deg) and mean position (cm).
 STEADY = {5e5: (23.45, -0.611), 1e6: (17.5, -0.280), 2e6: (5.2, -0.142)}
@@ -74,9 +75,9 @@ def _k(stiffness: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """The slider without a spring: turns of the crank, slider position (cm), and the turn at which the links line up.
+    """Motion of the slider without a spring: turns of the crank, slider position (cm), turn at which the links are collinear.
 
-    ``collinear_turn`` is NaN if they never do.
+    ``collinear_turn`` is NaN if they never are.
     """
 
     turns: NDArray[np.float64]
@@ -84,17 +85,17 @@ class Drift:
     collinear_turn: float
 
     def turn(self, number: int) -> NDArray[np.float64]:
-        """Slider position over a turn (cm), the first being turn 1; ends included."""
+        """Return the slider position over a turn (cm), counted from 1, both ends included."""
         n = SAMPLES_PER_DRIFT_TURN
         return self.slider_cm[(number - 1) * n : number * n + 1]
 
     def per_turn(self, number: int) -> float:
-        """Drift over a turn (cm)."""
+        """Return the drift over a turn (cm)."""
         return float(self.turn(number)[-1] - self.turn(number)[0])
 
     @property
     def until_collinear(self) -> NDArray[np.float64]:
-        """Slider position until the links line up (cm), NaN from there on."""
+        """Slider position (cm), NaN from the moment the links are collinear."""
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
     @property
@@ -104,14 +105,14 @@ class Drift:
 
     @property
     def unsteadiness(self) -> float:
-        """How much the motion over the fourth turn differs in shape from that over the third, relative to its swing."""
+        """Difference in shape between the motions over the fourth and the third turn, relative to the range of the fourth."""
         line = np.linspace(0.0, self.per_turn(4), SAMPLES_PER_DRIFT_TURN + 1)
         return float(np.ptp(self.turn(4) - self.turn(3)) / np.ptp(self.turn(4) - line))
 
 
 @cache
 def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Table 3.1 at 420 rpm without a spring; ends at the limit of assembly."""
+    """Run Table 3.1 at 420 rpm without a spring, up to the limit of assembly."""
     angle = asin(COLLINEAR_SINE)
     run = simulate(
         table_3_1(0.0, damping, gravity),
@@ -128,7 +129,7 @@ def drift(damping: float, gravity: float = 9.81) -> Drift:
 
 
 def drift_result() -> StudyResult:
-    """Drift of the slider with the five dampers, how far from linear it is, and when the links line up."""
+    """Compute the drift with the five dampers, its departure from a line, and when the links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
     settling, shapes, drifts, folds = [], [], [], []
     for mu, run in runs.items():
@@ -138,19 +139,19 @@ def drift_result() -> StudyResult:
             f"turns of a transient down to 5 %; {_mu(mu)}",
             "" if mu == 1e4 else "the damper ends it sooner",
         )
-        settling.append(near(statement, TEXT, 2.0, turns, 0.5, place="L1907", why=why))
+        settling.append(near(statement, text("L1907"), 2.0, turns, 0.5, why=why))
         statement, why = f"third turn's drift relative to the first's; {_mu(mu)}", "" if mu >= 5e5 else "it accelerates"
-        drifts.append(near(statement, TEXT, 1.0, run.growth, LINEAR, place="L1911", why=why))
+        drifts.append(near(statement, text("L1911"), 1.0, run.growth, LINEAR, why=why))
         if mu > 1e4:
             statement = (
                 f"change of the motion's shape from the third turn to the fourth, relative to its range; {_mu(mu)}"
             )
-            shapes.append(at_most(statement, TEXT, LINEAR, run.unsteadiness, place="L1909", why=why))
+            shapes.append(at_most(statement, text("L1909"), LINEAR, run.unsteadiness, why=why))
         if mu in COLLINEAR:
             stated, tolerance = COLLINEAR[mu]
             folds.append(near(f"links collinear; {_mu(mu)}", OURS, stated, run.collinear_turn, tolerance, "turns"))
     rates = greatest_ratio(np.array([run.per_turn(3) for run in runs.values()]))
-    # with the strongest damper they never are
+    # with the strongest damper the links never are collinear
     sooner = greatest_ratio(np.array([runs[mu].collinear_turn for mu in reversed(COLLINEAR)]))
     gain = min(abs(run.per_turn(3)) - abs(run.per_turn(1)) for run in runs.values())
     columns = {TURNS: max((run.turns for run in runs.values()), key=len)}
@@ -162,8 +163,8 @@ def drift_result() -> StudyResult:
         columns=padded(columns),
         verdicts=(
             *(*settling, *shapes, *drifts),
-            at_most("third turn's drift relative to that with the next weaker damper", TEXT, 1.0, rates, place="L1917"),
-            at_most("turns until collinear relative to the next stronger damper", TEXT, 1.0, sooner, place="L1919"),
+            at_most("third turn's drift relative to that with the next weaker damper", text("L1917"), 1.0, rates),
+            at_most("turns until collinear relative to the next stronger damper", text("L1919"), 1.0, sooner),
             at_least("third turn's drift less the first's, least of all dampers", OURS, 0.0, gain, "cm"),
             *folds,
         ),
@@ -171,7 +172,7 @@ def drift_result() -> StudyResult:
 
 
 def weightless_result() -> StudyResult:
-    """Drift with and without gravity for the five dampers."""
+    """Compute the drift with and without gravity for the five dampers."""
     columns = {TURNS: max((drift(mu).turns for mu in DAMPINGS), key=len)}
     for mu in DAMPINGS:
         columns[f"slider position u; {_mu(mu)} [cm]"] = drift(mu).until_collinear
@@ -181,10 +182,8 @@ def weightless_result() -> StudyResult:
         weighing, weightless = (sum(drift(mu, g).per_turn(n) for n in (1, 2, 3)) / 3.0 for g in (9.81, 0.0))
         ratio, statement = weightless / weighing, f"M without gravity less M with it; {_mu(mu)}"
         verdicts += [
-            at_most(
-                f"size of M without gravity over that with it; {_mu(mu)}", TEXT, 1.0, ratio, place="L1930", why=why
-            ),
-            at_most(statement, TEXT, 0.0, weightless - weighing, "cm a turn", place="L1930"),
+            at_most(f"size of M without gravity over that with it; {_mu(mu)}", text("L1930"), 1.0, ratio, why=why),
+            at_most(statement, text("L1930"), 0.0, weightless - weighing, "cm a turn"),
             near(f"drift over three turns without gravity over that with it; {_mu(mu)}", OURS, 1.25, ratio, 0.03),
         ]
     for words, g, stated in (("with gravity", 9.81, -1.93), ("without gravity", 0.0, -2.38)):
@@ -199,7 +198,7 @@ def weightless_result() -> StudyResult:
 
 
 def draw_drift(result: StudyResult) -> Figure:
-    """Drift over the first turns and over many; a cross where the links line up, or dashed what is without gravity."""
+    """Draw the drift over the first turns and over many, with a cross at collinear links or dashed curves without gravity."""
     turns = result.columns[TURNS]
     curves, others = [], []
     for colour, mu in zip(COLOURS, DAMPINGS):
@@ -231,7 +230,7 @@ def draw_drift(result: StudyResult) -> Figure:
 
 @cache
 def from_rest(stiffness: float) -> Trajectory:
-    """Three turns from the thesis's start, th2 = u = u' = 0."""
+    """Run three turns from the thesis's start, th2 = u = u' = 0."""
     inputs = Inputs(speed=SPEED * RAD_S_PER_RPM)
     return simulate(table_3_1(stiffness), inputs, stop_time=3.0 * PERIOD, step=PERIOD / 360.0)
 
@@ -241,7 +240,7 @@ def _steady(stiffness: float) -> SteadyTurn:
 
 
 def steady_result() -> StudyResult:
-    """The motion from rest and the steady turn with each spring."""
+    """Compute the motion from rest and the steady turn with each spring."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     columns = {ANGLE: turns[1e6].angle_deg}
     columns |= {f"slider position u; {_k(k)} [cm]": turn.slider_cm for k, turn in turns.items()}
@@ -258,7 +257,7 @@ def steady_result() -> StudyResult:
 
 
 def _steady_verdicts() -> list[Verdict]:
-    """Verdicts on transient, mean and least position, and the reference numbers."""
+    """Judge transient, mean and least position, and compare with reference numbers."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     places = {k: least(turn.angle_deg, turn.slider_cm)[0] for k, turn in turns.items()}
     means = {k: turn.slider_cm[:-1].mean() for k, turn in turns.items()}
@@ -268,28 +267,21 @@ def _steady_verdicts() -> list[Verdict]:
         away = np.abs(second - turn.slider_cm[:-1:4]).max() / np.ptp(turn.slider_cm)
         statement = f"distance from the steady motion in the second turn, relative to its range; {_k(k)}"
         why = "" if k == 2e6 else "the transient goes on"
-        verdicts.append(at_most(statement, TEXT, ON_THE_GRAPH, away, place="L1948", why=why))
+        verdicts.append(at_most(statement, text("L1948"), ON_THE_GRAPH, away, why=why))
     change, softer = (
         max(turn.change for turn in turns.values()),
         "{} relative to that with the next softer spring".format,
     )
     sooner, nearer = (greatest_ratio(np.array(list(x.values()))) for x in (places, means))
     verdicts += [
-        at_most("change of u from one turn to the next", TEXT, 1e-7, change, "cm", place="L1950"),
-        at_most("mean of u, greatest of the three springs", TEXT, 0.0, max(means.values()), "cm", place="L1952"),
-        at_most(softer("mean of u"), TEXT, 1.0, nearer, place="L1954"),
-        # 22 was read from a figure, and so was 0
-        near(f"crank angle of the least u; {_k(5e5)}", TEXT, 22.0, places[5e5], 2.0, "deg", place="L1962"),
-        at_most(softer("crank angle of the least u"), TEXT, 1.0, sooner, place="L1964"),
+        at_most("change of u from one turn to the next", text("L1950"), 1e-7, change, "cm"),
+        at_most("mean of u, greatest of the three springs", text("L1952"), 0.0, max(means.values()), "cm"),
+        at_most(softer("mean of u"), text("L1954"), 1.0, nearer),
+        # 22 and 0 were read from a figure
+        near(f"crank angle of the least u; {_k(5e5)}", text("L1962"), 22.0, places[5e5], 2.0, "deg"),
+        at_most(softer("crank angle of the least u"), text("L1964"), 1.0, sooner),
         near(
-            f"crank angle of the least u; {_k(2e6)}",
-            TEXT,
-            0.0,
-            places[2e6],
-            2.0,
-            "deg",
-            place="L1966",
-            why="it comes later",
+            f"crank angle of the least u; {_k(2e6)}", text("L1966"), 0.0, places[2e6], 2.0, "deg", why="it comes later"
         ),
     ]
     for k, (angle, mean) in STEADY.items():
@@ -300,7 +292,7 @@ def _steady_verdicts() -> list[Verdict]:
 
 
 def _shape_verdicts() -> list[Verdict]:
-    """Verdicts on the slopes between the least and the greatest position, and on the width of the curves."""
+    """Judge the slopes between the least and the greatest position, and the width of the curves."""
     turns = [_steady(k) for k in STIFFNESSES]
     ends = np.array([[find(t.angle_deg, t.slider_cm)[0] for find in (least, greatest)] for t in turns])
     widths, ranges = np.diff(ends, axis=1)[:, 0] % 360.0, np.array([np.ptp(t.slider_cm) for t in turns])
@@ -317,24 +309,16 @@ def _shape_verdicts() -> list[Verdict]:
         "the slider swings on its spring",
     )
     return [
-        near(same("least", "greatest"), TEXT, 1.0, rise, 0.2, place="L1968", why=steeper),
-        near(same("greatest", "least"), TEXT, 1.0, fall, 0.2, place="L1968"),
-        at_most(width("in crank angle from least to greatest"), TEXT, 1.0, greatest_ratio(widths), place="L1976"),
-        at_most(width("in u from least to greatest"), TEXT, 1.0, greatest_ratio(ranges), place="L1976", why=wider),
-        near(
-            f"range of the slope of the fall over its mean; {_k(1e7)}",
-            TEXT,
-            0.0,
-            varies,
-            0.2,
-            place="L1980",
-            why=swings,
-        ),
+        near(same("least", "greatest"), text("L1968"), 1.0, rise, 0.2, why=steeper),
+        near(same("greatest", "least"), text("L1968"), 1.0, fall, 0.2),
+        at_most(width("in crank angle from least to greatest"), text("L1976"), 1.0, greatest_ratio(widths)),
+        at_most(width("in u from least to greatest"), text("L1976"), 1.0, greatest_ratio(ranges), why=wider),
+        near(f"range of the slope of the fall over its mean; {_k(1e7)}", text("L1980"), 0.0, varies, 0.2, why=swings),
     ]
 
 
 def draw_steady(result: StudyResult) -> Figure:
-    """The motion from the start over three turns, and the steady turns with a cross at each least position."""
+    """Draw the motion from the start over three turns, and the steady turns with a cross at each least position."""
     columns = result.columns
     from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in STIFFNESSES}
     names = [f"slider position u; {_k(k)} [cm]" for k in STIFFNESSES]
@@ -366,7 +350,7 @@ def draw_steady(result: StudyResult) -> Figure:
 
 
 def torque_result() -> StudyResult:
-    """The torque over the steady turn with each spring, and where it depends on the spring."""
+    """Compute the torque over the steady turn with each spring, and where it depends on the spring."""
     turns = {k: _steady(k) for k in STIFFNESSES}
     angle, torque = turns[1e6].angle_deg, turns[1e6].torque
     # in dyn.cm, as stated
@@ -394,29 +378,19 @@ def torque_result() -> StudyResult:
         "extremes, where the slider's accelerations differ.",
         columns=columns,
         verdicts=(
-            near("crank angle of the sudden reversal", TEXT, 0.0, reversal, 10.0, "deg", place="L1993"),
-            at_most("difference between springs 30 deg from extremes", TEXT, ON_THE_GRAPH, elsewhere, place="L1995"),
-            near(
-                nearest("torque"),
-                TEXT,
-                0.0,
-                away[spread.argmax()],
-                10.0,
-                "deg",
-                place="L1999, L2019",
-                why=in_the_reversal,
-            ),
+            near("crank angle of the sudden reversal", text("L1993"), 0.0, reversal, 10.0, "deg"),
+            at_most("difference between springs 30 deg from extremes", text("L1995"), ON_THE_GRAPH, elsewhere),
+            near(nearest("torque"), text("L1999, L2019"), 0.0, away[spread.argmax()], 10.0, "deg", why=in_the_reversal),
             near(
                 nearest("slider's acceleration"),
-                TEXT,
+                text("L2001, L2023"),
                 0.0,
                 away[2 + accelerations.argmax()],
                 10.0,
                 "deg",
-                place="L2001, L2023",
                 why="they differ most where the torque hardly does",
             ),
-            at_most("mean torque beyond the damper's, over the peak", TEXT, 1e-5, unpaid, place="L2007-2017"),
+            at_most("mean torque beyond the damper's, over the peak", text("L2007-2017"), 1e-5, unpaid),
             near("difference between k = 5e5 and 2e6, relative to the peak", OURS, 0.096, spread.max(), 5e-4),
             near("greatest torque; k = 1e6 dyn/cm", OURS, 1.46e7, high, 0.005e7, "dyn.cm"),
             near("crank angle of the greatest torque", OURS, 327.0, high_at, 0.5, "deg"),
@@ -427,7 +401,7 @@ def torque_result() -> StudyResult:
 
 
 def draw_torque(result: StudyResult) -> Figure:
-    """The three torques over a turn."""
+    """Draw the three torques over a turn."""
     panel = Panel(
         x_label="crank angle [deg]",
         y_label="crank torque [N m]",

@@ -30,15 +30,15 @@ from ...youssef import (
     slider_equation,
     two_harmonics,
 )
-from ..study import LISTING, OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, listing, near, text
 
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
 #: Inertia ratios I4 whose resonances by appendix 2 are known.
 INERTIA_RATIOS = (0.5, 1.0, 1.5)
-#: Resonance (rad/s) by I4: of appendix 2 when run, and right. The determinant vanishes at two speeds: these are the lower ones,
-#: but for the listing's at I4 = 1.5.
+#: Resonance (rad/s) by I4: by appendix 2 when run, and exact. The determinant vanishes at two speeds, of which these are the
+#: lower ones, except the listing's at I4 = 1.5.
 RESONANCES = {0.5: (31.0763, 31.0975), 1.0: (30.5572, 30.5979), 1.5: (30.0645, 30.1220)}
-#: The same at I4 = 1 of the printed coefficients.
+#: Resonance (rad/s) at I4 = 1 by the printed coefficients.
 PRINTED_RESONANCE = 30.6120
 #: Variants that are compared, by their names in legends.
 VARIANTS = {Variant.EXACT: "right", Variant.PRINTED: "(4.21) as printed", Variant.FORTRAN: "listing of appendix 2"}
@@ -46,28 +46,28 @@ VARIANTS = {Variant.EXACT: "right", Variant.PRINTED: "(4.21) as printed", Varian
 SPEEDS = np.unique(
     np.concatenate([np.arange(9.0, 40.05, 0.1), np.arange(15.0, 15.8, 0.005), np.arange(30.0, 31.3, 0.005)]).round(3)
 )
-#: Those outside the regions of resonance.
+#: Mask of the speeds outside the regions of resonance.
 APART = (np.abs(SPEEDS - 15.5) > 1.0) & (np.abs(SPEEDS - 31.0) > 2.0)
 #: omega_c = mu/(m4 + m5) (1/s) of appendix 2: it raises mu by 200 dyn.s/cm after each curve, and m4 + m5 is 1000 g.
 DAMPERS = tuple(0.2 * n for n in range(1, 7))
-#: omega_c (1/s) at which the second harmonics are compared: the thesis's, which removes all instability.
+#: omega_c (1/s) of the comparison of second harmonics: the thesis's, which removes all instability.
 COMPARED_AT = 0.45
-#: Least amplitude in what we call the region of resonance, and how far from the resonance we call it outside (rad/s).
+#: Least amplitude in the region of resonance, and least distance of the outside from the resonance (rad/s): our choice.
 LARGE, OUTSIDE = 0.1, 3.0
-#: What we take "may be neglected" and "not affected on the scale of the graph" to mean.
+#: Our readings of "may be neglected" and "not affected on the scale of the graph".
 NEGLIGIBLE, UNSEEN = 0.1, 0.01
 
 
 @cache
 def equation(inertia_ratio: float, variant: Variant) -> SliderEquation:
-    """The equation at 1 rad/s: without gravity only its spring and its damper depend on the speed."""
+    """Return the linear equation at 1 rad/s: without gravity only its spring and its damper depend on the speed."""
     return slider_equation(chapter_4(inertia_ratio), 1.0, variant=variant, form=Form.RESONANCE)
 
 
 def linear(
     speed: float, inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> HarmonicMotion:
-    """zeta by the thesis's two harmonics."""
+    """Return zeta by the thesis's two harmonics."""
     once = equation(inertia_ratio, variant)
     return two_harmonics(replace(once, spring=SQUARE_OF_OMEGA_K / speed**2, damping=omega_c / speed))
 
@@ -75,12 +75,12 @@ def linear(
 def harmonic(
     n: int, speeds: NDArray[np.float64], inertia_ratio: float, omega_c: float = 0.0, variant: Variant = Variant.EXACT
 ) -> NDArray[np.float64]:
-    """Amplitude of the n-th harmonic over the speed."""
+    """Return the amplitude of the n-th harmonic over the speed."""
     return np.array([linear(speed, inertia_ratio, omega_c, variant).harmonic(n) for speed in speeds.tolist()])
 
 
 def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Variant.EXACT) -> tuple[float, float]:
-    """Speed (rad/s) and size of the greatest n-th harmonic near its resonance."""
+    """Return speed (rad/s) and size of the greatest n-th harmonic near its resonance."""
     middle = 0.5 * sum(resonance(chapter_4(inertia_ratio), variant=variant, harmonic=n))
     found = minimize_scalar(
         lambda speed: -linear(speed, inertia_ratio, omega_c, variant).harmonic(n),
@@ -95,7 +95,7 @@ def peak(n: int, inertia_ratio: float, omega_c: float, variant: Variant = Varian
 
 
 def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
-    """The n-th harmonic over the speed: three I4, and I4 = 1 by each variant."""
+    """Return the n-th harmonic over the speed, for three I4 by the exact equation and for I4 = 1 by each variant."""
     columns = {"speed [rad/s]": SPEEDS}
     for ratio in INERTIA_RATIOS:
         for variant, name in VARIANTS.items():
@@ -105,7 +105,7 @@ def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
 
 
 def growth_verdicts(columns: dict[str, NDArray[np.float64]], n: int, place: str) -> list[Verdict]:
-    """Amplitudes and widths of the region of resonance for a larger I4 against those for a smaller one."""
+    """Judge whether amplitudes and the width of the resonance grow with I4."""
     curves = [columns[f"I4 = {ratio:g}; right [1]"] for ratio in INERTIA_RATIOS]
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
     level = LARGE if n == 1 else 0.1 * LARGE
@@ -113,20 +113,19 @@ def growth_verdicts(columns: dict[str, NDArray[np.float64]], n: int, place: str)
     widths = [np.count_nonzero(harmonic(n, near_it, ratio) > level) for ratio in INERTIA_RATIOS]
     return [
         at_least(
-            "amplitude outside the resonance to that at the next smaller I4, least", TEXT, 1.0, min(ratios), place=place
+            "amplitude outside the resonance to that at the next smaller I4, least", text(place), 1.0, min(ratios)
         ),
         at_least(
             f"width of the region of resonance, amplitudes above {level:g}, at I4 = 1.5 to that at 0.5",
-            TEXT,
+            text(place),
             1.0,
             widths[2] / widths[0],
-            place=place,
         ),
     ]
 
 
 def compute_first() -> StudyResult:
-    """Fig 4.3, and where the determinant vanishes."""
+    """Compute Fig 4.3, and the speeds at which the determinant vanishes."""
     columns = undamped_columns(1)
     verdicts = []
     for ratio, (listed, reference) in RESONANCES.items():
@@ -135,22 +134,20 @@ def compute_first() -> StudyResult:
         verdicts += [
             at_most(
                 f"distance of the resonance below omega_k; I4 = {ratio:g}",
-                TEXT,
+                text("L3139-3143"),
                 1.0,
                 OMEGA_K - lower,
                 "rad/s",
-                place="L3139-3143",
                 why="" if ratio < 1.0 else "reached at I4 = 0.97",
             ),
-            at_most(f"resonance against omega_k; I4 = {ratio:g}", TEXT, OMEGA_K, upper, "rad/s", place="L3141, L3188"),
+            at_most(f"resonance against omega_k; I4 = {ratio:g}", text("L3141, L3188"), OMEGA_K, upper, "rad/s"),
             near(
                 f"resonance; I4 = {ratio:g}",
-                LISTING,
+                listing("appendix 2"),
                 listed,
                 lower,
                 5.1e-5,
                 "rad/s",
-                place="appendix 2",
                 why="M' zeta' is missing, terms in the crank's length are halved",
             ),
             near(f"resonance; I4 = {ratio:g}", OURS, reference, lower, 5.1e-5, "rad/s"),
@@ -162,10 +159,9 @@ def compute_first() -> StudyResult:
     verdicts += [
         at_least(
             "A1 or D1 to the greatest first harmonic of (4.21), whose factor cannot be read; I4 = 1",
-            TEXT,
+            text("L2797-2801"),
             1.0,
             min(raw.mass.mean, raw.spring_factor.mean) / max(2.0 * abs(wave[-1]) for wave in waves),
-            place="L2797-2801",
         ),
         near("resonance by the printed coefficients; I4 = 1", OURS, PRINTED_RESONANCE, printed, 5.1e-5, "rad/s"),
         *growth_verdicts(columns, 1, "L3156-3162, L3197"),
@@ -180,7 +176,7 @@ def compute_first() -> StudyResult:
 
 
 def compute_second() -> StudyResult:
-    """Fig 4.4: the second harmonic, how it compares with the first, and by how much the listing's is too small."""
+    """Compute Fig 4.4: the second harmonic, its size beside the first, and the error of the listing."""
     columns = undamped_columns(2)
     step = 0.005
     resonant = np.arange(14.5, 16.5, step)
@@ -195,35 +191,28 @@ def compute_second() -> StudyResult:
     verdicts = [
         at_most(
             "resonance of the second harmonic, highest of the three I4, against omega_k / 2",
-            TEXT,
+            text("L3188-3195"),
             0.5 * OMEGA_K,
             max(resonance(chapter_4(ratio), harmonic=2)[1] for ratio in INERTIA_RATIOS),
             "rad/s",
-            place="L3188-3195",
         ),
         at_most(
-            "second harmonic to the first, greatest from 20 to 40 rad/s",
-            TEXT,
-            NEGLIGIBLE,
-            small,
-            place="L3162-3168, L3210",
+            "second harmonic to the first, greatest from 20 to 40 rad/s", text("L3162-3168, L3210"), NEGLIGIBLE, small
         ),
         at_most(
             "range of speeds near omega_k / 2 in which the second harmonic is greater than the first, widest",
-            TEXT,
+            text("L3162-3168, L3210"),
             0.0,
             max(exceeds),
             "rad/s",
-            place="L3162-3168, L3210",
             why="it resonates there",
         ),
         near(
             "second harmonic at its resonance; I4 = 1, omega_c = 0.45 1/s",
-            LISTING,
+            listing("appendix 2"),
             listed,
             right,
             0.01 * listed,
-            place="appendix 2",
             why="M' zeta' is missing, terms in the crank's length are halved",
         ),
         near("the same, right to that of the listing as transcribed", OURS, 7.0, right / listed, 0.5),
@@ -240,7 +229,7 @@ def compute_second() -> StudyResult:
 
 
 def draw_undamped(result: StudyResult, n: int) -> Figure:
-    """The three inertia ratios, and the variants close to the resonance."""
+    """Draw the three inertia ratios, and the variants close to the resonance."""
     c, word = result.columns, ("first", "second")[n - 1]
     three = {f"I4 = {ratio:g}": c[f"I4 = {ratio:g}; right [1]"] for ratio in INERTIA_RATIOS}
     variants = {name: c[f"I4 = 1; {name} [1]"] for name in VARIANTS.values()}
@@ -270,7 +259,7 @@ RATIOS = np.arange(0.0, 2.01, 0.25)
 
 
 def compute_deviation() -> StudyResult:
-    """Fig 4.5: how far the resonance lies below omega_k."""
+    """Compute Fig 4.5: the distance of the resonance below omega_k."""
     columns = {"inertia ratio I4 [1]": RATIOS}
     for variant, name in VARIANTS.items():
         columns[f"omega_k less resonance; {name} [rad/s]"] = np.array(
@@ -290,25 +279,23 @@ def compute_deviation() -> StudyResult:
         verdicts=(
             at_most(
                 "greatest distance of the deviation from a straight line through zero, of it; I4 up to 1.5",
-                TEXT,
+                text("L3148-3150"),
                 0.05,
                 bent,
-                place="L3148-3150",
             ),
-            near("deviation at I4 = 0", TEXT, 0.0, deviation[0], 1e-6, "rad/s", place="L3150"),
+            near("deviation at I4 = 0", text("L3150"), 0.0, deviation[0], 1e-6, "rad/s"),
             at_most(
                 "what the equation at I4 = 0 has beyond a mass on a spring, greatest coefficient",
-                TEXT,
+                text("L3152-3156"),
                 1e-12,
                 rest,
-                place="L3152-3156",
             ),
         ),
     )
 
 
 def draw_deviation(result: StudyResult) -> Figure:
-    """The deviation by each variant."""
+    """Draw the deviation by each variant."""
     names = (name for name in result.columns if name.startswith("omega_k"))
     curves = [
         Curve(x=RATIOS, y=result.columns[column], label=name, line=line)
@@ -327,12 +314,12 @@ def draw_deviation(result: StudyResult) -> Figure:
 # Figures 4.6 and 4.7
 
 CLOSE = np.arange(27.0, 35.01, 0.02)
-#: The damper at which the plant's amplitude, a fifth of the rocker's length, is still a small motion (1/s).
+#: Damper (1/s) that limits the plant's amplitude to a fifth of the rocker's length, still a small motion.
 STRONGEST = DAMPERS[-1]
 
 
 def free_frequency(inertia_ratio: float, omega_c: float) -> float:
-    """Frequency of the free motion (rad/s), from the Floquet multipliers at 20 rad/s."""
+    """Return the frequency of the free motion (rad/s), from the Floquet multipliers at 20 rad/s."""
     speed = 20.0
     found = slider_equation(chapter_4(inertia_ratio, omega_c), speed)
     multiplier = hill_multipliers(found.homogeneous().stiffened(found.spring))[0]
@@ -342,12 +329,12 @@ def free_frequency(inertia_ratio: float, omega_c: float) -> float:
 
 
 def eliminating(inertia_ratio: float, amplitude: float) -> float:
-    """omega_c (1/s) that keeps the peak of the first harmonic down to an amplitude."""
+    """Find the omega_c (1/s) that limits the peak of the first harmonic to an amplitude."""
     return float(brentq(lambda d: peak(1, inertia_ratio, d)[1] - amplitude, 0.1, 10.0, xtol=1e-6))
 
 
 def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
-    """First harmonic of a single mass on a spring: the means of M and K alone."""
+    """Return the first harmonic of a single mass on a spring, with the means of M and K alone."""
     found = equation(inertia_ratio, Variant.EXACT)
     stiffness = SQUARE_OF_OMEGA_K / CLOSE**2 + found.stiffness.mean - found.mass.mean
     amplitude: NDArray[np.float64] = found.force.amplitudes[1] / np.abs(stiffness + 1j * omega_c / CLOSE)
@@ -355,7 +342,7 @@ def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
 
 
 def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
-    """Fig 4.6 and 4.7: the first harmonic with the listing's dampers."""
+    """Compute Fig 4.6 or 4.7: the first harmonic with the dampers of the listing."""
     columns = {"speed [rad/s]": CLOSE}
     for omega_c in (0.0, *DAMPERS):
         columns[f"omega_c = {omega_c:g} 1/s; right [1]"] = harmonic(1, CLOSE, inertia_ratio, omega_c)
@@ -373,34 +360,30 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
         at_most(
             f"change of the amplitude by omega_c = {STRONGEST:g} 1/s farther than {OUTSIDE:g} rad/s from the resonance, of the "
             f"peak at {DAMPERS[0]:g}",
-            TEXT,
+            text("L3176-3178, L3203"),
             UNSEEN,
             np.abs(strong - none)[outside].max() / tallest[1],
-            place="L3176-3178, L3203",
         ),
         at_most(
             f"shift of the peak from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
-            TEXT,
+            text("L3178-3180"),
             0.0,
             1e3 * shift,
             "mrad/s",
-            place="L3178-3180",
             why="the force grows with the square of the speed",
         ),
         at_most(
             f"shift of the frequency of the free motion from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s",
-            TEXT,
+            text("L3178-3180"),
             0.0,
             1e3 * (free_frequency(inertia_ratio, STRONGEST) - free_frequency(inertia_ratio, DAMPERS[0])),
             "mrad/s",
-            place="L3178-3180",
         ),
         at_most(
             f"amplitude less that of one mass on a spring, of the peak; omega_c = {DAMPERS[0]:g} 1/s",
-            TEXT,
+            text("L3206-3208"),
             0.05,
             np.abs(weak - one_mass(inertia_ratio, DAMPERS[0])).max() / tallest[1],
-            place="L3206-3208",
         ),
         near(f"peak relative to F1/lambda_c; omega_c = {DAMPERS[0]:g} 1/s", OURS, 1.0, tallest[1] / alone, 0.02),
         near(
@@ -416,10 +399,9 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
         verdicts.append(
             at_most(
                 f"damper that keeps the amplitude below {level:g}, to that at I4 = 1",
-                TEXT,
+                text("L3182-3184"),
                 1.0,
                 eliminating(inertia_ratio, level) / eliminating(1.0, level),
-                place="L3182-3184",
             )
         )
     return StudyResult(
@@ -432,7 +414,7 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """All dampers by the right equation, and the strongest by each variant and the plant."""
+    """Draw all dampers by the exact equation, and the strongest by each variant and the plant."""
     c = result.columns
     dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; right [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [

@@ -32,7 +32,7 @@ from ...youssef import (
     perturbed_boundary,
     perturbed_region,
 )
-from ..study import LISTING, OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, listing, near, padded, text, unjudged
 from .regions import (
     LOOKS,
     WAYS,
@@ -47,7 +47,7 @@ from .regions import (
     run_verdicts,
 )
 
-#: First region in lambda_k^2 by I4: the right one, and by appendix 3 when run.
+#: First region in lambda_k^2 by I4: exact, and by appendix 3 when run.
 RIGHT: Mapping[float, tuple[float, float]] = {
     0.5: (0.258298, 0.259203),
     1.0: (0.266540, 0.268367),
@@ -58,18 +58,18 @@ APPENDIX_3: Mapping[float, tuple[float, float]] = {
     1.0: (0.26580, 0.27054),
     1.5: (0.27382, 0.28069),
 }
-#: omega_c (1/s) that removes the region up to I4 = 1.5: as stated, by appendix 4 when run, and right.
+#: omega_c (1/s) that removes the region up to I4 = 1.5: as stated, by appendix 4 when run, and exact.
 STATED, LISTED, REMOVING = 0.45, 0.459, 0.167
 #: Why some numbers of Fig 5.2 and 5.3 fail.
 LISTED_RATIO = "I4 = 0.5, which the listing has (L8641)"
-#: What we take "narrow" and "negligible" to mean.
+#: Our readings of "narrow" and "negligible".
 NARROW, NEGLIGIBLE = 0.05, 0.1
 # Figures 5.1 to 5.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """The first region over a parameter: its symbol and values, the mechanism at one, and what the figure says of it."""
+    """First region over a parameter: symbol and values, mechanism at a value, and the verdicts of the figure."""
 
     number: str
     symbol: str
@@ -84,7 +84,7 @@ class Sweep:
 
 @cache
 def regions(name: str) -> dict[str, list[Region]]:
-    """The regions of a sweep by way; of its further mechanisms those of the true orbit, by name."""
+    """Return the regions of a sweep by method, and the regions of the true orbit of its further mechanisms."""
     sweep = SWEEPS[name]
     found = {way: [of(sweep.mechanism(x)) for x in sweep.values] for way, of in WAYS.items()}
     for way, mechanism in (sweep.further or {}).items():
@@ -93,30 +93,29 @@ def regions(name: str) -> dict[str, list[Region]]:
 
 
 def widths(found: Iterable[Region]) -> NDArray[np.float64]:
-    """Widths in lambda_k^2."""
+    """Return the widths of regions in lambda_k^2."""
     return np.array([region.width for region in found])
 
 
 def axes(found: Iterable[Region]) -> NDArray[np.float64]:
-    """A of each."""
+    """Return the axis A of each region."""
     return np.array([axis(region) for region in found])
 
 
 def second_verdict(sweep: Sweep) -> Verdict:
-    """The second region, of which the text says in all three figures that it is negligible."""
+    """Judge the width of the second region, which the text calls negligible for all three figures."""
     ratios = [hill(p, 2).width / hill(p).width for p in map(sweep.mechanism, sweep.values)]
     return at_most(
         "width of the second region to that of the first, greatest",
-        TEXT,
+        text("L3902-3906"),
         NEGLIGIBLE,
         max(ratios),
-        place="L3902-3906",
         why="the terms of first order largely cancel in the width of the first",
     )
 
 
 def compute_sweep(number: str) -> StudyResult:
-    """The regions over a parameter."""
+    """Compute the regions over a parameter."""
     sweep, found = SWEEPS[number], regions(number)
     columns = {f"{sweep.symbol} [1]": np.array(sweep.values)}
     for way, these in found.items():
@@ -132,7 +131,7 @@ def compute_sweep(number: str) -> StudyResult:
 
 
 def draw_sweep(result: StudyResult) -> Figure:
-    """The regions, and their widths."""
+    """Draw the regions and their widths."""
     c, sweep = result.columns, SWEEPS[result.number]
     values = c[f"{sweep.symbol} [1]"]
     edges, sizes = [], []
@@ -161,28 +160,26 @@ def draw_sweep(result: StudyResult) -> Figure:
 
 
 def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
-    """Fig 5.1, and the formulas it is by."""
+    """Judge Fig 5.1 and the formulas behind it."""
     true, ratios = found["true orbit"], np.array(SWEEPS["5.1"].values)
     middles = np.array([0.5 * (region.low + region.high) for region in true]) - 0.25
     slope = middles[-1] / ratios[-1]
     verdicts = [
         at_most(
             "width of the region to its middle, greatest",
-            TEXT,
+            text("L3762"),
             NARROW,
             (widths(true) / (middles + 0.25)).max(),
-            place="L3762",
         ),
-        at_least("growth of the width with I4, least", TEXT, 0.0, np.diff(widths(true)).min(), place="L3762, L3944"),
+        at_least("growth of the width with I4, least", text("L3762, L3944"), 0.0, np.diff(widths(true)).min()),
         at_most(
             "distance of its middle from a straight line through 1/4 at I4 = 0, of the line's rise",
-            TEXT,
+            text("L3764-3766"),
             NARROW,
             np.abs(middles - slope * ratios).max() / middles[-1],
-            place="L3764-3766",
         ),
-        near("axis A at I4 = 0", TEXT, 2.0, axis(hill(chapter_4(1e-6))), 1e-5, place="L3768"),
-        at_most("growth of the axis A with I4, greatest", TEXT, 0.0, np.diff(axes(true)).max(), place="L3768, L3946"),
+        near("axis A at I4 = 0", text("L3768"), 2.0, axis(hill(chapter_4(1e-6))), 1e-5),
+        at_most("growth of the axis A with I4, greatest", text("L3768, L3946"), 0.0, np.diff(axes(true)).max()),
     ]
     for ratio, stated in APPENDIX_3.items():
         region = right(chapter_4(ratio))
@@ -190,7 +187,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
             name = f"{side} boundary in lambda_k^2; I4 = {ratio:g}"
             # half a unit of the last digit printed
             verdicts += [
-                near(name, LISTING, listed, value, 5.5e-6, place="appendix 3", why="M' zeta' is missing"),
+                near(name, listing("appendix 3"), listed, value, 5.5e-6, why="M' zeta' is missing"),
                 near(name, OURS, ours, value, 5.5e-7),
             ]
     own = [appendix_3(chapter_4(ratio)) for ratio in APPENDIX_3]
@@ -204,10 +201,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
         at_most("listing as transcribed less what it gives, boundaries", OURS, 5.5e-6, off),
         at_most(
             "largest multiplier at half the zeroth boundary; I4 = 1",
-            TEXT,
+            text("L3420-3424"),
             1.0,
             np.abs(hill_multipliers(exact.stiffened(0.5 * zeroth))).max(),
-            place="L3420-3424",
             why="not both of the regions that it parts are stable: below it the slider falls away",
         ),
         at_most(
@@ -227,69 +223,57 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
 
 
 def with_crank(sigma2: float, inertia_ratio: float = 1.0) -> FiveBarParameters:
-    """The mechanism with another crank, sigma2 = l2/l4."""
+    """Return the mechanism with another crank, sigma2 = l2/l4."""
     mechanism = chapter_4(inertia_ratio)
     return replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
 
 
 def judge_crank(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
-    """Fig 5.2."""
+    """Judge Fig 5.2."""
     true = found["true orbit"]
     widest = widths(regions("5.1")["true orbit"]).max()
     return [
-        at_least(
-            "growth of the width with sigma2, least", TEXT, 0.0, np.diff(widths(true)).min(), place="L3876, L3938"
-        ),
-        near(
-            "axis A at sigma2 = 0.01",
-            TEXT,
-            1.968,
-            axes(true)[0],
-            5e-4,
-            place="L3880",
-            why=f"it is that of {LISTED_RATIO}",
-        ),
+        at_least("growth of the width with sigma2, least", text("L3876, L3938"), 0.0, np.diff(widths(true)).min()),
+        near("axis A at sigma2 = 0.01", text("L3880"), 1.968, axes(true)[0], 5e-4, why=f"it is that of {LISTED_RATIO}"),
         near("axis A at sigma2 = 0.01", OURS, 1.936, axes(true)[0], 5e-4),
         near("axis A at sigma2 = 0.01; I4 = 0.5", OURS, 1.967, axis(right(with_crank(0.01, 0.5))), 5e-4),
         at_least(
             "growth of the axis A from sigma2 = 0.01 to 0.1",
-            TEXT,
+            text("L3880-3882"),
             0.0,
             axes(true)[-1] - axes(true)[0],
-            place="L3880-3882",
             why="it does in the listing",
         ),
-        at_most("greatest width to that of Fig 5.1", TEXT, 1.0, widths(true).max() / widest, place="L3882-3884"),
+        at_most("greatest width to that of Fig 5.1", text("L3882-3884"), 1.0, widths(true).max() / widest),
         at_most(
             "omega_c that removes the region, up to sigma2 = 0.1",
-            TEXT,
+            text("L3923-3927"),
             STATED,
             removing_estimate(with_crank(0.1)),
             "1/s",
-            place="L3923-3927",
         ),
     ]
 
 
 def held(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """The mechanism to which the thesis's angles belong at any coupler: its ground link and the guide's direction follow."""
+    """Return the mechanism that has the thesis's angles with another coupler: ground link and guide direction follow."""
     mechanism = closed(sigma3, inertia_ratio)
     ground = rect(mechanism.coupler_length, pi / 3.0) - rect(mechanism.rocker_length, 2.0 * pi / 3.0)
     return replace(mechanism, ground_length=abs(ground), slider_guide_angle=-phase(ground))
 
 
 def closed(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
-    """The mechanism with another coupler, sigma3 = l3/l4, and the same ground link."""
+    """Return the mechanism with another coupler, sigma3 = l3/l4, and the same ground link."""
     mechanism = chapter_4(inertia_ratio)
     return replace(mechanism, coupler_length=sigma3 * mechanism.rocker_length)
 
 
-#: The thesis's coupler on a ground link that stays.
+#: Name of the sweep with a constant ground link.
 SAME_GROUND = "true orbit on the same ground link"
 
 
 def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
-    """Fig 5.3: with the angles held, as the thesis has it, and with the ground link kept."""
+    """Judge Fig 5.3, with constant angles as in the thesis, and with a constant ground link."""
     others = min(widths(regions(number)["true orbit"]).max() for number in ("5.1", "5.2"))
     verdicts = []
     follow = "the angles follow the coupler"
@@ -301,36 +285,21 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
         verdicts += [
             at_most(
                 f"growth of the width with sigma3, greatest; {words}",
-                TEXT,
+                text("L3892, L3938"),
                 0.0,
                 np.diff(widths(true)).max(),
-                place="L3892, L3938",
                 why=why,
             ),
-            near(
-                f"axis A at sigma3 = 0.8; {words}",
-                TEXT,
-                1.96,
-                axes(true)[0],
-                0.0051,
-                place="L3894-3896",
-                why=off,
-            ),
+            near(f"axis A at sigma3 = 0.8; {words}", text("L3894-3896"), 1.96, axes(true)[0], 0.0051, why=off),
             at_most(
-                f"change of the axis A over sigma3; {words}",
-                TEXT,
-                0.01,
-                np.ptp(axes(true)),
-                place="L3896-3898",
-                why=why,
+                f"change of the axis A over sigma3; {words}", text("L3896-3898"), 0.01, np.ptp(axes(true)), why=why
             ),
             at_most(
                 f"omega_c that removes the region, sigma3 from 0.8 to 1.2; {words}",
-                TEXT,
+                text("L3923-3929"),
                 STATED,
                 max(removing_estimate(mechanism(x)) for x in SWEEPS["5.3"].values),
                 "1/s",
-                place="L3923-3929",
                 why=why,
             ),
         ]
@@ -338,10 +307,9 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
         *verdicts,
         at_most(
             "greatest width to that of Fig 5.1 and 5.2",
-            TEXT,
+            text("L3898-3900"),
             1.0,
             widths(found["true orbit"]).max() / others,
-            place="L3898-3900",
             why=f"it is so with {LISTED_RATIO}",
         ),
         near("axis A at sigma3 = 0.8 by the listing as transcribed", OURS, 1.87, axis(appendix_3(held(0.8))), 0.005),
@@ -403,7 +371,7 @@ SWEEPS = {
 
 # Figure 5.4
 
-#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and the range in which the removing one is sought.
+#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and search range of the removing damper.
 BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
 DAMPERS = (0.0, 0.05, 0.1, 0.15)
 RANGE = (0.0, 1.2)
@@ -420,7 +388,7 @@ RUNS = ((0.1, 0.2761), (0.1, 0.2785), (0.2, 0.2761))
 
 
 def with_damping(omega_c: float) -> Plane:
-    """The plane of lambda_k^2 and I4 at a damper omega_c (1/s)."""
+    """Return the plane of lambda_k^2 and I4 at a damper omega_c (1/s)."""
 
     def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
         return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
@@ -430,13 +398,13 @@ def with_damping(omega_c: float) -> Plane:
 
 @cache
 def damped_region(omega_c: float) -> Chart:
-    """Boundaries of the first region in lambda_k^2 and I4."""
+    """Return the boundaries of the first region in lambda_k^2 and I4."""
     return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
 
 
 @cache
 def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
-    """Damper omega_c (1/s) that removes the first region, by (5.35)."""
+    """Find the damper omega_c (1/s) that removes the first region."""
 
     def test(lambda_k2: float, omega_c: float) -> float:
         return MOTIONS[motion](with_damping(omega_c), -1)(lambda_k2, inertia_ratio)
@@ -445,13 +413,13 @@ def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
 
 
 def width_at(found: Chart, value: float) -> float:
-    """Width in lambda_k^2 at an I4, zero where there is no region."""
+    """Return the width in lambda_k^2 at an I4, zero if there is no region."""
     roots = found.across(value, samples=100).roots
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
 def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
-    """What is stated of the regions, by their dampers (1/s)."""
+    """Judge the statements on the regions by damper (1/s)."""
     tips = {d: float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0}
     worst = {motion: removing(motion, 1.5).damping for motion in MOTIONS}
     mechanisms = [chapter_4(x) for x in (0.5, 1.0, 1.5)]
@@ -461,27 +429,15 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
     at = [width_at(found, 1.5) for found in charts.values()]
     removes = "omega_c that removes the region, up to I4 = 1.5"
     return [
-        at_most(
-            "growth of the width with omega_c, greatest; I4 = 1.5", TEXT, 0.0, np.diff(at).max(), place="L3915, L3952"
-        ),
+        at_most("growth of the width with omega_c, greatest; I4 = 1.5", text("L3915, L3952"), 0.0, np.diff(at).max()),
         at_least(
             "growth with omega_c of the I4 at which the region begins, least",
-            TEXT,
+            text("L3917"),
             0.0,
             np.diff(list(tips.values())).min(),
-            place="L3917",
         ),
-        at_most(removes, TEXT, STATED, worst["true orbit"], "1/s", place="L3919-3921"),
-        near(
-            removes,
-            LISTING,
-            LISTED,
-            worst["true orbit"],
-            5e-4,
-            "1/s",
-            place="appendix 4",
-            why="its regions are too wide",
-        ),
+        at_most(removes, text("L3919-3921"), STATED, worst["true orbit"], "1/s"),
+        near(removes, listing("appendix 4"), LISTED, worst["true orbit"], 5e-4, "1/s", why="its regions are too wide"),
         near(removes, OURS, REMOVING, worst["true orbit"], 5e-4, "1/s"),
         near(
             "omega_c that removes the region by the listing as transcribed; I4 = 1.5",
@@ -493,22 +449,20 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
         ),
         at_most(
             "omega_c that removes regions 1 to 4 as well, I4 = 1.5",
-            TEXT,
+            text("L3952-3958"),
             STATED,
             max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)),
             "1/s",
-            place="L3952-3958",
         ),
         at_most(
             "outer boundary; (5.35) less (5.16), of the width, right coefficients",
-            TEXT,
+            text("L3964-3968"),
             NEGLIGIBLE,
             max(apart),
-            place="L3964-3968",
         ),
         at_most("(5.35) cut off after its ninth term, as the thesis has it, less Hill's determinant", OURS, 1e-6, cut),
-        unjudged("the computer-oriented method is fast", TEXT, "no times are given", place="L3960"),
-        # a tip is where that damping removes the region; the trace rounds it in short steps
+        unjudged("the computer-oriented method is fast", text("L3960"), "no times are given"),
+        # at a tip that damping removes the region; the trace follows it in short steps
         *(
             near(
                 f"removing omega_c at the tip of the boundary, I4 = {tip:.4f}",
@@ -529,7 +483,7 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
 
 
 def compute_damped() -> StudyResult:
-    """Boundaries at each damper, and the damper that removes the region."""
+    """Compute the boundaries at each damper, and the damper that removes the region."""
     charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
     columns = {"I4 [1]": RATIOS}
     for motion in MOTIONS:
@@ -548,7 +502,7 @@ def compute_damped() -> StudyResult:
 
 
 def draw_damped(result: StudyResult) -> Figure:
-    """The regions at each damper, and the removing one over I4."""
+    """Draw the regions at each damper, and the removing damper over I4."""
     c = result.columns
     boundaries = []
     for colour, omega_c in zip(COLOURS, DAMPERS):

@@ -19,8 +19,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import (
     LINKS,
@@ -36,14 +34,15 @@ from ...synthesis import (
     trade_off,
     turn,
 )
-from ...synthesis.published import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from ...units import CM_PER_METRE
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
+from .problems import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 
 FloatArray = NDArray[np.float64]
 
-#: Least transmission angle that is asked of our linkages (deg).
+#: Least transmission angle of our linkages (deg).
 TRANSMISSION = 40.0
-#: A small search does: nearly every start of these problems ends at the same optimum.
+#: A small search is enough: nearly every start of these problems ends at the same optimum.
 SEARCH = Search(starts=4, candidates=1 << 14)
 #: Colours of target, printed and our linkage.
 TARGET, PRINTED, FOUND = "0.25", COLOURS[1], COLOURS[0]
@@ -53,10 +52,10 @@ ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 
 
 class Printed(NamedTuple):
-    """A problem of the thesis: its name, what is claimed and where, and the printed linkage's error.
+    """Problem of the thesis: name, claim and place, and the error of the printed linkage.
 
-    The error is given as printed with half its last digit, and as it evaluates with half the last digit of the reference, in
-    the unit of print.
+    Both errors come with half a unit of their last digit, in the unit of print: ``stated`` as printed, ``reference`` as the
+    printed linkage evaluates.
     """
 
     problem: str
@@ -128,35 +127,35 @@ TABLE = {
 
 @cache
 def best(name: str) -> Solution:
-    """Our best linkage for a problem of chapter VI."""
+    """Return our best linkage for a problem of chapter VI."""
     p = PROBLEMS[name]
     return synthesize(p.task, p.bounds, p.constraints, search=SEARCH).best
 
 
 def printed_error(name: str) -> float:
-    """Error of the printed linkage (unit of print)."""
+    """Return the error of the printed linkage (unit of print)."""
     p = PROBLEMS[name]
     return p.convert(evaluate(p.task, p.linkage).error)
 
 
 def our_error(name: str) -> float:
-    """Error of our linkage (unit of print)."""
+    """Return the error of our linkage (unit of print)."""
     return PROBLEMS[name].convert(best(name).error)
 
 
 def error_verdicts(row: Printed) -> tuple[Verdict, ...]:
-    """The printed linkage's error as the thesis states it and as it is, and ours against the goal."""
+    """Judge the printed linkage's error as stated and as evaluated, and ours against the goal."""
     p, printed = PROBLEMS[row.problem], printed_error(row.problem)
     (stated, half), (reference, digits) = row.stated, row.reference
     return (
-        near("error of the printed linkage", TEXT, stated, printed, half, p.unit, place=row.place, why=row.why),
+        near("error of the printed linkage", text(row.place), stated, printed, half, p.unit, why=row.why),
         near("error of the printed linkage", OURS, reference, printed, digits, p.unit),
         at_most("error of our linkage", OURS, p.goal, our_error(row.problem), p.unit),
     )
 
 
 def sound_verdicts(name: str) -> tuple[Verdict, ...]:
-    """Our linkage has the transmission angle and the lengths that are asked, and no defect."""
+    """Judge whether our linkage has the required transmission angle and lengths, and no defect."""
     p, ours = PROBLEMS[name], best(name)
     caps = [c.length for c in p.constraints if isinstance(c, LargestLink)]
     largest = min(caps, default=max((p.bounds[link][1] for link in LINKS if link in p.bounds), default=inf))
@@ -170,11 +169,11 @@ def sound_verdicts(name: str) -> tuple[Verdict, ...]:
     )
 
 
-# What the text says of single figures besides the error
+# Statements on single figures besides the error
 
 
 def rounding_verdicts() -> tuple[Verdict, ...]:
-    """Least and greatest error of the printed linkage of Fig 6.4 with every digit rounded up or down."""
+    """Judge the range of the error of Fig 6.4 when the printed digits are rounded up or down."""
     p = PROBLEMS["ellipse-a"]
     half = np.array([0.005 / CM_PER_METRE] * 7 + [radians(0.005)] * 3)
     corners = (np.array(signs) for signs in product((-1.0, 1.0), repeat=len(half)))
@@ -188,24 +187,24 @@ def rounding_verdicts() -> tuple[Verdict, ...]:
 
 
 def harder_verdicts(harder: str, easier: str, place: str) -> tuple[Verdict, ...]:
-    """That a four-bar cannot make the longer ellipse as well as the shorter one."""
+    """Judge whether the longer ellipse has the larger least error."""
     ratio = our_error(harder) / our_error(easier)
-    return (at_least("least error that we find, of that of ellipse (a)", TEXT, 1.0, ratio, place=place),)
+    return (at_least("least error that we find, of that of ellipse (a)", text(place), 1.0, ratio),)
 
 
 def bounded_verdicts() -> tuple[Verdict, ...]:
-    """The bounds of Fig 6.6, and what they cost."""
+    """Judge the bounds of Fig 6.6 and the error that they add."""
     p = PROBLEMS["ellipse-a-bounded"]
     outside = sum(not low <= p.linkage.values()[name] <= high for name, (low, high) in p.bounds.items())
     cost = printed_error("ellipse-a-bounded") - printed_error("ellipse-a")
     return (
-        near("lengths of the printed linkage out of their bounds", TEXT, 0, outside, 0, place="6.4.2 A, L4911"),
-        near("increase of the error by the bounds", TEXT, 52.7, cost, 0.05, "cm2", place="6.4.2 A, L4935"),
+        near("lengths of the printed linkage out of their bounds", text("6.4.2 A, L4911"), 0, outside, 0),
+        near("increase of the error by the bounds", text("6.4.2 A, L4935"), 52.7, cost, 0.05, "cm2"),
     )
 
 
 def fewer_verdicts(n: int = 48) -> tuple[Verdict, ...]:
-    """Fig 6.7 at another number of crank angles that its error may be meant for."""
+    """Judge Fig 6.7 at another number of crank angles that its printed error may refer to."""
     p, fewer = PROBLEMS["rocker"], rocker_function(n)
     printed = p.convert(evaluate(fewer, p.linkage).error)
     found = synthesize(fewer, p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best.error
@@ -216,7 +215,7 @@ def fewer_verdicts(n: int = 48) -> tuple[Verdict, ...]:
 
 
 def triangle_verdicts(name: str) -> tuple[Verdict, ...]:
-    """That the program's own way of taking the area, over 360 points of each curve, is not why the printed one differs."""
+    """Judge that the program's triangles give the area between curves of 360 points and explain no difference."""
     p = PROBLEMS[name]
     assert isinstance(p.task, UntimedPath)
     target = np.asarray(p.task.path.points)
@@ -228,7 +227,7 @@ def triangle_verdicts(name: str) -> tuple[Verdict, ...]:
 
 
 def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> float:
-    """The thesis's quality function of path generation (section 6.4.1, listing at L9797), in the square of the unit given.
+    """Return the thesis's quality function of path generation (section 6.4.1, listing at L9797), in the unit's square.
 
     Each desired point is paired with an actual one: the first with the nearest of all, each next one with the nearest of
     those from its predecessor's partner on, as many as ``window`` times the actual points for each desired one. The area is
@@ -249,7 +248,7 @@ def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> f
 
 
 def path_columns(name: str) -> dict[str, FloatArray]:
-    """Target, both coupler curves, both linkages with their ground links, and the distances from the target (cm)."""
+    """Return target, coupler curves, linkages with their ground links, and distances from the target (cm)."""
     p = PROBLEMS[name]
     stations = normal_form(p.task).places
     shapes = {"target": CM_PER_METRE * np.column_stack([stations.real, stations.imag])}
@@ -268,12 +267,12 @@ def path_columns(name: str) -> dict[str, FloatArray]:
 
 
 def curve_of(result: StudyResult, shape: str, **look: str | float | None) -> Curve:
-    """A shape of `path_columns` as a curve."""
+    """Return a shape of `path_columns` as a curve."""
     return Curve(x=result.columns[f"{shape} x [cm]"], y=result.columns[f"{shape} y [cm]"], **look)  # type: ignore[arg-type]
 
 
 def curves_panel(result: StudyResult, *more: Curve, marks: bool) -> Panel:
-    """Target and coupler curves; the target's points as marks, or as a wide line under the curves."""
+    """Build the panel of target and coupler curves; the target is drawn as marks or as a wide line."""
     x, y = (result.columns[f"target {axis} [cm]"] for axis in "xy")
     x, y = (np.append(v[np.isfinite(v)], v[0]) for v in (x, y))
     look = {"colour": TARGET, "line": "", "marker": "."} if marks else {"colour": "0.8", "width": 5.0}
@@ -293,7 +292,7 @@ def curves_panel(result: StudyResult, *more: Curve, marks: bool) -> Panel:
 
 
 def linkages_panel(result: StudyResult) -> Panel:
-    """Both linkages to scale, in the colours of `curves_panel`."""
+    """Build the panel of both linkages to scale, in the colours of `curves_panel`."""
     parts: dict[str, dict[str, str | float]] = {
         "links": {"marker": ".", "width": 1.6},
         "ground": {"line": ":", "width": 1.2},
@@ -309,7 +308,7 @@ def linkages_panel(result: StudyResult) -> Panel:
 
 
 def draw_path(result: StudyResult, *, timed: bool) -> Figure:
-    """The target and both curves, their distances over the crank's rotation or round the target, and the linkages."""
+    """Draw target and both curves, their distances over the crank's rotation or along the target, and the linkages."""
     place = result.columns["place on the target [deg]"]
     distances = Panel(
         x_label="crank rotation [deg]" if timed else "ωt of the ellipse [deg]",
@@ -331,7 +330,7 @@ def draw_path(result: StudyResult, *, timed: bool) -> Figure:
 
 
 def window_sums(linkage: Linkage, *, mounting: bool = False) -> tuple[float, float]:
-    """Sums of the squared errors within the weighted window and out of it, at 72 crank angles (deg2)."""
+    """Return the sums of the squared errors inside and outside the weighted window, at 72 crank angles (deg2)."""
     task = rocker_function(N, weighted=True, mounting=mounting)
     within, squares = np.asarray(task.weights) > 1.0, DEG2_PER_RAD2 * evaluate(task, linkage).errors ** 2
     return float(squares[within].sum()), float(squares[~within].sum())
@@ -339,28 +338,28 @@ def window_sums(linkage: Linkage, *, mounting: bool = False) -> tuple[float, flo
 
 @cache
 def mounted() -> Solution:
-    """Our linkage for the weighted rocker function, the output mounted on the rocker at a free angle."""
+    """Return our linkage for the weighted rocker function with the output mounted on the rocker at a free angle."""
     p = PROBLEMS["rocker-weighted"]
     task = rocker_function(N, weighted=True, mounting=True)
     return synthesize(task, p.bounds, p.constraints, search=SEARCH).best
 
 
 def window_verdicts() -> tuple[Verdict, ...]:
-    """That the weights buy the window at the expense of the rest, and what a mounting angle would do."""
+    """Judge whether the weights reduce the error in the window at the expense of the rest, and what a mounting angle gains."""
     inside, outside = window_sums(PROBLEMS["rocker-weighted"].linkage)
     even_inside, even_outside = window_sums(PROBLEMS["rocker"].linkage)
     free, _ = window_sums(mounted().linkage, mounting=True)
     place = "6.4.2 B, L4977"
     return (
-        at_most("error within the window, of that unweighted", TEXT, 1.0, inside / even_inside, place=place),
-        at_least("error out of the window, of that unweighted", TEXT, 1.0, outside / even_outside, place=place),
+        at_most("error within the window, of that unweighted", text(place), 1.0, inside / even_inside),
+        at_least("error out of the window, of that unweighted", text(place), 1.0, outside / even_outside),
         near(f"squared errors within the window, printed linkage; N = {N}", OURS, 104.9, inside, 0.05, "deg2"),
         at_most(f"the same with a free mounting angle; N = {N}", OURS, 3.5, free, "deg2"),
     )
 
 
 def rocker_columns(name: str) -> dict[str, FloatArray]:
-    """Target, rocker angles and errors over a turn (deg); least errors over the least transmission angle, NaN where none."""
+    """Return target, rocker angles and errors over a turn (deg), and the least error over the transmission angle."""
     p = PROBLEMS[name]
     assert isinstance(p.task, RockerFunction)
     linkages, tasks = {"printed": p.linkage, "ours": best(name).linkage}, {"fixed": p.task}
@@ -371,7 +370,7 @@ def rocker_columns(name: str) -> dict[str, FloatArray]:
     columns = {"crank rotation [deg]": np.degrees(phi), "target angle [deg]": target}
     for who, linkage in linkages.items():
         angle = np.degrees(linkage.rocker_angle(phi))
-        # into the turn that the target is in
+        # into the same turn as the target
         angle -= 360.0 * np.round(np.mean(angle - target) / 360.0)
         columns |= {f"{who} angle [deg]": angle, f"{who} error [deg]": angle - target}
     columns["least transmission angle [deg]"] = np.array(ANGLES)
@@ -382,7 +381,7 @@ def rocker_columns(name: str) -> dict[str, FloatArray]:
 
 
 def draw_rocker(result: StudyResult) -> Figure:
-    """Rocker angles, errors, and the least error over the transmission angle."""
+    """Draw rocker angles, errors, and the least error over the transmission angle."""
     c = result.columns
     labels = {"printed": "printed linkage", "ours": "our linkage", "mounted": "ours, mounting free"}
     look = dict(zip(labels, COLOURED))
@@ -441,15 +440,12 @@ MORE: Mapping[str, Callable[[], tuple[Verdict, ...]]] = {
     "6.7": fewer_verdicts,
     "6.8": window_verdicts,
     "6.9": partial(triangle_verdicts, "path-a"),
-    "6.10": lambda: (
-        *triangle_verdicts("path-b"),
-        *harder_verdicts("path-b", "path-a", "6.4.3, L5049"),
-    ),
+    "6.10": lambda: (*triangle_verdicts("path-b"), *harder_verdicts("path-b", "path-a", "6.4.3, L5049")),
 }
 
 
 def compute(number: str) -> StudyResult:
-    """The printed linkage of a problem and ours."""
+    """Compute the printed linkage of a problem and ours."""
     row = TABLE[number]
     rocker = row.problem.startswith("rocker")
     verdicts = (*error_verdicts(row), *MORE[number]())
@@ -457,7 +453,7 @@ def compute(number: str) -> StudyResult:
         number=number,
         claim=row.claim,
         columns=padded(rocker_columns(row.problem) if rocker else path_columns(row.problem)),
-        # the transmission angle of a rocker is what its function makes it
+        # a rocker function determines the transmission angle
         verdicts=verdicts if rocker else (*verdicts, *sound_verdicts(row.problem)),
     )
 

@@ -1,9 +1,9 @@
-"""Series 1 of chapter VII: the slider moved so that the coupler point is near a desired curve at every crank angle.
+"""Series 1 of chapter VII: a moving slider keeps the coupler point near a desired curve at every crank angle.
 
-The mechanism of Fig 7.2 to 7.10 has links of 0.5 and 1 without a unit: lengths are in units of l3. The desired curve is lost
-with its figure; that of Fig 7.4 is ours, and every statement on series 1 is judged with it. The variational motion (a) is the
-nearest at every crank angle, and has corners that no slider follows at speed; the eleven terms of the direct search (b) have
-none, for an eighth more of squared error. Series 2 is in `analysis.studies.youssef.series_2`.
+The mechanism of Fig 7.2 to 7.10 has links of 0.5 and 1 without a unit: lengths are in units of l3. The desired curve is
+lost with its figure; every statement on series 1 is judged with ours, Fig 7.4. The variational motion (a) is nearest at
+every crank angle, but has corners that no slider follows at speed. The eleven terms of the direct search (b) have none,
+at the cost of an eighth more squared error. Series 2 is in `analysis.studies.youssef.series_2`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...numerics.fourier import FourierSeries
 from ...slider import VariationalMotion, slider_motion, variational_motion
 from ...synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import accessible, accessible_area
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -48,24 +48,24 @@ SERIES_1 = "Desired curve: ours, see Fig 7.4."
 
 
 def point(rotation: FloatArray, u: ArrayLike) -> ComplexArray:
-    """P at crank rotations with the slider at u = U - 1."""
+    """Return P at crank rotations with the slider at u = U - 1."""
     u = np.asarray(u, dtype=float) + np.zeros_like(rotation)
     return np.asarray(LINKAGE.path(rotation, (u, np.zeros_like(u))) @ np.array([1.0, 1j]))
 
 
 def desired(rotation: FloatArray = ROTATION) -> ComplexArray:
-    """The desired points: where P is at U = 0.8 + 0.4 |sin th2|, up to 0.05 rad of the crank sooner or later."""
+    """Return the desired points: P at U = 0.8 + 0.4 |sin th2| with the crank advanced by 0.05 sin th2 rad."""
     return point(rotation + 0.05 * np.sin(rotation), 0.4 * np.abs(np.sin(rotation)) - 0.2)
 
 
 def task(weights: ArrayLike | None = None) -> TimedPath:
-    """The desired points as a task."""
+    """Return the desired points as a task."""
     return TimedPath(points=np.column_stack([desired().real, desired().imag]), weights=weights)
 
 
 @cache
 def variational(n: int = 72) -> VariationalMotion:
-    """The slider position of least error at n crank rotations."""
+    """Return the slider motion of least error at n crank rotations."""
     wanted = desired(turn(n))
     return variational_motion(LINKAGE, turn(n), np.column_stack([wanted.real, wanted.imag]))
 
@@ -74,26 +74,26 @@ def variational(n: int = 72) -> VariationalMotion:
 def direct(
     harmonics: int = HARMONICS, inside: float = 1.0, outside: float = 1.0, acceleration: float = inf
 ) -> Solution:
-    """The best Fourier series of the slider, with weights within and without p1 p2, and a bound of |d2U/dth2^2|."""
+    """Return the best Fourier series of the slider, with weights inside and outside p1 p2 and a bound on |d2U/dth2^2|."""
     unknown = SliderUnknown(harmonics=harmonics, guide_angle=(0.0, 0.0), acceleration=acceleration)
     weights = np.where(WITHIN, inside, outside)
     return slider_motion(task(weights), LINKAGE, unknown, search=Search(starts=4)).best
 
 
 def slider(linkage: Linkage) -> SliderMotion:
-    """The motion of its rocker pivot."""
+    """Return the motion of a linkage's rocker pivot."""
     assert isinstance(linkage.pivot, SliderMotion)
     return linkage.pivot
 
 
 def squared_errors(found: Solution) -> tuple[float, float]:
-    """Sums of the squared errors within p1 p2 and without."""
+    """Return the sums of the squared errors inside and outside p1 p2."""
     squares = found.evaluation.errors**2
     return float(squares[WITHIN].sum()), float(squares[~WITHIN].sum())
 
 
 def ends_of_simplex(starts: int = 6, seed: int = 7) -> list[float]:
-    """Errors at which the downhill simplex ends from random coefficients of eleven terms."""
+    """Return the errors at which the downhill simplex ends from random coefficients of eleven terms."""
     random = np.random.default_rng(seed)
 
     def error(c: FloatArray) -> float:
@@ -107,7 +107,10 @@ def ends_of_simplex(starts: int = 6, seed: int = 7) -> list[float]:
 
 
 def by_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """U by eq (7.14), both signs of its root, or by (7.15) where (7.14) has none; shape (n, 2), and where that is."""
+    """Solve eq (7.14) for U, with both signs of its root, or (7.15) if (7.14) has no root.
+
+    Returns U, shape (n, 2), and a mask of the points that use (7.15).
+    """
     l2, l3, l4 = LINKAGE.crank_length, LINKAGE.coupler_length, LINKAGE.rocker_length
     th3 = np.angle(target - l2 * np.exp(1j * rotation))
     first = l2 * np.cos(rotation) + l3 * np.cos(th3)
@@ -121,24 +124,24 @@ def by_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray
 
 
 def plane(curves: list[Curve], **more: object) -> Panel:
-    """Curves in the plane of series 1."""
+    """Build a panel with curves in the plane of series 1."""
     options = {"legend_at": "outside"} | more
     return Panel(x_label="x / l3", y_label="y / l3", curves=curves, equal=True, **options)  # type: ignore[arg-type]
 
 
 def xy(name: str, z: ComplexArray) -> dict[str, FloatArray]:
-    """Points of series 1 as two columns."""
+    """Return points of series 1 as two columns."""
     return {f"{name} x [l3]": z.real, f"{name} y [l3]": z.imag}
 
 
 def curve_of(result: StudyResult, name: str, label: str = "", **look: object) -> Curve:
-    """Two columns of `xy` as a curve."""
+    """Return two columns of `xy` as a curve."""
     c = result.columns
     return Curve(x=c[f"{name} x [l3]"], y=c[f"{name} y [l3]"], label=label, **look)  # type: ignore[arg-type]
 
 
 def family() -> StudyResult:
-    """Fig 7.2: coupler curves, isochronous curves, and the share of what they surround that P reaches."""
+    """Compute Fig 7.2: coupler curves, isochronous curves, and the share of the enclosed area that P reaches."""
     five_bar = LINKAGE.to_five_bar()
     ends = (FAMILY[0] - 1.0, FAMILY[-1] - 1.0)
     area = accessible_area(five_bar, ends, tolerance=1e-4)
@@ -166,24 +169,17 @@ def family() -> StudyResult:
         assignment="The values of U are lost: 0.6 to 1.4 are our choice; the crank turns fully from 0.5 to 1.5.",
         columns=padded(columns),
         verdicts=(
-            near("closed coupler curves, of those of the family", TEXT, len(FAMILY), closed, 0, place="7.0, L5234"),
+            near("closed coupler curves, of those of the family", text("7.0, L5234"), len(FAMILY), closed, 0),
             near(
                 "share of the area within the outer boundary that P reaches",
-                TEXT,
+                text("7.0, L5242"),
                 1.0,
                 area.area / surrounded,
                 0.01,
-                place="7.0, L5242",
                 why="what all curves of the family go round is out of reach",
             ),
             near(
-                "farthest of an isochronous curve from its circle about B",
-                TEXT,
-                0.0,
-                spread,
-                1e-12,
-                "l3",
-                place="7.0, L5260",
+                "farthest of an isochronous curve from its circle about B", text("7.0, L5260"), 0.0, spread, 1e-12, "l3"
             ),
             at_most("accessible area, relative error", OURS, 1e-4, area.error / area.area),
             at_most("farthest of 5000 random configurations outside of it", OURS, 2e-3, farthest, "l3"),
@@ -192,13 +188,13 @@ def family() -> StudyResult:
 
 
 def _area(ring: FloatArray) -> float:
-    """Area within a closed line."""
+    """Return the area within a closed line."""
     z = ring @ np.array([1.0, 1j])
     return abs(0.5 * float((z.conj() * np.roll(z, -1)).imag.sum()))
 
 
 def draw_family(result: StudyResult) -> Figure:
-    """Coupler curves with marks every 30 degrees, isochronous curves dotted, the accessible area shaded."""
+    """Draw coupler curves with marks every 30 degrees, isochronous curves dotted, and the accessible area shaded."""
     c = result.columns
     every = slice(None, None, 60)
     curves = [curve_of(result, f"U = {u:g}", f"U = {u:g}", colour=colour) for u, colour in zip(FAMILY, COLOURS)]
@@ -215,7 +211,7 @@ def draw_family(result: StudyResult) -> Figure:
 
 
 def curve_wanted() -> StudyResult:
-    """Fig 7.4: the desired curve, within what the family reaches."""
+    """Compute Fig 7.4: the desired curve, and whether P can reach it."""
     z = desired()
     reached = accessible(LINKAGE.to_five_bar(), (FAMILY[0] - 1.0 - 1e-9, FAMILY[-1] - 1.0 + 1e-9), z.real, z.imag)
     columns = {"crank rotation [deg]": np.degrees(ROTATION), **xy("desired", z)}
@@ -231,14 +227,14 @@ def curve_wanted() -> StudyResult:
         ),
         columns=padded(columns),
         verdicts=(
-            unjudged("the desired points", TEXT, why, place="7.3.1, L5567"),
+            unjudged("the desired points", text("7.3.1, L5567"), why),
             near("desired points that P does not reach", OURS, 0, z.size - int(reached.sum()), 0),
         ),
     )
 
 
 def draw_wanted(result: StudyResult) -> Figure:
-    """The desired points between the outer curves of the family."""
+    """Draw the desired points between the outer curves of the family."""
     z = desired()
     marks = {"p1": int(np.argmax(WITHIN)), "p2": int(np.nonzero(WITHIN)[0][-1])}
     curves = [
@@ -252,7 +248,7 @@ def draw_wanted(result: StudyResult) -> Figure:
 
 
 def two_positions() -> StudyResult:
-    """Fig 7.5: both positions of the rocker at a crank angle, and eqs (7.14), (7.15) against the library."""
+    """Compute Fig 7.5: both positions of the rocker at a crank angle, and eqs (7.14), (7.15) against the library."""
     found, (u, upright) = variational(), by_equations(ROTATION, desired())
     missed = np.abs(u - 1.0 - found.u[:, None]).min(axis=1)
     k = 60
@@ -275,37 +271,33 @@ def two_positions() -> StudyResult:
         verdicts=(
             near(
                 "length of the rocker in either position, the coupler in line with the point",
-                TEXT,
+                text("7.3.1, L5656"),
                 1.0,
                 rocker[np.argmax(np.abs(rocker - 1.0))],
                 1e-12,
                 "l4",
-                place="7.3.1, L5656",
             ),
             near(
                 "U by (7.14) and (7.15): greatest difference from the variational motion",
-                TEXT,
+                text("7.3.1, L5641"),
                 0.0,
                 missed.max(),
                 1e-9,
                 "l3",
-                place="7.3.1, L5641",
             ),
             near(
                 "upright rockers, of those where (7.14) has no root",
-                TEXT,
+                text("7.3.1, L5687"),
                 1.0,
                 (standing > 0.999).mean(),
                 0.0,
-                place="7.3.1, L5687",
             ),
             near(
                 "the same of random desired points",
-                TEXT,
+                text("7.3.1, L5687"),
                 1.0,
                 (of_random > 0.999).mean(),
                 0.0,
-                place="7.3.1, L5687",
                 why="it may also hang, th4 = -90 deg",
             ),
             at_least("upright or hanging, of random desired points", OURS, 0.999, np.abs(of_random).min()),
@@ -314,7 +306,7 @@ def two_positions() -> StudyResult:
 
 
 def draw_positions(result: StudyResult) -> Figure:
-    """Crank and coupler, both rockers, the desired point, and the slider's line."""
+    """Draw crank and coupler, both rockers, the desired point, and the slider's line."""
     reach = [result.columns[f"{name} x [l3]"][1] for name in ("U1", "U2")]
     curves = [
         Curve(x=[min(0.0, *reach) - 0.1, max(reach) + 0.1], y=[0.0, 0.0], colour="0.6", line=":"),
@@ -333,7 +325,7 @@ MOTIONS = {"variational": "(a) variational", "direct": "(b) eleven terms", "weig
 
 @cache
 def columns_of_motions() -> dict[str, FloatArray]:
-    """U, error and path of each motion, and the desired points."""
+    """Return U, error and path of each motion, and the desired points."""
     fine = variational(720)
     u = {"variational": np.append(fine.u, fine.u[0])}
     errors = {"variational": variational().error}
@@ -350,7 +342,7 @@ def columns_of_motions() -> dict[str, FloatArray]:
 
 
 def motion_verdicts() -> tuple[Verdict, ...]:
-    """Fig 7.6."""
+    """Judge Fig 7.6."""
     least, found = variational().squared_error, direct()
     fine = np.append(variational(720).u, variational(720).u[:2])
     corners = np.abs(np.diff(fine, 2)).max() / (2.0 * pi / 720) ** 2
@@ -364,74 +356,63 @@ def motion_verdicts() -> tuple[Verdict, ...]:
     place = "7.3.1, L5743"
     effort = "the effort of neither method is stated, and in this mechanism the equations are solved in closed form"
     return (
-        near(
-            "least error over all slider positions, of that of (a)",
-            TEXT,
-            1.0,
-            brute / least,
-            1e-3,
-            place="7.3.1, L5764",
-        ),
-        at_least("error of (b), of that of (a)", TEXT, 1.0, found.error / least, place="7.3.1, L5766"),
-        near("error of 41 terms, of that of (a)", TEXT, 1.0, direct(20).error / least, 0.01, place="7.3.1, L5768"),
-        at_least("optima of the simplex from six random starts", TEXT, 2, distinct, place=place),
+        near("least error over all slider positions, of that of (a)", text("7.3.1, L5764"), 1.0, brute / least, 1e-3),
+        at_least("error of (b), of that of (a)", text("7.3.1, L5766"), 1.0, found.error / least),
+        near("error of 41 terms, of that of (a)", text("7.3.1, L5768"), 1.0, direct(20).error / least, 0.01),
+        at_least("optima of the simplex from six random starts", text(place), 2, distinct),
         near("least of these, of that of exact derivatives from any start", OURS, 1.0, min(ends) / found.error, 1e-3),
         at_least(
             "greatest second derivative of U over th2 in (a), of that in (b)",
-            TEXT,
+            text("7.3.1, L5791"),
             1.0,
             corners / smooth,
-            place="7.3.1, L5791",
         ),
-        unjudged("the variational method takes far more effort in many cases", TEXT, effort, place="7.3.1, L5885"),
+        unjudged("the variational method takes far more effort in many cases", text("7.3.1, L5885"), effort),
     )
 
 
 def error_verdicts() -> tuple[Verdict, ...]:
-    """Fig 7.7."""
+    """Judge Fig 7.7."""
     excess = float((variational().error - direct().evaluation.errors).max())
-    return (
-        at_most("greatest excess of the error of (a) over that of (b)", TEXT, 1e-9, excess, "l3", place="7.3.1, L5764"),
-    )
+    return (at_most("greatest excess of the error of (a) over that of (b)", text("7.3.1, L5764"), 1e-9, excess, "l3"),)
 
 
 def path_verdicts() -> tuple[Verdict, ...]:
-    """Fig 7.8."""
+    """Judge Fig 7.8."""
     held = min(float((np.abs(point(ROTATION, u) - desired()) ** 2).sum()) for u in np.linspace(-0.49, 0.49, 197))
     place = "7.0, L5252"
     return tuple(
-        at_most(f"squared error of {name}, of that of the best fixed U", TEXT, 1.0, error / held, place=place)
+        at_most(f"squared error of {name}, of that of the best fixed U", text(place), 1.0, error / held)
         for name, error in (("(a)", variational().squared_error), ("(b)", direct().error))
     )
 
 
 def weighted_verdicts() -> tuple[Verdict, ...]:
-    """Fig 7.9: where the rest of the curve hardly counts a smoother motion does as well on p1 p2."""
+    """Judge Fig 7.9: with little weight outside p1 p2, a smoother motion is as accurate on p1 p2."""
     smooth = 1.0
     strict, _ = squared_errors(direct(inside=WEIGHT, acceleration=smooth))
     relaxed, _ = squared_errors(direct(inside=WEIGHT, outside=0.01, acceleration=smooth))
     return (
         at_most(
             "error on p1 p2 with the rest weighted 0.01, of that with 1; second derivative of U at most 1",
-            TEXT,
+            text("7.3.1, L5839"),
             1.0,
             relaxed / strict,
-            place="7.3.1, L5839",
         ),
     )
 
 
 def weighted_path_verdicts() -> tuple[Verdict, ...]:
-    """Fig 7.10."""
+    """Judge Fig 7.10."""
     inside, outside = (new / old for new, old in zip(squared_errors(direct(inside=WEIGHT)), squared_errors(direct())))
     return (
-        at_most("squared error on p1 p2, of that unweighted", TEXT, 1.0, inside, place="7.3.1, L5834"),
-        at_least("squared error on the rest, of that unweighted", TEXT, 1.0, outside, place="7.3.1, L5834"),
+        at_most("squared error on p1 p2, of that unweighted", text("7.3.1, L5834"), 1.0, inside),
+        at_least("squared error on the rest, of that unweighted", text("7.3.1, L5834"), 1.0, outside),
     )
 
 
 def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figure:
-    """U or the error over the crank's rotation, or the paths."""
+    """Draw U or the error over the crank's rotation, or the paths."""
     c = result.columns
     look = {name: {"label": MOTIONS[name], "colour": colour} for name, colour in zip(MOTIONS, COLOURS)}
     if what == "paths":
@@ -454,7 +435,7 @@ def draw_motions(result: StudyResult, names: tuple[str, ...], what: str) -> Figu
 
 
 class Motions(NamedTuple):
-    """A figure of the motions: what it claims, which it shows, what of them, and its verdicts."""
+    """Figure of the motions: its claim, the motions and the quantity that it shows, and its verdicts."""
 
     claim: str
     names: tuple[str, ...]
@@ -489,7 +470,7 @@ TABLE = {
 
 
 def compute(number: str) -> StudyResult:
-    """The motions of a figure."""
+    """Compute the motions of a figure."""
     row = TABLE[number]
     return StudyResult(
         number=number, claim=row.claim, assignment=SERIES_1, columns=columns_of_motions(), verdicts=row.verdicts()

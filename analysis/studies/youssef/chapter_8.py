@@ -1,7 +1,8 @@
-"""The figures of chapter VIII: how the slider of the two rigs moved, beside the theory.
+"""Figures of chapter VIII: the slider motion of both rigs, measured and computed.
 
-The measured curves are lost with the figures; the text says of most of them what they show. Theory is the periodic motion of
-the full equations with the measured damping. The resonance curves of rig 2 are in `rig_2`, what is ours in `rig_1` and there.
+The measured curves are lost with the figures; the text describes most of them. Theory is the periodic motion of the
+full equations with the measured damping. The resonance curves of rig 2 are in `rig_2`; our own studies are in `rig_1`
+and `rig_2`.
 """
 
 from __future__ import annotations
@@ -14,12 +15,11 @@ from math import atan2, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...linear import fit_decay
+from ...numerics.decay import fit_decay
 from ...periodic import mean_effective_mass
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, unjudged
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, text, unjudged
 from . import rig_1, rig_2
 from .rigs import (
     LOST,
@@ -55,7 +55,7 @@ KICK, LENGTH, SCATTER, DRY = 1.0, 1.0, 0.005, 0.5
 
 
 def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0.0) -> NDArray[np.float64]:
-    """Position (m) of the disconnected slider after an impulse; dry friction (N) shifts the middle of each swing."""
+    """Return the position (m) of the disconnected slider after an impulse; dry friction (N) shifts the centre of each swing."""
     p = rig(spring)
     decay = 0.5 * p.slider_damping / p.slider_mass
     frequency = sqrt(p.slider_stiffness / p.slider_mass - decay**2)
@@ -65,7 +65,7 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
         centre = -side * friction / p.slider_stiffness
         a = x - centre
         b = (v + decay * a) / frequency
-        # it turns back where its velocity is zero, and stays there if the spring is weaker than the friction
+        # the slider turns back at zero velocity, or stays there if the spring is weaker than the friction
         last = (atan2(v, decay * b + frequency * a) if v else pi) / frequency
         s = np.append(time - begin, last)
         swing = centre + np.exp(-decay * s) * (a * np.cos(frequency * s) + b * np.sin(frequency * s))
@@ -77,7 +77,7 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
 
 
 def compute_decay() -> StudyResult:
-    """Records as the thesis took them, and what the logarithmic decrement makes of them."""
+    """Compute records like those of the thesis, and the damping that their logarithmic decrement gives."""
     time = np.linspace(0.0, LENGTH, 4001)
     columns, verdicts = {"time [s]": time}, []
     for number, (stated, spring) in FOUND.items():
@@ -91,7 +91,7 @@ def compute_decay() -> StudyResult:
         added, left = (fit_decay(time, rubbed, friction=f).damping(mass)[0] - stated for f in (False, True))
         dry = f"what {DRY:g} N of dry friction adds to the coefficient"
         verdicts += [
-            unjudged(f"average damping coefficient of rig {number}", TEXT, LOST, place="8.3.3, L6401"),
+            unjudged(f"average damping coefficient of rig {number}", text("8.3.3, L6401"), LOST),
             near(f"coefficient from a record with scatter; {name}", OURS, stated, found, 4.0 * error, "N.s/m"),
             near(f"natural frequency of the disconnected slider; {name}", OURS, right, natural, 1e-3 * right, "rad/s"),
             at_least(f"{dry} if it counts as damping; {name}", OURS, 0.0, added, "N.s/m"),
@@ -107,7 +107,7 @@ def compute_decay() -> StudyResult:
 
 
 def draw_decay(result: StudyResult) -> Figure:
-    """The records, a panel a rig."""
+    """Draw the records, one panel a rig."""
     panels = []
     for number, (_, spring) in FOUND.items():
         names = [name for name in result.columns if f"spring {spring}" in name]
@@ -126,7 +126,7 @@ def draw_decay(result: StudyResult) -> Figure:
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """A figure of the slider's position over the crank angle: spring, speeds (rpm), and what is stated of it.
+    """Figure of the slider position over the crank angle: spring, speeds (rpm), and its verdicts.
 
     ``rough`` adds each curve with friction in the guide, by the coefficient `SLIGHT`.
     """
@@ -140,7 +140,7 @@ class Turns:
     rough: bool = False
 
     def compute(self) -> StudyResult:
-        """The steady turns at these speeds."""
+        """Compute the steady turns at the speeds of a figure."""
         turns = {f"{speed:g} rpm": turn(self.spring, speed) for speed in self.speeds}
         if self.rough:
             (speed,) = self.speeds
@@ -153,7 +153,7 @@ class Turns:
         )
 
     def draw(self, result: StudyResult) -> Figure:
-        """The turns over the crank angle; where they differ much in size, each over its amplitude."""
+        """Draw the turns over the crank angle, relative to their amplitudes if these differ much."""
         angle, *positions = result.columns.items()
         sizes = [0.5 * float(np.ptp(u)) for _, u in positions]
         relative = max(sizes) > 5.0 * min(sizes)
@@ -175,7 +175,7 @@ class Turns:
 
     @property
     def study(self) -> Study:
-        """The row as a study."""
+        """Return the row as a study."""
         return Study(self.number, self.compute, self.draw)
 
 
@@ -187,53 +187,51 @@ STATED = {"A": ((580.0, 592.0), (290.0, 296.0)), "B": ((1160.0, 1133.0), (580.0,
 
 
 def _periodic() -> list[Verdict]:
-    """8.7: one cycle of the crank is one of the slider, at this speed and at all others."""
+    """Judge Fig 8.7: one cycle of the slider takes one cycle of the crank, at this speed and at all others."""
     change = steady_turn(rig("A"), 360.0).change
     words = "largest multiplier of the motion of one cycle at all speeds run"
     largest = {s: largest_multiplier(s, SLOWEST, STOPPED[s]) for s in "AB"}
     return [
-        at_most(
-            "change of the steady u from one crank cycle to the next", TEXT, SAME, change, "cm", place="8.4.1.1, L6437"
-        ),
-        unjudged("the motion observed at 360 rpm has the period of a crank cycle", TEXT, LOST, place="8.4.1.1, L6441"),
-        *(at_most(f"{words}; spring {s}", TEXT, 1.0, largest[s], place="8.4.1.1, L6449") for s in "AB"),
+        at_most("change of the steady u from one crank cycle to the next", text("8.4.1.1, L6437"), SAME, change, "cm"),
+        unjudged("the motion observed at 360 rpm has the period of a crank cycle", text("8.4.1.1, L6441"), LOST),
+        *(at_most(f"{words}; spring {s}", text("8.4.1.1, L6449"), 1.0, largest[s]) for s in "AB"),
     ]
 
 
 def _compared(spring: str, speed: float) -> list[Verdict]:
-    """8.8 to 8.13: theory beside measurements that are lost."""
+    """Return the verdicts of Fig 8.8 to 8.13, which compare theory with lost measurements."""
     words, line = {"A": ("slightly other amplitudes", "L6479"), "B": ("reasonable agreement in amplitude", "L6524")}[
         spring
     ]
     why = f"{LOST}; what friction does to the theory is in rig-1-friction"
-    verdicts = [unjudged(f"almost total agreement in phase, {words}", TEXT, why, place=f"8.4.1.1, {line}")]
+    verdicts = [unjudged(f"almost total agreement in phase, {words}", text(f"8.4.1.1, {line}"), why)]
     if speed == 450.0:
         found, words = (
             speed_of_fewer_peaks("A", 400.0, 500.0),
             "speed at which first and last peak meet in a point of inflection",
         )
-        verdicts.append(near(words, TEXT, 450.0, found, 5.0, "rpm", place="8.4.1.2, L6726"))
+        verdicts.append(near(words, text("8.4.1.2, L6726"), 450.0, found, 5.0, "rpm"))
         verdicts.append(near(words, OURS, 451.0, found, 1.0, "rpm"))
     if speed == 720.0:
         words = "agreement at other speeds, good in phase and reasonable in amplitude"
-        verdicts.append(unjudged(words, TEXT, LOST, place="8.4.1.1, L6533"))
+        verdicts.append(unjudged(words, text("8.4.1.1, L6533"), LOST))
     return verdicts
 
 
 def _peaks(spring: str, speeds: Sequence[float], line: str, stated: int = 4) -> list[Verdict]:
-    """Peaks, highest and lowest points together, at each of the speeds."""
+    """Judge the number of maxima and minima together at each speed."""
     counted = {speed: peaks(turn(spring, speed)) for speed in speeds}
     words, place = "peaks of the oscillation at", f"8.4.1.2, {line}"
-    return [near(f"{words} {speed:g} rpm", TEXT, stated, n, 0.0, place=place) for speed, n in counted.items()]
+    return [near(f"{words} {speed:g} rpm", text(place), stated, n, 0.0) for speed, n in counted.items()]
 
 
 def _rises(spring: str, speeds: Sequence[float]) -> float:
-    """The least difference of the amplitude from one speed to the next (cm)."""
+    """Judge the growth of the amplitude from one speed to the next (cm)."""
     return float(np.diff([amplitude(turn(spring, speed)) for speed in speeds]).min())
 
 
 def _natural_and_half(spring: str, speeds: Sequence[float], line: str) -> list[Verdict]:
-    """The calculated natural frequency, and the amplitude that rises to its half."""
+    """Judge the calculated natural frequency, and the rise of the amplitude up to its half."""
     (natural, right), (half, right_half) = STATED[spring]
     found, at_half, rise = natural_speed(spring), near_fraction(spring, 2)[0], _rises(spring, speeds)
     why, why_half, place = (
@@ -243,40 +241,38 @@ def _natural_and_half(spring: str, speeds: Sequence[float], line: str) -> list[V
     )
     rising = f"least rise of the amplitude from one speed to the next, {speeds[0]:g} to {speeds[-1]:g} rpm"
     return [
-        near("calculated natural frequency", TEXT, natural, found, 5.0, "rpm", place="8.4.1.2, L6551", why=why),
+        near("calculated natural frequency", text("8.4.1.2, L6551"), natural, found, 5.0, "rpm", why=why),
         near("natural frequency from the mean effective mass", OURS, right, found, 0.5, "rpm"),
-        at_least(rising, TEXT, 0.0, rise, "cm", place=place),
-        near("speed of the local maximum", TEXT, half, at_half, 5.0, "rpm", place=place, why=why_half),
+        at_least(rising, text(place), 0.0, rise, "cm"),
+        near("speed of the local maximum", text(place), half, at_half, 5.0, "rpm", why=why_half),
         near("speed of the local maximum", OURS, right_half, at_half, 0.5, "rpm"),
     ]
 
 
 def _harmonics(spring: str) -> list[Verdict]:
-    """More than one harmonic, but none beyond the second: nothing is noticed where those meet the natural frequency."""
+    """Judge that there is more than one harmonic but no resonance of any beyond the second."""
     sizes = np.array([[harmonic(turn(spring, speed), n) for n in (1, 2, 3)] for speed in SPEEDS[spring]])
     second, third = (sizes[:, 1] / sizes[:, 0]).min(), (sizes[:, 2] / sizes[:, :2].max(axis=1)).max()
     verdicts = [
-        at_least("harmonic 2 over harmonic 1, least of six speeds", TEXT, NOTICED, second, place="8.4.1.2, L6583"),
-        at_most(
-            "harmonic 3 over the greater of 1 and 2, most of six", TEXT, 2.0 * NOTICED, third, place="8.4.1.2, L6777"
-        ),
+        at_least("harmonic 2 over harmonic 1, least of six speeds", text("8.4.1.2, L6583"), NOTICED, second),
+        at_most("harmonic 3 over the greater of 1 and 2, most of six", text("8.4.1.2, L6777"), 2.0 * NOTICED, third),
     ]
     for order, part in ((3, "a third"), (4, "a quarter")):
         rise, words = rise_at(spring, order), f"rise of the amplitude at {part} of the natural frequency, relative"
         why = f"harmonic {order} meets the natural frequency there" if rise > NOTICED else ""
-        verdicts.append(at_most(words, TEXT, NOTICED, rise, place="8.4.1.2, L6770", why=why))
+        verdicts.append(at_most(words, text("8.4.1.2, L6770"), NOTICED, rise, why=why))
     return verdicts
 
 
 def _travel(spring: str) -> Verdict:
-    """Whether the greatest displacement is met where the rig had to be stopped."""
+    """Judge whether the greatest displacement occurs at the speed at which the rig had to be stopped."""
     last = STOPPED[spring]
     *before, there = (
         float(np.abs(slider(turn(spring, w))).max()) for w in np.arange(SPEEDS[spring][0], last + 1.0, 5.0)
     )
     words = f"greatest displacement at {last:g} rpm, where the guide was too short, over that at all speeds below"
     why = "" if there > max(before) else f"{there:.2f} cm; {max(before):.2f} near half the natural frequency"
-    return at_least(words, TEXT, 1.0, there / max(before), place="8.4.1.2, L6555", why=why)
+    return at_least(words, text("8.4.1.2, L6555"), 1.0, there / max(before), why=why)
 
 
 def _fig_8_14() -> list[Verdict]:
@@ -291,10 +287,10 @@ def _fig_8_15() -> list[Verdict]:
     return [
         *_peaks("A", (300.0, 360.0), "L6579"),
         *_peaks("A", (500.0,), "L6732", stated=2),
-        near("points of inflection at 500 rpm, as of a sine", TEXT, 2, bends, 0, place="8.4.1.2, L6728", why=shoulder),
-        near(words, TEXT, 345.0, lowest, 5.0, "rpm", place="8.4.1.2, L6740", why="0.62 of the natural frequency"),
+        near("points of inflection at 500 rpm, as of a sine", text("8.4.1.2, L6728"), 2, bends, 0, why=shoulder),
+        near(words, text("8.4.1.2, L6740"), 345.0, lowest, 5.0, "rpm", why="0.62 of the natural frequency"),
         near(words, OURS, 367.0, lowest, 0.5, "rpm"),
-        at_least("least rise of the amplitude by 10 rpm, 370 to 500", TEXT, 0.0, rise, "cm", place="8.4.1.2, L6740"),
+        at_least("least rise of the amplitude by 10 rpm, 370 to 500", text("8.4.1.2, L6740"), 0.0, rise, "cm"),
         _travel("A"),
     ]
 
@@ -303,7 +299,7 @@ def _fig_8_16() -> list[Verdict]:
     ratio, why = natural_speed("B") / natural_speed("A"), "the springs are as 11 to 3"
     return [
         *_natural_and_half("B", (500.0, 540.0, 560.0), "L6754"),
-        near("natural frequency over spring A's", TEXT, 2.0, ratio, 0.01, place="8.4.1.2, L6551", why=why),
+        near("natural frequency over spring A's", text("8.4.1.2, L6551"), 2.0, ratio, 0.01, why=why),
         near("natural frequency over spring A's, sqrt(11/3)", OURS, sqrt(11.0 / 3.0), ratio, 1e-9),
         *_peaks("B", SPEEDS["B"][:3], "L6752"),
         *_harmonics("B"),
@@ -316,9 +312,9 @@ def _fig_8_17() -> list[Verdict]:
     words = "speed at which first and last peak meet, out of the rig's reach"
     return [
         *_peaks("B", SPEEDS["B"][3:], "L6752"),
-        at_least("fall of the amplitude from 620 to 680 rpm", TEXT, 0.0, before - least, "cm", place=place),
-        at_least("rise of the amplitude from 680 to 800 rpm", TEXT, 0.0, after - least, "cm", place=place),
-        at_least(words, TEXT, STOPPED["B"], meeting, "rpm", place="8.4.1.2, L6762"),
+        at_least("fall of the amplitude from 620 to 680 rpm", text(place), 0.0, before - least, "cm"),
+        at_least("rise of the amplitude from 680 to 800 rpm", text(place), 0.0, after - least, "cm"),
+        at_least(words, text("8.4.1.2, L6762"), STOPPED["B"], meeting, "rpm"),
         _travel("B"),
     ]
 
@@ -344,26 +340,18 @@ def _fig_8_18() -> list[Verdict]:
         "spread of the force over speed squared on a damped mass-spring system",
     )
     return [
-        at_most(
-            "harmonic 2 over harmonic 1, greatest at the speeds shown", TEXT, 0.1, shown, place=f"{section}, L6806"
-        ),
-        at_most("largest multiplier of the motion of one cycle", TEXT, 1.0, largest, place=f"{section}, L6808"),
-        at_least("change of the phase, 300 to 1000 rpm", TEXT, 90.0, shift, "deg", place=f"{section}, L6812"),
+        at_most("harmonic 2 over harmonic 1, greatest at the speeds shown", text(f"{section}, L6806"), 0.1, shown),
+        at_most("largest multiplier of the motion of one cycle", text(f"{section}, L6808"), 1.0, largest),
+        at_least("change of the phase, 300 to 1000 rpm", text(f"{section}, L6812"), 90.0, shift, "deg"),
         *(
             verdict
             for s, (second, third) in ratios.items()
             for verdict in (
-                at_most(
-                    f"harmonic 2 over 1, {range_of}; spring {s}", TEXT, 0.1, second, place=f"{section}, L6810", why=why
-                ),
-                at_most(
-                    f"harmonic 3 over 1, {range_of}; spring {s}", TEXT, NOTICED, third, place=f"{section}, L6820, L6968"
-                ),
+                at_most(f"harmonic 2 over 1, {range_of}; spring {s}", text(f"{section}, L6810"), 0.1, second, why=why),
+                at_most(f"harmonic 3 over 1, {range_of}; spring {s}", text(f"{section}, L6820, L6968"), NOTICED, third),
             )
         ),
-        at_most(
-            f"{oscillator} that gives harmonic 1, relative", TEXT, NOTICED, spread, place=f"{section}, L6822, L6970"
-        ),
+        at_most(f"{oscillator} that gives harmonic 1, relative", text(f"{section}, L6822, L6970"), NOTICED, spread),
     ]
 
 

@@ -1,10 +1,10 @@
-"""The methods of sections 7.1 and 7.4, by which the slider may be driven, on a mechanism with masses.
+"""The methods of sections 7.1 and 7.4 for driving the slider, applied to a mechanism with masses.
 
-The thesis sorts them and computes none: off-line (a spring, a drive without feedback), partial-on-line (feedback to a stored
-motion), and adaptive (trial cycles that change the drive). Here each drives the two harmonics of Fig 7.11: the printed links of
-the weighted rocker function as steel bars of 20 by 5 mm, a damper and some friction in the guide, 120 rpm. The plant is not
-quite what the controller knows: twice the friction, coupler and slider a tenth heavier, a load on the rocker pin. In a trial
-cycle the stored motion is changed by the Fourier series of the deviation that the last cycle had.
+The thesis classifies the methods and computes none: off-line (a spring, a drive without feedback), partial-on-line
+(feedback to a stored motion), and adaptive (trial cycles that correct the drive). Here each drives the two harmonics of
+Fig 7.11: the printed links of the weighted rocker function as steel bars of 20 by 5 mm, a damper and some friction in the
+guide, 120 rpm. The plant differs from the controller's model: twice the friction, coupler and slider a tenth heavier, a
+load on the rocker pin. A trial cycle corrects the stored motion by the Fourier series of the last cycle's deviation.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...linear import Design, design_pid, linearise_along
 from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .series_2 import rocker_motion
 
 NUMBER = "control"
-#: rad/s.
+#: Crank speed (rad/s).
 SPEED = 4.0 * pi
-#: N.s/m and N, in the guide.
+#: Damping (N.s/m) and friction (N) in the guide.
 DAMPING, FRICTION = 5.0, 2.0
-#: Of the controller: s, rad/s; turns that are run.
+#: Sampling period (s) and bandwidth (rad/s) of the controller; turns of a run.
 PERIOD, BANDWIDTH, TURNS = 1e-3, 120.0, 3.0
-#: At the pin of coupler and rocker, unknown to the controller (N).
+#: Load at the pin of coupler and rocker, unknown to the controller (N).
 LOAD = (-5.0, -3.0)
 #: Trial cycles, and harmonics of the deviation that they correct.
 TRIALS, HARMONICS = 5, 8
 
 
 class Machine(NamedTuple):
-    """The mechanism as it is known and as it is, the motion of its slider over the crank angle (m), and the feedback."""
+    """Mechanism as modelled and as built, motion of its slider over the crank angle (m), and feedback."""
 
     model: FiveBarParameters
     plant: FiveBarParameters
@@ -50,7 +50,7 @@ class Machine(NamedTuple):
 
 @cache
 def machine() -> Machine:
-    """The printed links in steel, and the two harmonics over the crank's angle."""
+    """Return the printed links in steel, and the two harmonics over the crank angle."""
     linkage = rocker_motion(2).linkage
     motion = motion_of_plant(linkage)
     model = replace(
@@ -68,7 +68,7 @@ def machine() -> Machine:
 
 
 def run(stored: FourierSeries, *, feedback: bool = True) -> TrackingResult:
-    """The plant driven along a stored motion."""
+    """Run the plant along a stored motion."""
     m = machine()
     design = m.design if feedback else None
     controller = TrackingController(m.model, stored, PERIOD, design=design, feedforward=not feedback)
@@ -77,7 +77,7 @@ def run(stored: FourierSeries, *, feedback: bool = True) -> TrackingResult:
 
 @cache
 def trials() -> tuple[NDArray[np.float64], ...]:
-    """Deviation of the slider from the motion wanted over the last turn of each trial cycle (m)."""
+    """Return the deviation of the slider from the desired motion over the last turn of each trial cycle (m)."""
     turn = round(2.0 * pi / (SPEED * PERIOD))
     stored, deviations = machine().motion, []
     for _ in range(TRIALS):
@@ -90,12 +90,12 @@ def trials() -> tuple[NDArray[np.float64], ...]:
 
 
 def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def without_counterpart() -> tuple[Verdict, ...]:
-    """What is only named."""
+    """Return verdicts on the methods that the thesis only names."""
     rows = {
         "secondary linkages and cams drive the slider": (
             "their shape is not computed; what they would have to do is u of Fig 7.6 and 7.11",
@@ -114,11 +114,11 @@ def without_counterpart() -> tuple[Verdict, ...]:
             "7.4, L5998",
         ),
     }
-    return tuple(unjudged(statement, TEXT, why, place=place) for statement, (why, place) in rows.items())
+    return tuple(unjudged(statement, text(place), why) for statement, (why, place) in rows.items())
 
 
 def compute() -> StudyResult:
-    """Force with and without a spring, the motion without feedback and with it, and the trial cycles."""
+    """Compute the force with and without a spring, the motion with and without feedback, and the trial cycles."""
     m = machine()
     drives = {"without a spring": inverse_dynamics(m.model, m.motion, SPEED)}
     drives["with the best spring"] = inverse_dynamics(best_spring(m.model, m.motion, SPEED).parameters, m.motion, SPEED)
@@ -146,31 +146,24 @@ def compute() -> StudyResult:
             at_least("rms force without a spring, of that with the best", OURS, 1.5, bare / sprung),
             at_least(
                 "an independent drive without feedback loses the motion; status of the run",
-                TEXT,
+                text("7.1.1 (c), L5327"),
                 1.0,
                 open_loop.loop.status,
-                place="7.1.1 (c), L5327",
             ),
-            near(
-                "feedback keeps it to the stored motion; status", TEXT, 0, closed.loop.status, 0, place="7.1.2, L5340"
-            ),
-            at_least(
-                "rms force at twice the speed, of that at 120 rpm", TEXT, 1.0, faster / bare, place="7.1.2, L5360"
-            ),
+            near("feedback keeps it to the stored motion; status", text("7.1.2, L5340"), 0, closed.loop.status, 0),
+            at_least("rms force at twice the speed, of that at 120 rpm", text("7.1.2, L5360"), 1.0, faster / bare),
             at_most(
                 "rms deviation of the last trial cycle, of that of the first",
-                TEXT,
+                text("7.1.3, L5380; 7.3.1, L5855"),
                 1.0,
                 errors[-1] / errors[0],
-                place="7.1.3, L5380; 7.3.1, L5855",
             ),
             at_most(
                 "greatest growth of the rms deviation from cycle to cycle",
-                TEXT,
+                text("7.1.3, L5388"),
                 0.0,
                 np.diff(errors).max(),
                 "mm",
-                place="7.1.3, L5388",
             ),
             *without_counterpart(),
         ),
@@ -178,7 +171,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Force, errors of the runs, and the trial cycles."""
+    """Draw force, errors of the runs, and the trial cycles."""
     c = result.columns
     runs = (("feed-forward", "no feedback", COLOURS[1]), ("feedback", "feedback", COLOURS[0]))
     panels = [

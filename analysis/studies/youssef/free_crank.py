@@ -1,7 +1,7 @@
-"""Fig 3.6 to 3.14: the crank launched by a torque, and left to itself.
+"""Figures 3.6 to 3.14: the crank accelerated by a torque, and the crank in free motion.
 
-In a launch T0 t^2 is nearly constant, not T0 t, and below a least T0 the crank falls back. In free motion the slider's second
-harmonic is that of a resonance near half the natural frequency, but the damper lowers the speed of it and makes it broad.
+In a launch T0 t^2 is nearly constant, not T0 t, and below a least T0 the crank falls back. In free motion the second
+harmonic of the slider has a resonance near half the natural frequency; the damper lowers its speed and broadens it.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.published import CM_PER_METRE, DYN_CM_PER_NEWTON_METRE, RAD_S_PER_RPM
+from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .runs import LINEAR, ON_THE_GRAPH, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
 
 #: Torques of Fig 3.6 to 3.8, and those of the curve of 3.7 (dyn.cm).
@@ -29,16 +30,16 @@ TORQUES = (1e7, 1e8, 2e8)
 TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
 #: Springs of the free motion (dyn/cm).
 SOFT, STIFF = 5e5, 2e6
-#: Crank speed about which the thesis sees higher harmonics, and what counts as about it (rad/s).
+#: Crank speed near which the thesis sees higher harmonics, and the range that counts as near (rad/s).
 HARMONIC_SPEED, ABOUT = 27.0, 2.7
 #: Crank angles in a turn of a free crank.
 SAMPLES = 256
-#: Quantity of a plot: what the axis calls it, output, factor to its unit, unit.
+#: Quantity of a plot: its name on the axis, output, factor to its unit, unit.
 Quantity = tuple[str, str, float, str]
 SLIDER: Quantity = ("slider position u", "slider.position", CM_PER_METRE, "cm")
 CRANK_SPEED: Quantity = ("crank speed", "crank.speed", 1.0, "rad/s")
 TIME = "time [s]"
-#: What is ours in the launches.
+#: Our choices in the launches.
 UNSAID = (
     "The text gives neither the damper of the launches nor, with three torques, the spring: here the damper of Fig 3.4 and the "
     "middle one of its springs."
@@ -47,7 +48,7 @@ UNSAID = (
 
 @cache
 def launch(torque: float, stiffness: float = 1e6, stop_time: float = 1.0, samples: int = 2000) -> Trajectory:
-    """Table 3.1 from rest under T = T0 (1 - th2) up to 1 rad, then none; its event, if it gets there, is the release."""
+    """Run Table 3.1 from rest under T = T0 (1 - th2) up to 1 rad, then without torque; an event marks the release."""
     return simulate(
         table_3_1(stiffness),
         Inputs(torque=TorsionBar(torque=torque / DYN_CM_PER_NEWTON_METRE)),
@@ -58,18 +59,18 @@ def launch(torque: float, stiffness: float = 1e6, stop_time: float = 1.0, sample
 
 
 def release_time(torque: float, stiffness: float = 1e6, stop_time: float = 1.0) -> float:
-    """Time from rest to th2 = 1 rad (s); infinite if the crank falls back before."""
+    """Return the time from rest to th2 = 1 rad (s); infinite if the crank falls back before."""
     events = launch(torque, stiffness, stop_time).events
     return events[0].time if events else np.inf
 
 
 def accelerated(torque: float, stiffness: float = 1e6) -> Trajectory:
-    """A launch up to the end of its torque."""
+    """Return a launch up to the end of its torque."""
     return launch(torque, stiffness, release_time(torque, stiffness), 1000)
 
 
 def least_torque() -> float:
-    """The least T0 (dyn.cm) that turns the crank by 1 rad, to half a per cent."""
+    """Find the least T0 (dyn.cm) that turns the crank by 1 rad, to half a per cent."""
     low, high = 1e5, 1e7
     while high / low > 1.01:
         middle = float(np.sqrt(low * high))
@@ -79,7 +80,7 @@ def least_torque() -> float:
 
 @cache
 def coast(stiffness: float) -> Trajectory:
-    """Table 3.1 left to itself in its steady motion at 420 rpm, at crank angle 0."""
+    """Run Table 3.1 without torque, from its steady motion at 420 rpm at crank angle 0."""
     period, speed = 60.0 / SPEED, SPEED * RAD_S_PER_RPM
     steady = simulate(table_3_1(stiffness), Inputs(speed=speed), stop_time=20.0 * period, step=period)
     u, v = (float(steady[name][-1]) for name in ("slider.position", "slider.velocity"))
@@ -89,7 +90,7 @@ def coast(stiffness: float) -> Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """A free crank over each of its whole turns, as samples at equal crank angles.
+    """Statistics of each whole turn of a free crank, from samples at equal crank angles.
 
     Attributes
     ----------
@@ -116,7 +117,7 @@ class Turns:
 
     @classmethod
     def of(cls, run: Trajectory, start: float = 0.0) -> Turns:
-        """The turns from a crank angle (rad) on."""
+        """Divide a run into turns from a crank angle (rad) on."""
         angle = run["crank.angle"]
         marks = np.arange(start, angle[-1], 2.0 * pi)
         times = np.interp(marks, angle, run.time)
@@ -137,17 +138,17 @@ class Turns:
 
     @property
     def transient(self) -> int:
-        """Turns until the mean slider position is furthest from its start, whereupon it decays."""
+        """Number of turns until the mean slider position is furthest from its start, after which it decays."""
         return int(np.abs(self.slider).argmax())
 
     @property
     def shown(self) -> int:
-        """Turns until the mean crank speed falls below `HARMONIC_SPEED`."""
+        """Number of turns until the mean crank speed falls below `HARMONIC_SPEED`."""
         return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
 
 
 def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
-    """Half the natural frequency of the slider (rad/s) with the effective mass at each crank angle, at u = 0."""
+    """Return half the slider's natural frequency (rad/s) with the effective mass at each crank angle, at u = 0."""
     parameters = table_3_1(stiffness)
     p = parameters.constants()
     places = (kinematics.position(angle, 0.0, p) for angle in np.linspace(0.0, 2.0 * pi, 721).tolist())
@@ -156,7 +157,7 @@ def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
 
 
 def _energy_verdict(*runs: Trajectory) -> Verdict:
-    """That no energy is lost or made: the largest residual of the balance relative to the energy that is in play."""
+    """Judge the residual of the energy balance relative to the largest energy of the runs."""
     worst = max(
         float(np.abs(run["energy.residual"]).max() / max(run["energy.supplied"].max(), run["energy.kinetic"].max()))
         for run in runs
@@ -178,7 +179,7 @@ def _by_spring() -> dict[str, Trajectory]:
 def _launch_result(
     number: str, claim: str, runs: Mapping[str, Trajectory], quantity: Quantity, *verdicts: Verdict
 ) -> StudyResult:
-    """A quantity of launches over time, with the times at which their torques end."""
+    """Build the result of launches: a quantity over time, and the times at which the torques end."""
     name, output, factor, unit = quantity
     columns = {TIME: next(iter(runs.values())).time}
     columns |= {f"{name}; {label} [{unit}]": factor * run[output] for label, run in runs.items()}
@@ -188,7 +189,7 @@ def _launch_result(
 
 
 def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
-    """A quantity over time, a circle where the crank has turned by 1 rad and the torque ends."""
+    """Draw a quantity over time, with a circle at 1 rad, where the torque ends."""
     time, *columns = result.columns.values()
     name = list(result.columns)[1]
     curves, circles = [], []
@@ -207,7 +208,7 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 
 
 def _rise_verdicts(runs: Sequence[Trajectory], place: str) -> list[Verdict]:
-    """Whether the crank speed rises along a line up to its peak, and peaks before the torque ends."""
+    """Judge whether the crank speed rises along a line, and whether it peaks before the torque ends."""
     bows, angles = [], []
     for run in runs:
         peak = int(run["crank.speed"].argmax())
@@ -215,14 +216,11 @@ def _rise_verdicts(runs: Sequence[Trajectory], place: str) -> list[Verdict]:
         bows.append(np.abs(w / w[-1] - t / t[-1]).max())
         angles.append(run["crank.angle"][peak])
     line, end = "crank speed's distance from a line up to its peak, over the peak", "crank angle of the peak, greatest"
-    return [
-        at_most(line, TEXT, LINEAR, max(bows), place=place),
-        at_most(end, TEXT, 1.0, max(angles), "rad", place=place),
-    ]
+    return [at_most(line, text(place), LINEAR, max(bows)), at_most(end, text(place), 1.0, max(angles), "rad")]
 
 
 def _swing_verdicts(runs: Iterable[Trajectory], start: float, places: tuple[str, str, str]) -> list[Verdict]:
-    """Whether the crank that is free from an angle on swings, slows down, and why: its speed, and what the damper takes."""
+    """Judge whether a free crank swings in speed, slows down on average, and loses energy to the damper alone."""
     swings, falls, shares = [], [], []
     for run in runs:
         turns, free = Turns.of(run, start), run["crank.angle"] >= start
@@ -232,25 +230,25 @@ def _swing_verdicts(runs: Iterable[Trajectory], start: float, places: tuple[str,
         shares.append(np.ptp(run["energy.dissipated"][free]) / (energy[0] - energy[-1]))
     swing, fall, share = min(swings), max(falls), min(shares)
     return [
-        at_least("range of the crank speed over its mean, least of all turns", TEXT, 0.1, swing, place=places[0]),
-        at_most("mean crank speed relative to the turn before, greatest", TEXT, 1.0, fall, place=places[1]),
-        near("part of the energy's fall that the damper takes", TEXT, 1.0, share, 1e-6, place=places[2]),
+        at_least("range of the crank speed over its mean, least of all turns", text(places[0]), 0.1, swing),
+        at_most("mean crank speed relative to the turn before, greatest", text(places[1]), 1.0, fall),
+        near("part of the energy's fall that the damper takes", text(places[2]), 1.0, share, 1e-6),
     ]
 
 
 def _after(runs: Mapping[str, Trajectory]) -> list[Turns]:
-    """The turns after the torque has ended."""
+    """Return the turns after the torque has ended."""
     return [Turns.of(run, start=1.0) for run in runs.values()]
 
 
 def _decay_verdict(turns: Sequence[Turns], place: str) -> Verdict:
-    """Whether the mean position decays after the transient."""
+    """Judge whether the mean position decays after the transient."""
     decay = max(greatest_ratio(t.slider[t.transient :]) for t in turns)
-    return at_most("mean of u relative to the turn before, after the transient", TEXT, 1.0, decay, place=place)
+    return at_most("mean of u relative to the turn before, after the transient", text(place), 1.0, decay)
 
 
 def launch_speeds() -> StudyResult:
-    """The crank speed after launches with the three torques."""
+    """Compute the crank speed after launches with the three torques."""
     return _launch_result(
         "3.6",
         "The speed rises linearly until the torque no longer accelerates the crank, then swings and decays.",
@@ -263,7 +261,7 @@ def launch_speeds() -> StudyResult:
 
 
 def torque_over_time() -> StudyResult:
-    """Time to 1 rad over the torque, the exponent, and where the torque is too small."""
+    """Compute the time to 1 rad over the torque, its exponent, and the least sufficient torque."""
     time = np.array([release_time(float(torque)) for torque in TORQUE_RANGE])
     slope = float(np.mean(np.diff(np.log(TORQUES)) / np.diff(np.log([release_time(torque) for torque in TORQUES]))))
     fitted = np.polyfit(np.log(time), np.log(TORQUE_RANGE), 1)[0]
@@ -275,9 +273,9 @@ def torque_over_time() -> StudyResult:
         assignment=UNSAID,
         columns={"T0 [dyn.cm]": TORQUE_RANGE, "time to 1 rad [s]": time, "T0 t^2 [dyn.cm.s2]": constant},
         verdicts=(
-            near("exponent of T0 in the time to 1 rad", TEXT, -1.0, slope, 0.05, place="L2140", why=nearly),
-            near("T0 as the time grows", TEXT, 0.0, least_torque(), 5e5, "dyn.cm", place="L2142", why=falls),
-            near("time to 1 rad as T0 grows: 1e12 dyn.cm", TEXT, 0.0, release_time(1e12), 1e-3, "s", place="L2142"),
+            near("exponent of T0 in the time to 1 rad", text("L2140"), -1.0, slope, 0.05, why=nearly),
+            near("T0 as the time grows", text("L2142"), 0.0, least_torque(), 5e5, "dyn.cm", why=falls),
+            near("time to 1 rad as T0 grows: 1e12 dyn.cm", text("L2142"), 0.0, release_time(1e12), 1e-3, "s"),
             near("exponent, mean of the two between the three torques", OURS, -1.95, slope, 0.005),
             near("exponent, fitted to all of the curve", OURS, -1.95, fitted, 0.02),
             at_most("spread of T0 t^2 over a factor of 20 in T0", OURS, 0.15, np.ptp(constant) / constant.mean()),
@@ -287,7 +285,7 @@ def torque_over_time() -> StudyResult:
 
 
 def draw_torque_over_time(result: StudyResult) -> Figure:
-    """Torque over time, and on logarithmic axes, with lines of exponent -1 and -2 through T0 = 1e8."""
+    """Draw the torque over time, on linear and logarithmic axes, with lines of exponent -1 and -2 through T0 = 1e8."""
     torque, time = result.columns["T0 [dyn.cm]"], result.columns["time to 1 rad [s]"]
     hinge, three = float(np.interp(1e8, torque, time)), np.interp(TORQUES, torque, time)
     curves = [
@@ -308,27 +306,27 @@ def _reference_position() -> Verdict:
 
 
 def launch_positions() -> StudyResult:
-    """The slider after launches with the three torques."""
+    """Compute the slider position after launches with the three torques."""
     runs = _by_torque()
     turns = _after(runs)
     largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
     later = turns[2].transient - max(t.transient for t in turns[:2])
     shift = turns[2].slider.mean() / turns[1].slider.mean()
     verdicts = [
-        at_least("turns until u decays, T0 = 2e8 less the lower ones", TEXT, 1.0, later, "turns", place="L2157"),
-        at_least("mean of u, T0 = 2e8 relative to T0 = 1e8 dyn.cm", TEXT, 1.0, shift, place="L2165"),
+        at_least("turns until u decays, T0 = 2e8 less the lower ones", text("L2157"), 1.0, later, "turns"),
+        at_least("mean of u, T0 = 2e8 relative to T0 = 1e8 dyn.cm", text("L2165"), 1.0, shift),
     ]
     for label, run in runs.items():
         u, within = CM_PER_METRE * run["slider.position"].max(), CM_PER_METRE * ON_THE_GRAPH * largest
         statement, why = f"greatest u; {label}", "" if u < within else "it swings to both sides"
-        verdicts.append(near(statement, TEXT, 0.0, u, within, "cm", place="L2161", why=why))
+        verdicts.append(near(statement, text("L2161"), 0.0, u, within, "cm", why=why))
     verdicts.append(_decay_verdict(turns, "L2159"))
     claim = "The harder the launch, the further the slider moves from its start, and the later it settles to a decay."
     return _launch_result("3.8", claim, runs, SLIDER, *verdicts, _reference_position())
 
 
 def launch_speeds_by_spring() -> StudyResult:
-    """The crank speed after launches with the three springs."""
+    """Compute the crank speed after launches with the three springs."""
     rises = [accelerated(1e8, k) for k in STIFFNESSES]
     speeds = np.array([run["crank.speed"] for run in rises])
     apart, angle = np.ptp(speeds, axis=0).max() / speeds.max(), launch(1e8)["crank.angle"][500]
@@ -338,14 +336,14 @@ def launch_speeds_by_spring() -> StudyResult:
         _by_spring(),
         CRANK_SPEED,
         *_rise_verdicts(rises, "L2175-2181"),
-        at_most("spread of the crank speed while the torque acts", TEXT, ON_THE_GRAPH, apart, place="L2187"),
+        at_most("spread of the crank speed while the torque acts", text("L2187"), ON_THE_GRAPH, apart),
         *_swing_verdicts(_by_spring().values(), 1.0, ("L2181", "L2183", "L2185")),
         near("crank angle at 0.25 s; T0 = 1e8 dyn.cm, k = 1e6 dyn/cm", OURS, 17.8051227, angle, 5e-8, "rad"),
     )
 
 
 def launch_positions_by_spring() -> StudyResult:
-    """The slider after launches with the three springs."""
+    """Compute the slider position after launches with the three springs."""
     runs = _by_spring()
     apart = np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
     apart /= np.ptp([run["slider.position"] for run in runs.values()])
@@ -357,10 +355,10 @@ def launch_positions_by_spring() -> StudyResult:
         "and torque, and then a steady decay.",
         runs,
         SLIDER,
-        at_most("spread of u while the torque acts, relative to the graph", TEXT, ON_THE_GRAPH, apart, place="L2191"),
+        at_most("spread of u while the torque acts, relative to the graph", text("L2191"), ON_THE_GRAPH, apart),
         _decay_verdict(_after(runs), "L2199"),
-        at_least(longer("springs"), TEXT, 1.0, springs, "turns", place="L2195-2205"),
-        at_least(longer("torques"), TEXT, 1.0, torques, "turns", place="L2195-2205"),
+        at_least(longer("springs"), text("L2195-2205"), 1.0, springs, "turns"),
+        at_least(longer("torques"), text("L2195-2205"), 1.0, torques, "turns"),
         _reference_position(),
     )
 
@@ -371,7 +369,7 @@ def launch_positions_by_spring() -> StudyResult:
 def _coast_result(
     number: str, claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *verdicts: Verdict
 ) -> StudyResult:
-    """Columns of a free motion up to where it is shown."""
+    """Build the result of a free motion from its columns, cut where the figure ends."""
     turns = Turns.of(run)
     last = int(np.searchsorted(run.time, turns.ends[turns.shown - 1]))
     return StudyResult(
@@ -387,7 +385,7 @@ def _coast_result(
 
 
 def free_speed(number: str, stiffness: float) -> StudyResult:
-    """The crank speed over the crank angle in free motion."""
+    """Compute the crank speed over the crank angle in free motion."""
     run = coast(stiffness)
     turns, label = Turns.of(run), f"k = {plain(stiffness)} dyn/cm"
     energy, ratio = run["energy.kinetic"] + run["energy.potential"], greatest_ratio(turns.speed_range)
@@ -401,14 +399,14 @@ def free_speed(number: str, stiffness: float) -> StudyResult:
             f"crank speed; {label} [rad/s]": run["crank.speed"],
         },
         *_swing_verdicts([run], 0.0, ("L2243", "L2249", "L2255")),
-        at_most("range of the crank speed relative to the turn before, greatest", TEXT, 1.0, ratio, place="L2245"),
-        at_most(relative, TEXT, 0.25, turns.energy_share.max(), place="L2253"),
+        at_most("range of the crank speed relative to the turn before, greatest", text("L2245"), 1.0, ratio),
+        at_most(relative, text("L2253"), 0.25, turns.energy_share.max()),
         at_most("rise of the mechanical energy between two samples", OURS, 1e-8, np.diff(energy).max(), "J"),
     )
 
 
 def draw_free_speed(result: StudyResult) -> Figure:
-    """Crank speed over crank angle."""
+    """Draw the crank speed over the crank angle."""
     turns, speed = result.columns.values()
     curve, across = Curve(x=turns, y=speed), (0.0, float(turns[-1]))
     panel = Panel(x_label="turns of the crank", y_label="crank speed [rad/s]", curves=[curve], x_range=across)
@@ -416,7 +414,7 @@ def draw_free_speed(result: StudyResult) -> Figure:
 
 
 def _phase_plane(number: str, stiffness: float, *verdicts: Verdict) -> StudyResult:
-    """Velocity over position of the slider in free motion, and what is said of both springs."""
+    """Compute the slider's phase plane in free motion, and judge what is stated for both springs."""
     run = coast(stiffness)
     turns, label = Turns.of(run), f"k = {plain(stiffness)} dyn/cm"
     # the first turns are the transient of the release
@@ -430,31 +428,29 @@ def _phase_plane(number: str, stiffness: float, *verdicts: Verdict) -> StudyResu
             f"slider position u; {label} [cm]": CM_PER_METRE * run["slider.position"],
             f"slider velocity; {label} [cm/s]": CM_PER_METRE * run["slider.velocity"],
         },
-        at_most(
-            "range of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, swing, place="L2281"
-        ),
-        at_most("mean of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, mean, place="L2283"),
-        at_least("second harmonic of u relative to the first, least of all turns", TEXT, 0.1, second, place="L2293"),
+        at_most("range of u relative to the turn before, from the fourth on, greatest", text("L2281"), 1.0, swing),
+        at_most("mean of u relative to the turn before, from the fourth on, greatest", text("L2283"), 1.0, mean),
+        at_least("second harmonic of u relative to the first, least of all turns", text("L2293"), 0.1, second),
         *verdicts,
-        unjudged("the curves are smooth but for the sampling", TEXT, drawing, place="L2266-2276"),
+        unjudged("the curves are smooth but for the sampling", text("L2266-2276"), drawing),
     )
 
 
 def soft_phase_plane() -> StudyResult:
-    """That with the soft spring, whose mean position lies further from u = 0."""
+    """Compute the phase plane with the soft spring, whose mean position lies further from u = 0."""
     turns = [Turns.of(coast(k)) for k in (SOFT, STIFF)]
     drift, distance = (a / b for a, b in zip(*((np.ptp(t.slider[: t.shown]), abs(t.slider[0])) for t in turns)))
     words = "{} relative to that with k = 2e6 dyn/cm".format
     return _phase_plane(
         "3.13",
         SOFT,
-        at_least(words("drift of the mean of u"), TEXT, 1.0, drift, place="L2289"),
-        at_least(words("distance of the mean of u from 0 at the start"), TEXT, 1.0, distance, place="L2291"),
+        at_least(words("drift of the mean of u"), text("L2289"), 1.0, drift),
+        at_least(words("distance of the mean of u from 0 at the start"), text("L2291"), 1.0, distance),
     )
 
 
 def stiff_phase_plane() -> StudyResult:
-    """That with the stiff spring, whose higher harmonics the thesis explains by a resonance."""
+    """Compute the phase plane with the stiff spring, whose higher harmonics the thesis explains by a resonance."""
     soft, stiff = (Turns.of(coast(k)) for k in (SOFT, STIFF))
     # the mean speed falls from turn to turn
     seen = [float(np.interp(-HARMONIC_SPEED, -t.speed, t.second / t.first)) for t in (stiff, soft)]
@@ -473,18 +469,18 @@ def stiff_phase_plane() -> StudyResult:
     return _phase_plane(
         "3.14",
         STIFF,
-        at_least(compared, TEXT, 1.0, seen[0] / seen[1], place="L2299"),
-        near(greatest("first"), TEXT, HARMONIC_SPEED, most, ABOUT, "rad/s", place="L2301", why=broad),
-        near(with_mass("mean"), TEXT, HARMONIC_SPEED, half, ABOUT, "rad/s", place="L2303"),
-        near(greatest(squared), TEXT, 1.0, resonance / half, lowered, place="L2305"),
-        at_least(with_mass("least"), TEXT, HARMONIC_SPEED, over_turn.max(), "rad/s", place="L2309-2317"),
-        at_most(with_mass("greatest"), TEXT, HARMONIC_SPEED, over_turn.min(), "rad/s", place="L2309-2317"),
+        at_least(compared, text("L2299"), 1.0, seen[0] / seen[1]),
+        near(greatest("first"), text("L2301"), HARMONIC_SPEED, most, ABOUT, "rad/s", why=broad),
+        near(with_mass("mean"), text("L2303"), HARMONIC_SPEED, half, ABOUT, "rad/s"),
+        near(greatest(squared), text("L2305"), 1.0, resonance / half, lowered),
+        at_least(with_mass("least"), text("L2309-2317"), HARMONIC_SPEED, over_turn.max(), "rad/s"),
+        at_most(with_mass("greatest"), text("L2309-2317"), HARMONIC_SPEED, over_turn.min(), "rad/s"),
         near("half the natural frequency", OURS, 25.55, half, 0.005, "rad/s"),
     )
 
 
 def draw_phase_plane(result: StudyResult) -> Figure:
-    """Velocity over position, with the start S and the finish F."""
+    """Draw the velocity over the position, with the start S and the finish F."""
     u, v = result.columns.values()
     start = Curve(x=u[:1], y=v[:1], colour="black", line="", marker="s", label="S, start")
     finish = Curve(x=u[-1:], y=v[-1:], colour="black", line="", marker="o", label="F, finish")

@@ -1,7 +1,7 @@
-"""The linkage itself: a still and an animation.
+"""Picture and animation of the linkage.
 
-Table 3.1 at 420 rpm from the thesis's start, th2 = u = u' = 0, with a coupler point P of ours: the slider swings into its
-steady motion within a few turns, and the path of P with it.
+Table 3.1 runs at 420 rpm from the thesis's start, th2 = u = u' = 0, with a coupler point P of ours. Within a few turns
+the slider reaches its steady motion, and P its steady path.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import Figure, animate_linkage, draw_linkage
 from ...run import Inputs, Trajectory, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, Study, StudyResult, at_most
 from .runs import SPEED, table_3_1
 
@@ -30,13 +29,13 @@ STILL = 2.0 * np.pi * (TURNS - 1) + 1.0
 
 @cache
 def run() -> Trajectory:
-    """Three turns from the thesis's start."""
+    """Run three turns from the thesis's start."""
     period = 60.0 / SPEED
     return simulate(MECHANISM, Inputs(speed=SPEED * RAD_S_PER_RPM), stop_time=TURNS * period, step=period / 240)
 
 
 def compute() -> StudyResult:
-    """The run's slider and coupler point."""
+    """Compute the positions of slider and coupler point."""
     t = run()
     return StudyResult(
         number=NUMBER,
@@ -54,7 +53,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """The linkage at one radian of the last turn, with the path of P over it."""
+    """Draw the linkage at one radian of the last turn, with the path of P."""
     angle = result.columns["crank angle [rad]"]
     last = angle >= angle[-1] - 2.0 * np.pi - 1e-9
     trace = np.column_stack([result.columns[f"{axis} of P [cm]"][last] for axis in "xy"]) / CM_PER_METRE
@@ -63,7 +62,7 @@ def draw(result: StudyResult) -> Figure:
 
 
 def animate(result: StudyResult, path: Path) -> Path:
-    """All of the run."""
+    """Animate the whole run."""
     return animate_linkage(MECHANISM, run(), path, frames=72, title=result.heading)
 
 

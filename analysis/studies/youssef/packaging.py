@@ -1,9 +1,9 @@
 """Fig 6.11: the packaging machine.
 
-The coupler point pushes packages along a straight line within 120 degrees of the crank's rotation and returns round nineteen
-points. The printed linkage travels 175.8 cm on a part that is 7 cm from flat, and comes within 10.5 degrees of a dead
-position. Ours is flat to 2.5 cm over 144 cm, has less than half the area, and keeps 40 degrees. How flat and how long the
-thesis wants it is not in the text.
+The coupler point pushes packages along a straight line within 120 degrees of crank rotation and returns past nineteen
+points. The printed linkage travels 175.8 cm on a part that is flat to 7 cm, and comes within 10.5 degrees of a dead
+position. Ours is flat to 2.5 cm over 144 cm, has less than half the area, and keeps 40 degrees. The text does not tell
+the flatness and length that the thesis requires.
 """
 
 from __future__ import annotations
@@ -13,21 +13,10 @@ from math import degrees, pi
 
 import numpy as np
 
-from linkwork.five_bar.published import CM_PER_METRE
-
 from ...figures import Curve, Figure, Panel, plot_curves
 from ...synthesis import area_between, hausdorff, straightest_part, turn
-from ...synthesis.published import (
-    CM2_PER_M2,
-    PACKAGING_FLATNESS,
-    PACKAGING_OFFSET_CM,
-    PACKAGING_ROTATION,
-    PACKAGING_TRAVEL,
-    PROBLEMS,
-    N,
-    packaging_path,
-)
-from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded, unjudged
+from ...units import CM_PER_METRE
+from ..study import OURS, Study, StudyResult, at_least, at_most, near, padded, text, unjudged
 from .chapter_6 import (
     FOUND,
     PRINTED,
@@ -41,12 +30,22 @@ from .chapter_6 import (
     path_columns,
     sound_verdicts,
 )
+from .problems import (
+    CM2_PER_M2,
+    PACKAGING_FLATNESS,
+    PACKAGING_OFFSET_CM,
+    PACKAGING_ROTATION,
+    PACKAGING_TRAVEL,
+    PROBLEMS,
+    N,
+    packaging_path,
+)
 
 NUMBER = "6.11"
 
 
 def nineteen_points() -> FloatArray:
-    """The ten points of the listing, and the middles of all sides but the one of 4 cm, shape (19, 2) in m."""
+    """Return the ten points of the listing and the midpoints of all sides but the one of 4 cm, shape (19, 2) in m."""
     corners = packaging_path().points
     ahead = np.roll(corners, -1, axis=0)
     middles = np.where(np.hypot(*(ahead - corners).T)[:, None] > 0.05, 0.5 * (corners + ahead), np.nan)
@@ -55,7 +54,7 @@ def nineteen_points() -> FloatArray:
 
 
 def region(distance: float) -> dict[str, FloatArray]:
-    """Bounds of the region within a distance of the desired path (m), as columns in cm."""
+    """Return the bounds of the region within a distance of the desired path (m), as columns in cm."""
     import shapely
 
     polygon = shapely.Polygon(packaging_path().points)
@@ -68,7 +67,7 @@ def region(distance: float) -> dict[str, FloatArray]:
 
 
 def compute() -> StudyResult:
-    """The region and the linkages, the quality function of the nineteen points, and the straight push."""
+    """Compute the region and the linkages, the quality function of the nineteen points, and the straight part."""
     p, ours, desired = PROBLEMS["packaging"], best("packaging"), nineteen_points()
     curves = {"printed": p.linkage.path(turn(N)), "ours": ours.linkage.path(turn(N))}
     # with the window of 2 that the program has for its ten points the pairing lags behind on the long sides
@@ -104,22 +103,20 @@ def compute() -> StudyResult:
         ),
         columns=padded(columns),
         verdicts=(
-            unjudged("the path is within the region", TEXT, "the bounds of the region are lost", place="6.4.3, L5101"),
+            unjudged("the path is within the region", text("6.4.3, L5101"), "the bounds of the region are lost"),
             at_least(
                 "travel within 120 degrees; AB is 154 cm between the program's points",
-                TEXT,
+                text(place),
                 154.0,
                 CM_PER_METRE * printed.travel,
                 "cm",
-                place=place,
             ),
-            at_most("height of the printed crank shaft", TEXT, line, above, "cm", place="6.4.3, L5107"),
+            at_most("height of the printed crank shaft", text("6.4.3, L5107"), line, above, "cm"),
             at_most(
                 "quality function of the nineteen points, printed linkage, of ours",
-                TEXT,
+                text("6.4.3, L5115"),
                 1.0,
                 best_of_printed,
-                place="6.4.3, L5115",
                 why="not the optimum linkage, though its straight part is longer",
             ),
             at_most("the same of the printed linkage: less than the area", OURS, 1444.0, areas["printed"], "cm2"),
@@ -141,7 +138,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Region, points and curves (a), the straight parts with y enlarged, and the linkages (b)."""
+    """Draw region, points and curves (a), the straight parts with y enlarged, and the linkages (b)."""
     bounds = [curve_of(result, f"{name} bound", colour="0.55", line="--", width=0.8) for name in ("outer", "inner")]
     points = curve_of(result, "nineteen points", label="nineteen points", colour=TARGET, line="", marker="o")
     line = Curve(

@@ -1,9 +1,9 @@
-"""The methods of sections 6.2 and 6.3 that no figure shows: the combined quality function, the constraint of assembly.
+"""Methods of sections 6.2 and 6.3 without a figure: the combined quality function and the constraint of assembly.
 
-A path in time and the area between the curves may be asked for at once, and their quality functions added. For ellipse (a)
-the sum is made least here, with no link longer than the longest of either printed linkage, by the thesis's own downhill
-simplex from our two optima. The best crank phase of a linkage found for the path alone is taken: the thesis keeps th20 there
-although the area does not depend on it (L4700).
+The quality functions of a path in time and of the area between the curves may be added. For ellipse (a) the sum is
+minimised with no link longer than the longest of either printed linkage, by the thesis's downhill simplex from our two
+optima. A linkage found for the path alone gets its best crank phase: the thesis keeps th20 there although the area
+does not depend on it (L4700).
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from scipy.optimize import minimize, minimize_scalar
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...synthesis import Linkage, Search, TimedPath, UntimedPath, area_between, evaluate, synthesize, turn
-from ...synthesis.published import AREA_N, CM2_PER_M2, PROBLEMS, ellipse
-from ..study import OURS, TEXT, Study, StudyResult, at_least, at_most, near, padded
+from ..study import OURS, Study, StudyResult, at_least, at_most, near, padded, text
 from .chapter_6 import TRANSMISSION, FloatArray, best, our_error, printed_error
+from .problems import AREA_N, CM2_PER_M2, PROBLEMS, ellipse
 
 NUMBER = "quality"
 TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]
 LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
-#: Evaluations of a simplex, how often it is begun anew, and its size relative to the dimensions.
+#: Evaluations of a simplex, number of restarts, and its size relative to the dimensions.
 EVALUATIONS, ROUNDS, SIZE = 1500, 3, 0.01
-#: Error of a linkage that the limits refuse (cm2).
+#: Error of a linkage outside the limits (cm2).
 REFUSED = 1e6
-#: Random four-bars on which the constraint is tried.
+#: Number of random four-bars in the test of the constraint.
 SAMPLES = 10_000
 
 
 class Quality(NamedTuple):
-    """Both quality functions of a linkage: sum of squared distances in time, area between the curves (cm2)."""
+    """Quality functions of a linkage: sum of squared distances in time, and area between the curves (cm2)."""
 
     timed: float
     area: float
@@ -46,14 +46,14 @@ class Quality(NamedTuple):
 
 
 def both(linkage: Linkage) -> Quality:
-    """Both quality functions of a linkage for ellipse (a)."""
+    """Return both quality functions of a linkage for ellipse (a)."""
     assert isinstance(PATH.task, UntimedPath)
     area = area_between(linkage.path(turn(AREA_N)), PATH.task.path)
     return Quality(TIMED.convert(evaluate(TIMED.task, linkage).error), CM2_PER_M2 * area)
 
 
 def in_time(linkage: Linkage) -> Linkage:
-    """The linkage at the crank phase that suits the timed ellipse best."""
+    """Return the linkage with the crank phase of least error for the timed ellipse."""
 
     def error(phase: float) -> float:
         return evaluate(TIMED.task, replace(linkage, crank_phase=phase)).error
@@ -65,7 +65,7 @@ def in_time(linkage: Linkage) -> Linkage:
 
 
 def least_combined(start: Linkage) -> Linkage:
-    """The linkage of least combined error that the simplex finds from a linkage on."""
+    """Minimise the combined error by the downhill simplex from a linkage."""
     unit = np.maximum(np.abs(start.vector), 0.05)
 
     def linkage(x: FloatArray) -> Linkage:
@@ -88,14 +88,14 @@ def least_combined(start: Linkage) -> Linkage:
 
 @cache
 def linkages() -> dict[str, Linkage]:
-    """The linkages that are compared: printed for the timed ellipse and for the path, ours for each, and for both."""
+    """Return the linkages to compare: printed for the timed ellipse and for the path, ours for each, and for both."""
     ours = {"ours; timed": best("ellipse-a").linkage, "ours; path": in_time(best("path-a").linkage)}
     found = min((least_combined(start) for start in ours.values()), key=lambda linkage: both(linkage).combined)
     return {"printed; timed": TIMED.linkage, "printed; path": in_time(PATH.linkage), **ours, "ours; combined": found}
 
 
 def least_away_from_ends(seed: int = 64) -> int:
-    """Of random four-bars, how many have the least argument of the square root (6.12) at another angle than 0 or 180 deg."""
+    """Count the random four-bars whose square root (6.12) has its least argument at another angle than 0 or 180 deg."""
     l1, l2, l3, l4 = np.random.default_rng(seed).uniform(0.1, 1.0, (4, SAMPLES, 1))
     cosine = np.cos(turn(72))
     span = l1**2 + l2**2 - 2.0 * l1 * l2 * cosine
@@ -105,7 +105,7 @@ def least_away_from_ends(seed: int = 64) -> int:
 
 
 def minima(n: int) -> int:
-    """Different linkages of least error that 24 starts find for ellipse (a) timed at n points."""
+    """Return the different optima that 24 starts find for ellipse (a) timed at n points."""
     task = TimedPath(points=ellipse(10.0, n))
     return len(
         synthesize(task, TIMED.bounds, TIMED.constraints, search=Search(starts=24, candidates=1 << 13)).solutions
@@ -113,7 +113,7 @@ def minima(n: int) -> int:
 
 
 def compute() -> StudyResult:
-    """Both quality functions of the linkages."""
+    """Compute both quality functions of the linkages."""
     q = {name: both(linkage) for name, linkage in linkages().items()}
     found, timed, path = q["ours; combined"], q["ours; timed"], q["ours; path"]
     columns = {
@@ -127,37 +127,30 @@ def compute() -> StudyResult:
         assignment="The thesis gives no example: problem, equal weights and the limit of the links are our choice.",
         columns=padded(columns),
         verdicts=(
-            at_most(
-                "timed error of the combined optimum, of the path's", TEXT, 1.0, found.timed / path.timed, place=place
-            ),
-            at_most(
-                "area of the combined optimum, of the timed one's", TEXT, 1.0, found.area / timed.area, place=place
-            ),
+            at_most("timed error of the combined optimum, of the path's", text(place), 1.0, found.timed / path.timed),
+            at_most("area of the combined optimum, of the timed one's", text(place), 1.0, found.area / timed.area),
             at_most("combined error, of the lesser of the two optima's", OURS, 1.0, found.combined / least),
             at_least("its timed error, of the timed optimum's", OURS, 1.0, found.timed / timed.timed),
             at_least("its area, of the path's optimum's", OURS, 1.0, found.area / path.area),
             near(
                 f"four-bars of {SAMPLES} whose constraint (6.12) is least away from cos wt = 1 and -1",
-                TEXT,
+                text("6.3.2, L4514"),
                 0,
                 least_away_from_ends(),
                 0,
-                place="6.3.2, L4514",
             ),
             at_least(
                 "minima found at 72 points, more than at 12; timed ellipse (a)",
-                TEXT,
+                text("6.3.1, L4348"),
                 1,
                 minima(72) - minima(12),
-                place="6.3.1, L4348",
                 why="the same four at either",
             ),
             at_most(
                 "error of the printed linkage, of the least with no longer link; timed ellipse (a)",
-                TEXT,
+                text("6.3.1, L4366"),
                 1.0,
                 printed_error("ellipse-a") / our_error("ellipse-a"),
-                place="6.3.1, L4366",
                 why="the simplex did not locate the global minimum",
             ),
         ),
@@ -165,7 +158,7 @@ def compute() -> StudyResult:
 
 
 def draw(result: StudyResult) -> Figure:
-    """Area over timed error of each linkage."""
+    """Draw the area over the timed error of each linkage."""
     c = result.columns
     looks = {"printed": COLOURS[1], "ours": COLOURS[0]}
     curves = [

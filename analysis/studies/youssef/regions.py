@@ -1,5 +1,6 @@
-"""The first region of instability of the mechanisms of chapters IV and V: by the true orbit, by the linear equation put right,
-and by the thesis's own coefficients.
+"""First region of instability of the mechanisms of chapters IV and V, by four methods.
+
+The methods are the true orbit, the corrected linear equation, and the thesis's coefficients as printed and as listed.
 """
 
 from __future__ import annotations
@@ -31,12 +32,12 @@ TURNS = 2000
 
 
 def crank_speed(lambda_k2: float) -> float:
-    """Crank speed (rad/s) at a lambda_k^2."""
+    """Return the crank speed (rad/s) at a lambda_k^2."""
     return sqrt(SQUARE_OF_OMEGA_K / lambda_k2)
 
 
 def axis(region: Region) -> float:
-    """A of omega = A omega_k in the middle of a region."""
+    """Return A of omega = A omega_k in the middle of a region."""
     return 1.0 / sqrt(0.5 * (region.low + region.high))
 
 
@@ -44,19 +45,19 @@ def axis(region: Region) -> float:
 def equation(
     parameters: FiveBarParameters, variant: Variant = Variant.EXACT, form: Form = Form.STABILITY
 ) -> PeriodicEquation:
-    """The slider's equation without damping; without gravity it is the same at any speed."""
+    """Return the slider's undamped linear equation, which without gravity is the same at any speed."""
     undamped = replace(parameters, slider_damping=0.0)
     return slider_equation(undamped, crank_speed(0.25), variant=variant, form=form).homogeneous()
 
 
 def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Variant.EXACT) -> Region:
-    """A region by Hill's determinant, eq (5.35)."""
+    """Return a region by Hill's determinant, eq (5.35)."""
     return hill_regions(equation(parameters, variant), number)[number]
 
 
 @cache
 def right(parameters: FiveBarParameters) -> Region:
-    """The first region of the true periodic orbit, sought about that of the linear equation."""
+    """Return the first region of the true periodic orbit, searched near the region of the linear equation."""
     test = orbit_test(lambda lambda_k2, _: (parameters, Drive(speed=crank_speed(lambda_k2))), -1)
     linear = hill(parameters)
     found = scan(lambda x: test(x, 0.0), linear.low - 0.5 * linear.width, linear.high + 0.5 * linear.width, samples=8)
@@ -65,14 +66,14 @@ def right(parameters: FiveBarParameters) -> Region:
 
 
 def first_order(parameters: FiveBarParameters, variant: Variant) -> Region:
-    """Eq (5.16)."""
+    """Return the first region by eq (5.16)."""
     region = perturbed_region(equation(parameters, variant, Form.SERIES), 1, order=1)
     assert region is not None, "there is no damping"
     return region
 
 
 def appendix_3(parameters: FiveBarParameters) -> Region:
-    """Eq (5.16) by the listing: without 1/k0 in the half width, and a sine for a cosine."""
+    """Return the first region by eq (5.16) as listed: without 1/k0 in the half width, and with a sine for a cosine."""
     region = first_order(parameters, Variant.APPENDIX_3)
     middle = 0.5 * (region.low + region.high)
     half = 0.5 * region.width * equation(parameters, Variant.APPENDIX_3, Form.SERIES).factor.mean
@@ -90,7 +91,7 @@ LOOKS = {"true orbit": "-", "linear equation": "--", "(4.21) as printed": ":", "
 
 
 def removing_estimate(parameters: FiveBarParameters, number: int = 1) -> float:
-    """The damper (1/s) that removes a region of the linear equation put right, from its width."""
+    """Estimate the damper (1/s) that removes a region of the corrected linear equation from its width."""
     found = equation(parameters)
     return perturbed_removing_damping(found, number) * crank_speed(hill(parameters, number).low)
 
@@ -100,12 +101,12 @@ def removing_estimate(parameters: FiveBarParameters, number: int = 1) -> float:
 
 @cache
 def long_run(parameters: FiveBarParameters, lambda_k2: float) -> Confirmation:
-    """A long run of the nonlinear mechanism from close to its periodic orbit."""
+    """Run the nonlinear mechanism for many turns from close to its periodic orbit."""
     return confirm(parameters, Drive(speed=crank_speed(lambda_k2)), turns=TURNS)
 
 
 def run_verdicts(name: str, parameters: FiveBarParameters, places: Iterable[float]) -> list[Verdict]:
-    """What long runs say: growth by the multiplier, or bounded."""
+    """Judge long runs: their growth against the multiplier, or their boundedness."""
     verdicts = []
     for lambda_k2 in places:
         run, where = long_run(parameters, lambda_k2), f"long run; {name}, lambda_k^2 = {lambda_k2:g}"

@@ -1,4 +1,4 @@
-"""Studies of ours on rig 1: what lies about resonance, where it could not be run, and what friction explains."""
+"""Studies of ours on rig 1: the motions about resonance, where it could not be run, and the influence of friction."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Crossing, PeriodicOrbit, SpecialPoint, Sweep, sweep
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, unjudged
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, text, unjudged
 from .rigs import (
     FASTEST,
     GRID,
@@ -48,31 +47,31 @@ NAMES = ("below resonance", "lower branch", "upper branch", "period of two turns
 
 @cache
 def swept(spring: str, rising: bool) -> Sweep:
-    """What a machine meets as it speeds up or slows down step by step, with spring B about resonance."""
+    """Sweep the speed up or down in steps with spring B about resonance."""
     low, step = (SLOWEST, 25.0) if spring == "A" else (SPLIT, STEP)
     speeds = np.arange(low, FASTEST[spring] + 1.0, step) * RAD_S_PER_RPM
     return sweep(rig(spring), speeds if rising else speeds[::-1])
 
 
 def special_points() -> list[SpecialPoint]:
-    """Fold and period doublings of the branches about resonance with spring B."""
+    """Return the folds and period doublings of the branches about resonance with spring B."""
     return [special for branch in resonant_b().branches for special in branch.special]
 
 
 def speeds_of(kind: Crossing) -> list[float]:
-    """Their speeds (rpm)."""
+    """Return the speeds of special points (rpm)."""
     return [special.parameter / RAD_S_PER_RPM for special in special_points() if special.kind is kind]
 
 
 def upper_orbit(speed: float) -> PeriodicOrbit:
-    """The motion of large amplitude with spring B at a speed (rpm)."""
+    """Find the motion of large amplitude with spring B at a speed (rpm)."""
     upper = resonant_b().branches[1]
     near_it = upper.orbits[int(np.argmin(np.abs(rpm(upper) - speed)))]
     return orbit(rig("B"), speed, near_it.start)
 
 
 def compute_rig_1() -> StudyResult:
-    """Branches of periodic motions, and sweeps with rising and falling speed."""
+    """Compute branches of periodic motions, and sweeps with rising and falling speed."""
     columns = columns_of(motions("A").branches[0], "spring A")
     for name, branch in zip(NAMES, motions("B").branches + resonant_b().branches):
         columns |= columns_of(branch, f"spring B; {name}")
@@ -116,7 +115,7 @@ def compute_rig_1() -> StudyResult:
 
 
 def draw_rig_1(result: StudyResult) -> Figure:
-    """Amplitude over the speed: spring A, spring B up to resonance, and the motions about it."""
+    """Draw the amplitude over the speed: spring A, spring B up to resonance, and the motions about resonance."""
     below = [c for n in NAMES[:2] for c in curves_over_speed(result, f"spring B; {n}", COLOURS[0])]
     about = [c for n, colour in zip(NAMES[1:], COLOURS) for c in curves_over_speed(result, f"spring B; {n}", colour, n)]
     for name, label, line, marker, colour in (
@@ -158,13 +157,13 @@ PIN_RADIUS = 3e-4
 
 
 def lowered(spring: str, **changes: float) -> NDArray[np.float64]:
-    """By what part changes of the rig lower the amplitude at the speeds of comparison."""
+    """Return the relative decrease of the amplitude by changes of the rig, at the speeds of comparison."""
     speeds = COMPARED[spring]
     return np.array([1.0 - amplitude(turn(spring, w, **changes)) / amplitude(turn(spring, w)) for w in speeds])
 
 
 def lag(spring: str, speed: float, coefficient: float) -> float:
-    """By how much friction delays the oscillation, where the two agree best (deg of crank angle)."""
+    """Return the delay of the motion by friction that gives the best agreement (deg of crank angle)."""
     rough, smooth = (slider(turn(spring, speed, slider_friction_coefficient=c))[:-1] for c in (coefficient, 0.0))
     together = np.fft.irfft(np.fft.rfft(rough - rough.mean()) * np.conj(np.fft.rfft(smooth - smooth.mean())))
     shift = 360.0 / len(rough) * int(np.argmax(together))
@@ -172,7 +171,7 @@ def lag(spring: str, speed: float, coefficient: float) -> float:
 
 
 def lost_to_friction(speed: float, coefficient: float) -> float:
-    """Work of friction in the guide over that of the damper in a crank cycle; spring A."""
+    """Return the work of friction in the guide relative to the damper's, over a crank cycle with spring A."""
     of = turn("A", speed, slider_friction_coefficient=coefficient)
     v = of["slider.velocity"]
     viscous = rig("A").slider_damping * np.mean(v**2)
@@ -180,7 +179,7 @@ def lost_to_friction(speed: float, coefficient: float) -> float:
 
 
 def _with(coefficient: float) -> list[Verdict]:
-    """What a coefficient does to what the text says of the amplitudes."""
+    """Judge the statements on the amplitudes with a coefficient of friction."""
     friction, words = {"slider_friction_coefficient": coefficient}, f"; coefficient {coefficient:g}"
     taken = {s: lowered(s, **friction) for s in "AB"}
     shift, ratio = max(abs(lag("A", w, coefficient)) for w in COMPARED["A"]), taken["B"].mean() / taken["A"].mean()
@@ -194,26 +193,20 @@ def _with(coefficient: float) -> list[Verdict]:
     fractions = "rise of the amplitude at a third and a quarter of the natural frequency, spring"
     agree, most = "8.4.1.1, L6484", taken["A"].max()
     return [
-        at_most(f"amplitude taken off at 390 to 450 rpm, spring A{words}", TEXT, 0.1, most, place=agree, why=more),
-        at_most(
-            f"shift of the phase at 390 to 450 rpm, spring A{words}", TEXT, 5.0, shift, "deg", place=agree, why=more
-        ),
-        at_most(
-            f"work of Coulomb over viscous friction, 420 rpm{words}", TEXT, 1.0, work, place="8.4.1.1, L6494", why=more
-        ),
-        at_least(f"amplitude taken off, spring B over A{words}", TEXT, 1.0, ratio, place="8.4.1.1, L6526", why=less),
+        at_most(f"amplitude taken off at 390 to 450 rpm, spring A{words}", text(agree), 0.1, most, why=more),
+        at_most(f"shift of the phase at 390 to 450 rpm, spring A{words}", text(agree), 5.0, shift, "deg", why=more),
+        at_most(f"work of Coulomb over viscous friction, 420 rpm{words}", text("8.4.1.1, L6494"), 1.0, work, why=more),
+        at_least(f"amplitude taken off, spring B over A{words}", text("8.4.1.1, L6526"), 1.0, ratio, why=less),
         *(
-            at_most(f"{fractions} {s}{words}", TEXT, NOTICED, value, place="8.4.1.2, L6770", why=hidden[s])
+            at_most(f"{fractions} {s}{words}", text("8.4.1.2, L6770"), NOTICED, value, why=hidden[s])
             for s, value in rises.items()
         ),
-        at_least(
-            f"displacement at 800 over 570 rpm, B{words}", TEXT, 1.0, last / half, place="8.4.1.2, L6555", why=remains
-        ),
+        at_least(f"displacement at 800 over 570 rpm, B{words}", text("8.4.1.2, L6555"), 1.0, last / half, why=remains),
     ]
 
 
 def compute_friction() -> StudyResult:
-    """Amplitude over the speed with friction, and what becomes of the statements on the amplitudes."""
+    """Compute the amplitude over the speed with friction, and judge the statements on the amplitudes."""
     columns: dict[str, NDArray[np.float64]] = {}
     for s in "AB":
         columns[f"speed; spring {s} [rpm]"] = GRID[s]
@@ -242,33 +235,23 @@ def compute_friction() -> StudyResult:
         columns=padded(columns),
         verdicts=(
             at_least(
-                "greatest force of the guide in a cycle over its mean, 420 rpm",
-                TEXT,
-                1.1,
-                within,
-                place="8.4.1.1, L6496",
+                "greatest force of the guide in a cycle over its mean, 420 rpm", text("8.4.1.1, L6496"), 1.1, within
             ),
-            at_least("greatest force of the guide at 450 over 390 rpm", TEXT, 1.1, over, place="8.4.1.1, L6496"),
+            at_least("greatest force of the guide at 450 over 390 rpm", text("8.4.1.1, L6496"), 1.1, over),
             at_most(
-                "force of the guide less the joint's, 420 rpm",
-                TEXT,
-                0.1,
-                weight,
-                "N",
-                place="8.4.1.1, L6498",
-                why=carried,
+                "force of the guide less the joint's, 420 rpm", text("8.4.1.1, L6498"), 0.1, weight, "N", why=carried
             ),
-            at_least(tried, TEXT, 1.0, whole, place="8.4.1.1, L6486", why="what hides one departure makes another"),
+            at_least(tried, text("8.4.1.1, L6486"), 1.0, whole, why="what hides one departure makes another"),
             *_with(SLIGHT),
             *_with(STRONG),
-            unjudged("the average of the damping coefficient contributes", TEXT, why, place="8.4.1.1, L6510"),
-            unjudged("friction in the pins contributes", TEXT, why_pins, place="8.4.1.1, L6512"),
+            unjudged("the average of the damping coefficient contributes", text("8.4.1.1, L6510"), why),
+            unjudged("friction in the pins contributes", text("8.4.1.1, L6512"), why_pins),
         ),
     )
 
 
 def draw_friction(result: StudyResult) -> Figure:
-    """Amplitude over the speed, and a turn, one curve a coefficient."""
+    """Draw the amplitude over the speed and a turn, one curve a coefficient."""
     panels = []
     for s, speed in SHOWN.items():
         verticals = {words: place for words, place in marks(s, 2, 3, 4).items() if place > GRID[s][0]}

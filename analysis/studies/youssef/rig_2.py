@@ -1,4 +1,4 @@
-"""The resonance curves of rig 2, figures 8.19 to 8.21, and what its drive and its pins carry."""
+"""Resonance curves of rig 2, figures 8.19 to 8.21, and the loads on its drive and pins."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Branch
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ...youssef import HarmonicMotion, Variant, nonlinear_harmonic_balance, slider_equation, two_harmonics
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text, unjudged
 from .rigs import (
     FASTEST,
     LOST,
@@ -48,17 +47,17 @@ BEYOND, STRONGER = 1000.0, 1.25
 
 @cache
 def linear_motion(spring: str, speed: float) -> HarmonicMotion:
-    """u/l4 at a speed (rpm) by two harmonics of the linear equation of chapter IV, put right."""
+    """Return u/l4 at a speed (rpm) by two harmonics of the corrected linear equation of chapter IV."""
     return two_harmonics(slider_equation(rig(spring), speed * RAD_S_PER_RPM, variant=Variant.SECOND_ORDER))
 
 
 def length(spring: str) -> float:
-    """The rocker's length (cm), over which amplitudes are."""
+    """Return the rocker's length (cm), the reference of amplitudes."""
     return CM_PER_METRE * rig(spring).rocker_length
 
 
 def compute_resonance(number: str, spring: str) -> StudyResult:
-    """Amplitude over the speed by the full equations and by two harmonics of the linear one."""
+    """Compute the amplitude over the speed by the full equations and by two harmonics of the linear one."""
     (branch,), l4 = motions(spring).branches, length(spring)
     place, peak = near_fraction(spring, 1)
     speeds = np.unique(np.append(CURVE, place)).tolist()
@@ -84,7 +83,7 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
         verdicts=(
             *_natural_frequencies(spring, place),
             *_beyond(spring),
-            at_most("error of the linear equation at resonance, relative", TEXT, 0.01, error, place="8.4.2.2, L6976"),
+            at_most("error of the linear equation at resonance, relative", text("8.4.2.2, L6976"), 0.01, error),
             at_most("difference between orbits and nonlinear harmonic balance", OURS, SAME, apart, "cm"),
             runs_verdict(spring, checked),
             at_most("largest Floquet multiplier over all speeds", OURS, 1.0, largest),
@@ -93,12 +92,12 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
 
 
 def _natural_frequencies(spring: str, place: float) -> list[Verdict]:
-    """What the thesis sees and calculates."""
+    """Judge the natural frequencies that the thesis measures and calculates."""
     (seen, calculated, right), natural = NATURAL[spring], natural_speed(spring)
     why, section = "582 and 829 rpm are not as 1 to the root of 2", "8.4.2.2, L6867"
     verdicts = [
-        near("speed of the greatest amplitude", TEXT, seen, place, 5.0, "rpm", place="8.4.2.2, L6861"),
-        near("calculated natural frequency", TEXT, calculated, natural, 0.5, "rpm", place=section, why=why),
+        near("speed of the greatest amplitude", text("8.4.2.2, L6861"), seen, place, 5.0, "rpm"),
+        near("calculated natural frequency", text(section), calculated, natural, 0.5, "rpm", why=why),
         near("natural frequency from the mean effective mass", OURS, right, natural, 0.05, "rpm"),
     ]
     if spring == "C":
@@ -106,21 +105,13 @@ def _natural_frequencies(spring: str, place: float) -> list[Verdict]:
     ratio, rounding = natural / natural_speed("C"), 0.5 / 582.0 + 0.5 / 829.0
     return [
         *verdicts,
-        near(
-            "natural frequency over spring C's",
-            TEXT,
-            829.0 / 582.0,
-            ratio,
-            rounding,
-            place=section,
-            why="the root of 2",
-        ),
+        near("natural frequency over spring C's", text(section), 829.0 / 582.0, ratio, rounding, why="the root of 2"),
         near("natural frequency over spring C's, the root of 2", OURS, sqrt(2.0), ratio, 1e-9),
     ]
 
 
 def _beyond(spring: str) -> list[Verdict]:
-    """Whether what the thesis names makes resonance wider and the amplitude beyond it larger than the theory's."""
+    """Judge whether the causes named in the thesis broaden the resonance and raise the amplitude beyond it."""
     base, damping = amplitude(turn(spring, BEYOND)), STRONGER * rig(spring).slider_damping
     rough, damped = (
         turn(spring, BEYOND, slider_friction_coefficient=SLIGHT),
@@ -133,14 +124,14 @@ def _beyond(spring: str) -> list[Verdict]:
     }
     words, section, why = f"amplitude at {BEYOND:g} rpm over that of the theory", "8.4.2.2, L6847", "it is lowered"
     return [
-        unjudged("theory and experiment agree up to resonance", TEXT, LOST, place="8.4.2.2, L6839"),
-        unjudged("theory has a narrower resonance, smaller amplitudes beyond", TEXT, LOST, place="8.4.2.2, L6841"),
-        *(at_least(f"{words}, {name}", TEXT, 1.0, r, place=section, why=why) for name, r in ratios.items()),
+        unjudged("theory and experiment agree up to resonance", text("8.4.2.2, L6839"), LOST),
+        unjudged("theory has a narrower resonance, smaller amplitudes beyond", text("8.4.2.2, L6841"), LOST),
+        *(at_least(f"{words}, {name}", text(section), 1.0, r, why=why) for name, r in ratios.items()),
     ]
 
 
 def draw_resonance(spring: str, result: StudyResult) -> Figure:
-    """Amplitude over l4 over the speed."""
+    """Draw the amplitude relative to l4 over the speed."""
     panel = Panel(
         x_label="crank speed [rpm]",
         y_label="amplitude of u / l4",
@@ -168,7 +159,7 @@ ORDERS = (1, 2, 3)
 
 
 def compute_harmonics() -> StudyResult:
-    """The second harmonic over l4 over the speed, by the full and the linear equations; the first and third beside it."""
+    """Compute three harmonics relative to l4 over the speed, and the second by the linear equation too."""
     columns: dict[str, NDArray[np.float64]] = {}
     verdicts: list[Verdict] = []
     points = CURVE[::3]
@@ -187,14 +178,14 @@ def compute_harmonics() -> StudyResult:
             "greatest harmonic 1 over greatest harmonic 2",
             f"{sizes[1][at] / sizes[2][at]:.0f} at resonance itself",
         )
-        verdicts.append(near(f"{words}; {name}", TEXT, 50.0, ratio, 5.0, place="8.4.2.2, L6881", why=why))
+        verdicts.append(near(f"{words}; {name}", text("8.4.2.2, L6881"), 50.0, ratio, 5.0, why=why))
         for n, part in ((2, "half"), (3, "a third"), (4, "a quarter")):
             above, words = rise_at(spring, n), f"rise of the amplitude at {part} of the natural frequency, relative"
             why = f"harmonic {n} makes {10.0 * near_fraction(spring, n)[1]:.2f} mm there" if above > NOTICED else ""
-            verdicts.append(at_most(f"{words}; {name}", TEXT, NOTICED, above, place="8.4.2.2, L6871", why=why))
+            verdicts.append(at_most(f"{words}; {name}", text("8.4.2.2, L6871"), NOTICED, above, why=why))
         words, left = f"the same at half with friction by {SLIGHT:g} of the guide's force", rise(spring, SLIGHT, 2)
         why = "more than linear bearings have does not hide it"
-        verdicts.append(at_most(f"{words}; {name}", TEXT, NOTICED, left, place="8.4.2.2, L6857, L6871", why=why))
+        verdicts.append(at_most(f"{words}; {name}", text("8.4.2.2, L6857, L6871"), NOTICED, left, why=why))
         verdicts.append(at_most(f"error of harmonic 2 by the linear equation, relative; {name}", OURS, 0.1, error))
     return StudyResult(
         number="8.21",
@@ -205,7 +196,7 @@ def compute_harmonics() -> StudyResult:
 
 
 def draw_harmonics(result: StudyResult) -> Figure:
-    """The harmonics, one panel a spring, the second in front."""
+    """Draw the harmonics, one panel a spring, the second in front."""
     panels = []
     for spring in "CD":
         name = f"spring {spring}"
@@ -252,7 +243,7 @@ TORQUES = ("greatest crank torque", "mean crank torque")
 
 
 def compute_forces() -> StudyResult:
-    """Crank torque and pin forces along the motions, and what resonance adds to the law of low speeds."""
+    """Compute crank torque and pin forces along the motions, and their departure from the law of low speeds."""
     columns: dict[str, NDArray[np.float64]] = {}
     verdicts: list[Verdict] = []
     for spring in "CD":
@@ -284,12 +275,12 @@ def compute_forces() -> StudyResult:
 
 
 def amplification(branch: Branch, force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A force along a branch over what it would be if it grew with the square of the speed from the branch's low end."""
+    """Return a force along a branch relative to one that grows with the square of the speed from the branch's low end."""
     return np.asarray(force / (force[0] * (branch.parameter / branch.parameter[0]) ** 2))
 
 
 def power_balance(branch: Branch) -> float:
-    """Mean power at the crank less the damper's, relative to the greatest torque's; the greatest along a branch."""
+    """Return the greatest difference of mean crank and damper power along a branch, relative to that of the greatest torque."""
     damping = branch.family.parameters.slider_damping
     worst = 0.0
     for speed, of in zip(branch.parameter, (motion.turn() for motion in branch.orbits)):
@@ -300,7 +291,7 @@ def power_balance(branch: Branch) -> float:
 
 
 def draw_forces(result: StudyResult) -> Figure:
-    """Torque above, pin forces below, one column a spring; dotted the law of low speeds."""
+    """Draw the torque above and the pin forces below, one column a spring, with the law of low speeds dotted."""
     torques, forces = [], []
     for spring in "CD":
         name = f"spring {spring}"

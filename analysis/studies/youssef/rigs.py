@@ -1,7 +1,7 @@
-"""What the figures of chapter VIII share: the two rigs and their periodic motions over the speed, in rpm and cm.
+"""The two rigs of chapter VIII and their periodic motions over the speed, in rpm and cm.
 
-Rig 1 lies in a vertical plane, with spring A or B; rig 2, whose crank is a twentieth of the other links, in a horizontal one,
-with spring C or D. The amplitude is half the distance between the least and the greatest slider position over a period.
+Rig 1, with spring A or B, lies in a vertical plane. Rig 2, with spring C or D, lies in a horizontal plane, and its crank
+is a twentieth of the other links. The amplitude is half the range of the slider position over a period.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
+from linkwork.five_bar.published import SETS
 
 from ...figures import Curve
 from ...periodic import (
@@ -28,13 +28,14 @@ from ...periodic import (
     frequency_response,
     natural_frequency,
 )
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..study import OURS, StudyResult, Verdict, at_most
 from .runs import SETTLING_TIME, steady_turn
 
 LOST = "the measured curve is lost with the figure"
-#: A rise of the amplitude up to which the thesis would hardly have noticed it, and departures from a sine, relative.
+#: Relative rise of the amplitude, and departure from a sine, that the thesis would hardly have noticed.
 NOTICED = 0.05
-#: Coefficient of friction in the guide that lowers the amplitude slightly.
+#: Coefficient of friction in the guide that reduces the amplitude slightly.
 SLIGHT = 0.05
 #: The rig of each spring.
 RIG = {"A": 1, "B": 1, "C": 2, "D": 2}
@@ -42,7 +43,7 @@ RIG = {"A": 1, "B": 1, "C": 2, "D": 2}
 #: on; below it the branches that come down from resonance run into the limit of assembly.
 SLOWEST, SPLIT = 100.0, 900.0
 FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
-#: Speeds (rpm) at which friction in the guide is tried, of rig 2 about half the natural frequency.
+#: Speeds (rpm) of the studies of friction in the guide, for rig 2 about half the natural frequency.
 GRID = {
     spring: np.arange(first, last + 1.0, 5.0)
     for spring, first, last in (("A", 150, 520), ("B", 250, 820), ("C", 250, 350), ("D", 360, 500))
@@ -51,81 +52,81 @@ GRID = {
 SAME = 1e-4
 #: Samples of a turn.
 SAMPLES = 1440
-#: Greatest steps of the continuation: a two hundredth of the range of speeds, so that the resonance of the third harmonic
-#: is not stepped over; and a fiftieth, where resonance itself makes for shorter steps.
+#: Greatest steps of the continuation relative to the range of speeds: fine enough to resolve the resonance of the third
+#: harmonic, and coarse where the resonance itself shortens the steps.
 FINE, COARSE = 5e-3, 2e-2
 
 
 @cache
 def rig(spring: str, **changes: float) -> FiveBarParameters:
-    """The rig of a spring, with changes of its parameters."""
+    """Return the rig of a spring, with changes of its parameters."""
     parameters: FiveBarParameters = replace(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters, **changes)
     return parameters
 
 
 def natural_speed(spring: str) -> float:
-    """Crank speed at the slider's natural frequency with the mean effective mass (rpm)."""
+    """Return the crank speed at the slider's natural frequency with the mean effective mass (rpm)."""
     return natural_frequency(rig(spring)) / RAD_S_PER_RPM
 
 
 @cache
 def response(spring: str, low: float, high: float, greatest_step: float = FINE) -> Response:
-    """The periodic motions over a range of speeds (rpm), no branch of it lost."""
+    """Return the periodic motions over a range of speeds (rpm), with no branch lost."""
     found = frequency_response(rig(spring), low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, greatest_step=greatest_step)
     assert not found.problems, found.problems
     return found
 
 
 def motions(spring: str) -> Response:
-    """The periodic motions over all speeds, with spring B up to `SPLIT`."""
+    """Return the periodic motions over all speeds, with spring B up to `SPLIT`."""
     return response(spring, SLOWEST, SPLIT if spring == "B" else FASTEST[spring])
 
 
 def resonant_b() -> Response:
-    """Periodic motions with spring B about resonance: the lower branch first, then the upper one."""
+    """Return the periodic motions with spring B about resonance: the lower branch, then the upper one."""
     return response("B", SPLIT, FASTEST["B"], COARSE)
 
 
 def orbit(parameters: FiveBarParameters, speed: float, start: NDArray[np.float64] | None = None) -> PeriodicOrbit:
-    """The periodic motion at a speed (rpm), the one near a start if one is given."""
+    """Find the periodic motion at a speed (rpm), near a start if one is given."""
     return find_orbit(parameters, speed=speed * RAD_S_PER_RPM, start=start)
 
 
 @cache
 def turn(spring: str, speed: float, **changes: float) -> Turn:
-    """One turn of the steady motion at a speed (rpm), with changes of the rig's parameters."""
+    """Return one turn of the steady motion at a speed (rpm), with changes of the rig's parameters."""
     return orbit(rig(spring, **changes), speed).turn(SAMPLES)
 
 
 def slider(of: Turn) -> NDArray[np.float64]:
-    """Slider position over a turn, its first value once more at the end (cm)."""
+    """Return the slider position over a turn (cm), with its first value repeated at the end."""
     u = CM_PER_METRE * of["slider.position"]
     return np.append(u, u[0])
 
 
 def amplitude(of: Turn) -> float:
-    """Half the distance between the least and the greatest slider position (cm)."""
+    """Return half the range of the slider position (cm)."""
     return 0.5 * float(np.ptp(slider(of)))
 
 
 def turns_of_sign(x: NDArray[np.float64]) -> int:
-    """How often a periodic sequence changes its sign."""
+    """Count the changes of sign of a periodic sequence."""
     return int(np.sum(np.sign(x) != np.sign(np.roll(x, 1))))
 
 
 def peaks(of: Turn) -> int:
-    """Highest and lowest points of the slider position over a turn, together, as the thesis counts them."""
+    """Count the maxima and minima of the slider position over a turn together, as the thesis does."""
     return turns_of_sign(np.diff(slider(of)))
 
 
 def harmonic(of: Turn, order: int) -> float:
-    """Amplitude of a harmonic of the crank's turn in the slider position (cm)."""
+    """Return the amplitude of a harmonic of the crank's turn in the slider position (cm)."""
     return CM_PER_METRE * float(of.harmonic("slider.position", order))
 
 
 @cache
 def speed_of_fewer_peaks(spring: str, low: float, high: float) -> float:
-    """Speed above which the slider has two peaks a turn instead of four (rpm), to 0.1 rpm."""
+    """Find the speed (rpm, to 0.1) above which the slider has two peaks a turn instead of four."""
     while high - low > 0.1:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if peaks(turn(spring, middle)) > 2 else (low, middle)
@@ -133,24 +134,24 @@ def speed_of_fewer_peaks(spring: str, low: float, high: float) -> float:
 
 
 def rpm(branch: Branch) -> NDArray[np.float64]:
-    """Speeds along a branch (rpm)."""
+    """Return the speeds along a branch (rpm)."""
     return branch.parameter / RAD_S_PER_RPM
 
 
 def between(extrema: Sequence[Extremum], low: float, high: float) -> tuple[float, float]:
-    """Speed (rpm) and amplitude (cm) of the one extremum between two speeds (rpm)."""
+    """Return speed (rpm) and amplitude (cm) of the one extremum between two speeds (rpm)."""
     (found,) = (e for e in extrema if low < e.parameter / RAD_S_PER_RPM < high)
     return found.parameter / RAD_S_PER_RPM, CM_PER_METRE * found.amplitude
 
 
 def near_fraction(spring: str, order: int) -> tuple[float, float]:
-    """Speed (rpm) and amplitude (cm) of the greatest amplitude near 1/order of the natural frequency."""
+    """Return speed (rpm) and amplitude (cm) of the maximum near 1/order of the natural frequency."""
     place = natural_speed(spring) / order
     return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
 
 
 def rise_at(spring: str, order: int) -> float:
-    """By what part the amplitude at its maximum near 1/order of the natural frequency exceeds the next minimum above."""
+    """Return the relative rise of the maximum near 1/order of the natural frequency over the next minimum above it."""
     tops = [
         e
         for e in motions(spring).maxima()
@@ -162,7 +163,7 @@ def rise_at(spring: str, order: int) -> float:
 
 @cache
 def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
-    """Amplitude (cm) at the speeds of `GRID` with friction in the guide by a part of its force."""
+    """Return the amplitude (cm) at the speeds of `GRID` with a coefficient of friction in the guide."""
     parameters, start, found = rig(spring, slider_friction_coefficient=coefficient), None, []
     for speed in GRID[spring].tolist():
         motion = orbit(parameters, speed, start)
@@ -172,7 +173,7 @@ def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
 
 
 def rise(spring: str, coefficient: float, order: int) -> float:
-    """By what part a maximum near 1/order of the natural frequency exceeds the next minimum above; 0 without one."""
+    """Return the rise of `rise_at` with a coefficient of friction in the guide; 0 without a maximum."""
     size, speeds = over_speed(spring, coefficient), GRID[spring]
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])) + 1
     lows = np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
@@ -182,7 +183,7 @@ def rise(spring: str, coefficient: float, order: int) -> float:
 
 
 def columns_of(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
-    """Amplitude along a branch as columns, its stable and, if it has one, its unstable part; see `curves_over_speed`."""
+    """Return the amplitude along a branch as columns for its stable and unstable parts; see `curves_over_speed`."""
     amplitude = CM_PER_METRE * branch.amplitude
     stable = np.array([verdict is Stability.STABLE for verdict in branch.stability()])
     # a dashed part begins and ends on the solid one
@@ -194,7 +195,7 @@ def columns_of(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
 
 
 def curves_over_speed(result: StudyResult, name: str, colour: str, label: str = "") -> list[Curve]:
-    """Amplitude along a branch, its stable part solid and its unstable one dashed."""
+    """Return the amplitude along a branch as curves, its stable part solid and its unstable part dashed."""
     speed = result.columns[f"speed; {name} [rpm]"]
     curves = [Curve(x=speed, y=result.columns[f"stable; {name} [cm]"], label=label, colour=colour)]
     if f"unstable; {name} [cm]" in result.columns:
@@ -203,13 +204,13 @@ def curves_over_speed(result: StudyResult, name: str, colour: str, label: str = 
 
 
 def marks(spring: str, *orders: int) -> Mapping[str, float]:
-    """The natural frequency of a spring, or parts of it, as marks of a panel."""
+    """Return the natural frequency of a spring, or fractions of it, as marks of a panel."""
     words = {1: "natural", 2: "half", 3: "a third", 4: "a quarter"}
     return {f"{words[n]}, {natural_speed(spring) / n:.0f}": natural_speed(spring) / n for n in orders}
 
 
 def runs_verdict(spring: str, speeds: Sequence[float]) -> Verdict:
-    """That runs from rest at u = 0 end in the orbits, at a few speeds (rpm)."""
+    """Judge that runs from rest at u = 0 end in the periodic motions at some speeds (rpm)."""
     worst = 0.0
     for speed in speeds:
         run = steady_turn(rig(spring), speed)
@@ -225,7 +226,7 @@ def runs_verdict(spring: str, speeds: Sequence[float]) -> Verdict:
 
 
 def largest_multiplier(spring: str, low: float, high: float) -> float:
-    """The largest Floquet multiplier over a range of speeds (rpm)."""
+    """Return the largest Floquet multiplier over a range of speeds (rpm)."""
     (branch,) = motions(spring).branches
     within = (rpm(branch) >= low) & (rpm(branch) <= high)
     return float(branch.largest_multiplier[within].max())

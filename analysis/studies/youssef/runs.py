@@ -1,6 +1,6 @@
-"""The runs behind the figures, each made once however many figures show it.
+"""The runs behind the figures, cached so that figures share them.
 
-Parameters come in the thesis's units (dyn/cm, dyn.s/cm, dyn.cm, rpm), as its text names them; results are in cm, degrees,
+Parameters are in the thesis's units (dyn/cm, dyn.s/cm, dyn.cm, rpm), as its text names them; results are in cm, degrees,
 turns, rad/s and N.m.
 """
 
@@ -14,29 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.published import (
-    CM_PER_METRE,
-    DYN_PER_CM_PER_NEWTON_PER_METRE,
-    RAD_S_PER_RPM,
-    TABLE_3_1,
-)
+from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE, TABLE_3_1
 
 from ...run import Inputs, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
 
 #: Crank speed of chapter III (rpm).
 SPEED = 420.0
 #: Springs of Fig 3.4 to 3.14 (dyn/cm).
 STIFFNESSES = (5e5, 1e6, 2e6)
-#: Part of the scale of a graph that its reader no longer sees.
+#: Share of the scale of a graph below which its reader sees no difference.
 ON_THE_GRAPH = 0.05
-#: How far from linear, relative to itself, what counts as linear may be.
+#: Relative departure from a line up to which a quantity counts as linear.
 LINEAR = 0.1
-#: How long a motion is given to become steady (s).
+#: Time for a motion to become steady (s).
 SETTLING_TIME = 8.0
 
 
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
-    """The mechanism of Table 3.1 with a spring (dyn/cm), a damper (dyn.s/cm) and gravity (m/s2)."""
+    """Return the mechanism of Table 3.1 with a spring (dyn/cm), a damper (dyn.s/cm) and gravity (m/s2)."""
     return replace(
         TABLE_3_1,
         slider_stiffness=stiffness / DYN_PER_CM_PER_NEWTON_PER_METRE,
@@ -46,12 +42,12 @@ def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> 
 
 
 def plain(value: float) -> str:
-    """A value as the thesis's tables are quoted here and in the CSV headers: 5e5."""
+    """Format a value as in the thesis's tables and in CSV headers: 5e5."""
     return f"{value:.0e}".replace("e+0", "e")
 
 
 def scientific(value: float) -> str:
-    """The same in print: 5 times a power of ten, a leading 1 left out."""
+    """Format a value for print: 5 times a power of ten, a leading 1 omitted."""
     digits, exponent = plain(value).split("e")
     power = "10" + exponent.translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return power if digits == "1" else f"{digits}\N{MULTIPLICATION SIGN}{power}"
@@ -59,9 +55,9 @@ def scientific(value: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SteadyTurn:
-    """One turn of the steady motion, samples at equal crank angles, the last at 360 deg.
+    """One turn of the steady motion, sampled at equal crank angles, the last at 360 deg.
 
-    ``change`` is how much the slider position differs from the turn before at most (cm): how steady it is.
+    ``change`` is the largest difference of the slider position from the turn before (cm), a measure of steadiness.
     """
 
     angle_deg: NDArray[np.float64]
@@ -76,18 +72,18 @@ class SteadyTurn:
 
     @property
     def peaks(self) -> int:
-        """Highest and lowest points of the slider position over the turn, together."""
+        """Number of maxima and minima of the slider position over the turn, together."""
         rise = np.diff(self.slider_cm)
         return int(np.sum(np.sign(rise) != np.sign(np.roll(rise, 1))))
 
     def harmonic(self, order: int) -> float:
-        """Amplitude of a harmonic of the crank's turn in the slider position (cm)."""
+        """Return the amplitude of a harmonic of the crank's turn in the slider position (cm)."""
         return 2.0 * float(np.abs(np.fft.rfft(self.slider_cm[:-1])[order])) / (len(self.slider_cm) - 1)
 
 
 @cache
 def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[float, float] = (0.0, 0.0)) -> SteadyTurn:
-    """The steady motion that a run ends in; from rest at u = 0, or from another (u, u') at crank angle 0 (m, m/s)."""
+    """Run until the motion is steady and return a turn; from rest at u = 0 or from (u, u') at crank angle 0 (m, m/s)."""
     period, samples = 60.0 / speed_rpm, 1440
     inputs = Inputs(speed=speed_rpm * RAD_S_PER_RPM)
     turns = ceil(SETTLING_TIME / period)
@@ -117,7 +113,7 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
 
 
 def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Place and value of the least of evenly spaced samples, by the parabola through it and its neighbours."""
+    """Return place and value of the minimum of evenly spaced samples, by a parabola through three of them."""
     i = int(np.clip(np.argmin(y), 1, len(y) - 2))
     a, b, c = y[i - 1 : i + 2]
     shift = 0.5 * (a - c) / (a - 2.0 * b + c)
@@ -125,11 +121,11 @@ def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]
 
 
 def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Place and value of the greatest of evenly spaced samples; see `least`."""
+    """Return place and value of the maximum of evenly spaced samples; see `least`."""
     place, value = least(x, -y)
     return place, -value
 
 
 def greatest_ratio(values: NDArray[np.float64]) -> float:
-    """The greatest ratio of a value to the one before it."""
+    """Return the greatest ratio of a value to its predecessor."""
     return float((values[1:] / values[:-1]).max())

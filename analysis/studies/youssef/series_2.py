@@ -1,10 +1,10 @@
-"""Series 2 of chapter VII: the rocker pivot of two printed four-bars moved by two harmonics of the crank's rotation.
+"""Series 2 of chapter VII: two harmonics of the crank's rotation move the rocker pivot of two printed four-bars.
 
-The printed series of path (b) has a misprint: with A0 = 0.31 cm where 3.1 stands, and the guide's angle counted from the
-horizontal, it gives the 4.3 cm2 that are stated. That of the rocker function gives its 4.8 deg2 in no reading. The direct
-search with exact derivatives finds better motions for both, and shows what more harmonics bring. No motion at all traces the
-whole of path (b) with these links: P is never farther from the crank shaft than l2 + r, and a part of the ellipse lies beyond.
-Lengths and errors are in the units of print, cm and degrees.
+The printed series of path (b) has a misprint: with A0 = 0.31 cm for 3.1 cm, and the guide's angle measured from the
+horizontal, it gives the stated 4.3 cm2. The series of the rocker function gives its 4.8 deg2 in no reading. The direct
+search with exact derivatives finds better motions for both, and shows the gain of more harmonics. No motion traces all
+of path (b) with these links: the distance of P from the crank shaft is at most l2 + r, and part of the ellipse lies
+beyond. Lengths and errors are in the units of print, cm and degrees.
 """
 
 from __future__ import annotations
@@ -18,10 +18,8 @@ from math import degrees, pi, radians
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE
-
+from ...display import format_count
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...notebook import format_count
 from ...numerics.fourier import FourierSeries
 from ...slider import slider_motion
 from ...synthesis import (
@@ -35,9 +33,10 @@ from ...synthesis import (
     evaluate,
     turn,
 )
-from ...synthesis.published import PROBLEMS, WEIGHT, packaging_path
-from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
+from ...units import CM_PER_METRE
+from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
 from .chapter_7 import slider
+from .problems import PROBLEMS, WEIGHT, packaging_path
 
 FloatArray = NDArray[np.float64]
 
@@ -47,17 +46,14 @@ TARGET, FIXED = "0.25", "0.55"
 ROCKER_STARTS = 24
 PATH_SEARCHES = {2: (8, 0.25), 3: (8, 0.25), 5: (24, 0.18)}
 #: Printed series: A0, A1, A2 and B1, B2 (cm), guide angle (deg).
-SERIES = {
-    ROCKER: ((1.46, -0.425, -0.855), (-0.256, 0.569), -41.0),
-    PATH: ((3.1, 0.772, 0.568), (-0.34, -0.136), -0.9),
-}
+SERIES = {ROCKER: ((1.46, -0.425, -0.855), (-0.256, 0.569), -41.0), PATH: ((3.1, 0.772, 0.568), (-0.34, -0.136), -0.9)}
 #: Crank rotations of the curves (rad).
 TURN = np.linspace(0.0, 2.0 * pi, 721)
 
 
 @cache
 def rocker_motion(harmonics: int) -> Solution:
-    """The best Fourier series of the slider for the weighted rocker function, the printed links kept."""
+    """Return the best Fourier series of the slider for the weighted rocker function, with the printed links."""
     p = PROBLEMS[ROCKER]
     return slider_motion(
         p.task, p.linkage, SliderUnknown(harmonics=harmonics), search=Search(starts=ROCKER_STARTS)
@@ -66,10 +62,9 @@ def rocker_motion(harmonics: int) -> Solution:
 
 @cache
 def path_motion(harmonics: int) -> Solution:
-    """The best Fourier series of the slider for path (b), the printed links kept.
+    """Return the best Fourier series of the slider for path (b), with the printed links.
 
-    The guide within a right angle from the ground link, and a bound of the stroke: among so many optima they bring the search
-    to the better ones.
+    The guide within a right angle of the ground link and a bound on the stroke lead the search to the better of many optima.
     """
     p = PROBLEMS[PATH]
     starts, stroke = PATH_SEARCHES[harmonics]
@@ -78,7 +73,7 @@ def path_motion(harmonics: int) -> Solution:
 
 
 def error_of(name: str, linkage: Linkage) -> float:
-    """Error of a linkage in the unit of print."""
+    """Return the error of a linkage in the unit of print."""
     p = PROBLEMS[name]
     return p.convert(evaluate(p.task, linkage).error)
 
@@ -86,7 +81,7 @@ def error_of(name: str, linkage: Linkage) -> float:
 def printed(
     name: str, *, mean: float = 1.0, sines: float = 1.0, sign: float = 1.0, turned: float = 0.0, along: float = 1.0
 ) -> Linkage:
-    """The printed linkage with its slider moved as printed, in one of the readings that the text leaves open.
+    """Return the printed linkage with the printed slider motion, in one of the readings that the text leaves open.
 
     Parameters
     ----------
@@ -111,7 +106,10 @@ def printed(
 
 
 def readings(name: str) -> list[float]:
-    """Errors of the printed series in its readings: A0 whole, a tenth or none of it, signs, argument omega t or th2."""
+    """Return the errors of the printed series in all its readings.
+
+    The readings differ in A0 (whole, a tenth, none), in signs, and in the argument (omega t or th2).
+    """
     k = PROBLEMS[name].linkage
     signs = (1.0, -1.0)
     found = [
@@ -122,19 +120,19 @@ def readings(name: str) -> list[float]:
 
 
 def angle_error(linkage: Linkage) -> FloatArray:
-    """Rocker angle less the one that is asked (deg), within half a turn."""
+    """Return the rocker angle less the desired one (deg), within half a turn."""
     off = np.degrees(linkage.rocker_angle(TURN)) - wanted_angle()
     return np.asarray((off + 180.0) % 360.0 - 180.0)
 
 
 def wanted_angle() -> FloatArray:
-    """The rocker function that is asked (deg)."""
+    """Return the desired rocker function (deg)."""
     return np.asarray(70.0 + 100.0 * np.abs(np.sin(0.5 * TURN)))
 
 
 @cache
 def reduced() -> float:
-    """Greatest error with two harmonics, of that of the fixed pivot, of all problems of chapter VI."""
+    """Return the greatest ratio of the errors with two harmonics and with a fixed pivot, of all problems of chapter VI."""
     shares = []
     for name, p in PROBLEMS.items():
         task = UntimedPath(path=packaging_path()) if name == "packaging" else p.task
@@ -145,12 +143,12 @@ def reduced() -> float:
 
 
 def sound(*solutions: Solution) -> Verdict:
-    """That none of the linkages has a circuit, branch or order defect."""
+    """Judge that none of the linkages has a circuit, branch or order defect."""
     return at_least("no circuit, branch or order defect", OURS, 1.0, float(min(s.verdicts.sound for s in solutions)))
 
 
 def moved_rocker() -> StudyResult:
-    """Fig 7.11: the best motion with each number of harmonics, and the printed one."""
+    """Compute Fig 7.11: the best motion with each number of harmonics, and the printed one."""
     p = PROBLEMS[ROCKER]
     assert isinstance(p.task, RockerFunction)
     found = {n: rocker_motion(n) for n in (1, 2, 3)}
@@ -173,28 +171,24 @@ def moved_rocker() -> StudyResult:
         verdicts=(
             near(
                 "error of the printed series, least of its readings",
-                TEXT,
+                text("7.3.2, L5957"),
                 4.8,
                 min(readings(ROCKER)),
                 0.05,
                 "deg2",
-                place="7.3.2, L5957",
                 why="as printed the links cannot be joined over the turn",
             ),
-            at_most("error with two harmonics", TEXT, 4.8, errors[2], "deg2", place=place),
+            at_most("error with two harmonics", text(place), 4.8, errors[2], "deg2"),
             at_most("error with two harmonics", OURS, 0.76, errors[2], "deg2"),
             near("error with the pivot fixed, N = 24", OURS, 35.8, error_of(ROCKER, p.linkage), 0.05, "deg2"),
-            at_most("rms error within the window, of that without", TEXT, 1.0, in_window, place="7.3.2, L5963"),
-            at_most(
-                "error with three harmonics, of that with two", TEXT, 1.0, errors[3] / errors[2], place="7.3.2, L5969"
-            ),
+            at_most("rms error within the window, of that without", text("7.3.2, L5963"), 1.0, in_window),
+            at_most("error with three harmonics, of that with two", text("7.3.2, L5969"), 1.0, errors[3] / errors[2]),
             at_least("error with one harmonic, of that with two", OURS, 1.0, errors[1] / errors[2]),
             at_most(
                 "greatest error with two harmonics, of that with the pivot fixed; all eight problems of chapter VI",
-                TEXT,
+                text("7.3.2, L5935; 6.4.2, L4874, L4969"),
                 1.0,
                 reduced(),
-                place="7.3.2, L5935; 6.4.2, L4874, L4969",
             ),
             sound(*found.values()),
             at_least("least transmission angle with any of them", OURS, 20.0, least, "deg"),
@@ -203,7 +197,7 @@ def moved_rocker() -> StudyResult:
 
 
 def draw_rocker(result: StudyResult) -> Figure:
-    """Rocker angles, their errors, and the slider."""
+    """Draw rocker angles, their errors, and the slider position."""
     c = result.columns
     task = PROBLEMS[ROCKER].task
     assert isinstance(task, RockerFunction)
@@ -238,7 +232,7 @@ def draw_rocker(result: StudyResult) -> Figure:
 
 
 def out_of_reach(quarter: int = 20000) -> float:
-    """Area of the ellipse that is farther from the crank shaft than l2 + r (cm2); with so many sides for a quarter circle."""
+    """Return the area of the ellipse beyond l2 + r from the crank shaft (cm2), with ``quarter`` sides for a quarter circle."""
     from shapely import Point, Polygon
 
     p = PROBLEMS[PATH]
@@ -249,14 +243,14 @@ def out_of_reach(quarter: int = 20000) -> float:
 
 
 def mended() -> Linkage:
-    """The printed series of path (b) with A0 = 0.31 cm and the guide's angle from the horizontal."""
+    """Return the printed series of path (b) with A0 = 0.31 cm and the guide's angle from the horizontal."""
     found = printed(PATH, mean=0.1)
     motion = slider(found)
     return replace(found, pivot=replace(motion, guide_angle=motion.guide_angle - found.ground_angle))
 
 
 def moved_path() -> StudyResult:
-    """Fig 7.12: path (b) with the printed series, mended, and with the best series of two, three and five harmonics."""
+    """Compute Fig 7.12: path (b) with the printed series, its correction, and the best series of 2, 3 and 5 harmonics."""
     p = PROBLEMS[PATH]
     assert isinstance(p.task, UntimedPath)
     found = {n: path_motion(n) for n in PATH_SEARCHES}
@@ -285,17 +279,16 @@ def moved_path() -> StudyResult:
         claim="The slider moved by two harmonics brings the area between path (b) and the curve from 12.6 to 4.3 cm2.",
         columns=padded(columns),
         verdicts=(
-            near("area with the printed series", TEXT, 4.3, as_printed, 0.05, "cm2", place=place, why=why),
+            near("area with the printed series", text(place), 4.3, as_printed, 0.05, "cm2", why=why),
             near(
                 "the same with A0 = 0.31 cm, the guide's angle from the horizontal",
-                TEXT,
+                text(place),
                 4.3,
                 error_of(PATH, mended()),
                 0.05,
                 "cm2",
-                place=place,
             ),
-            at_most("area with two harmonics", TEXT, 4.3, errors[2], "cm2", place="7.3.2, L5994"),
+            at_most("area with two harmonics", text("7.3.2, L5994"), 4.3, errors[2], "cm2"),
             at_most("the same with the guide's angle from the ground link", OURS, 4.3, tenth, "cm2"),
             near("area with the pivot fixed", OURS, 12.61, error_of(PATH, p.linkage), 0.005, "cm2"),
             at_most("area with two harmonics", OURS, 4.05, errors[2], "cm2"),
@@ -310,7 +303,7 @@ def moved_path() -> StudyResult:
 
 
 def draw_path(result: StudyResult) -> Figure:
-    """Curves, distances, and the slider."""
+    """Draw curves, distances, and the slider position."""
     c = result.columns
     labels = {"fixed": "pivot fixed", "printed": "printed series, mended"} | {
         f"{n}": f"{n} harmonics" for n in PATH_SEARCHES

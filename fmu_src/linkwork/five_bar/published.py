@@ -5,22 +5,20 @@
 
 from __future__ import annotations
 
-from math import pi
 from types import MappingProxyType
 from typing import Mapping
 
 from ..mechanism import PublishedSet
+from ..units import CM_PER_METRE, RAD_S_PER_RPM
 from .parameters import FiveBarParameters, InitialState
 
-# Divisors, because 206 / 1000 is the float nearest to 0.206 and 206 * 0.001 is not.
-CM_PER_METRE = 1e2
+# Divisors, as `CM_PER_METRE` is.
 GRAM_PER_KG = 1e3
 G_CM2_PER_KG_M2 = 1e7
 DYN_CM_PER_NEWTON_METRE = 1e7
 DYN_PER_NEWTON = 1e5
 #: Stiffness in dyn/cm per N/m, and damping in dyn.s/cm per N.s/m.
 DYN_PER_CM_PER_NEWTON_PER_METRE = 1e3
-RAD_S_PER_RPM = pi / 30.0
 
 
 def _at(crank_speed_rpm: float, parameters: FiveBarParameters, source: str) -> PublishedSet:

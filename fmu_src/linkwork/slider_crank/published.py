@@ -6,19 +6,18 @@ A round crank and a round rod with their centres of mass at mid-length, and a cu
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import radians
 from types import MappingProxyType
 from typing import Mapping
 
 from ..mechanism import PublishedSet
+from ..units import INCH, RAD_S_PER_RPM
 from .parameters import InitialState, SliderCrankParameters
 
-INCH = 0.0254
 POUND_FORCE = 4.4482216152605
 #: Unit of mass of the printed data, lb.s2/in.
 POUND_S2_PER_INCH = POUND_FORCE / INCH
 POUND_INCH = POUND_FORCE * INCH
-RAD_S_PER_RPM = pi / 30.0
 
 CRANK_SPEED = 50.0 * RAD_S_PER_RPM
 CRANK_TORQUE = 100.0 * POUND_INCH

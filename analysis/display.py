@@ -1,0 +1,51 @@
+"""Show results: one line where they are printed, with a small picture below it in a notebook."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable
+from html import escape
+from io import BytesIO
+from math import isfinite
+from pkgutil import resolve_name
+
+from linkwork.errors import LinkworkError
+
+#: Function that draws a result, by name, because results do not import the package that draws them.
+PICTURES = "analysis.figures:plot"
+#: Pixels to the inch: small enough to be kept in a notebook.
+DOTS_PER_INCH = 80
+
+
+class Shown:
+    """Base of results that a notebook shows as their `repr`, with a picture below if there is one."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        text = f"<code>{escape(repr(self))}</code>"
+        written = BytesIO()
+        try:
+            resolve_name(PICTURES)(self).savefig(written, format="png", dpi=DOTS_PER_INCH)
+        except LinkworkError as error:
+            return f"{text}<br>{escape(str(error))}"
+        data = b64encode(written.getvalue()).decode("ascii")
+        return f'{text}<br><img alt="{type(self).__name__}" style="max-width: 100%" src="data:image/png;base64,{data}">'
+
+
+def format_range(values: Iterable[float], unit: str) -> str:
+    """Write the range of the finite ones of some numbers with their unit: "-0.01 to 0.02 m"."""
+    finite = [float(value) for value in values if isfinite(value)]
+    if not finite:
+        return "no finite value"
+    low, high = min(finite), max(finite)
+    numbers = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+    return f"{numbers} {unit}".rstrip()
+
+
+def format_count(count: int, what: str) -> str:
+    """Write a number of things: "1 branch", "2 branches", "no branches"."""
+    several = (
+        f"{what}es" if what.endswith(("ch", "s", "x")) else f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
+    )
+    return f"1 {what}" if count == 1 else f"{count or 'no'} {several}"

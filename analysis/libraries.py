@@ -1,0 +1,74 @@
+"""Libraries that are not installed with Linkwork's core, and what to say where one is missing."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from functools import cache
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, requires
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+from linkwork.errors import LinkworkError
+
+
+class MissingLibraryError(LinkworkError, ImportError):
+    """A library is not installed; the message has the command that installs it, from any index that has the library.
+
+    Attributes
+    ----------
+    requirement : str
+        What pip is to install, such as ``plotly>=5.24``.
+    extra : str
+        Linkwork's extra that the library belongs to; empty for a library of the core.
+    """
+
+    def __init__(self, library: str) -> None:
+        self.requirement, self.extra = _requirements().get(library, (library, ""))
+        extra = f" (it is in Linkwork's extra '{self.extra}')" if self.extra else ""
+        super().__init__(f"{library} is not installed: python -m pip install '{self.requirement}'{extra}", name=library)
+
+
+def require(*libraries: str) -> None:
+    """Check that libraries are installed, without importing them.
+
+    Raises
+    ------
+    MissingLibraryError
+        For the first one that is not.
+    """
+    for library in libraries:
+        if find_spec(library) is None:
+            raise MissingLibraryError(library)
+
+
+def lazy(library: str) -> Any:
+    """Return a stand-in for a library, which imports it when it is first used and raises `MissingLibraryError` then."""
+    return _Lazy(library)
+
+
+class _Lazy(ModuleType):
+    def __getattr__(self, name: str) -> Any:
+        require(self.__name__)
+        return getattr(import_module(self.__name__), name)
+
+
+@cache
+def _requirements() -> dict[str, tuple[str, str]]:
+    """Return requirement and extra by the library's name, from the metadata of the installed package."""
+    try:
+        lines = requires("linkwork") or []
+    except PackageNotFoundError:  # a checkout that is only on the path
+        lines = []
+    extras: dict[str, dict[str, str]] = defaultdict(dict)
+    for line in lines:
+        requirement, _, marker = (part.strip() for part in line.partition(";"))
+        extra = re.search(r"extra == ['\"]([\w-]+)['\"]", marker)
+        library = re.match(r"[\w-]+", requirement)
+        if library:
+            extras[extra[1] if extra else ""][library[0].replace("-", "_")] = requirement
+    # the smallest extra that has a library counts, as 'all' and 'dev' repeat the others; the core counts before any
+    order = sorted(extras, key=lambda extra: len(extras[extra]) if extra else 0, reverse=True)
+    return {library: (requirement, extra) for extra in order for library, requirement in extras[extra].items()}

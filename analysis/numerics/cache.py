@@ -1,0 +1,92 @@
+"""Folders for compiled code and other results that are kept between runs."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from platformdirs import user_cache_dir
+
+#: Bytes that must fit into a folder for code.
+_LEAST = 1_000_000
+
+
+def cache_root() -> Path:
+    """Return the root of the cache: LINKWORK_CACHE_DIR, else the user's cache folder."""
+    return Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False))
+
+
+def code_folder(name: str) -> Path:
+    """Return a folder for files that are loaded as code, below `cache_root` or below a temporary folder.
+
+    A folder that other users can write to could make us run their code: it is not used, which is said once on standard error.
+    """
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = cache_root() / name
+    if _usable(folder):
+        if _ours(folder, user):
+            return folder
+        _say_shared(folder.parent)
+    folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
+    if _usable(folder) and _ours(folder, user):
+        return folder
+    return Path(tempfile.mkdtemp(prefix="linkwork-"))
+
+
+@cache
+def _say_shared(folder: Path) -> None:
+    sys.stderr.write(
+        f"linkwork: others can write to {folder}, or to a folder above it: compiled code is kept elsewhere; "
+        "LINKWORK_CACHE_DIR can name a folder of yours alone\n"
+    )
+
+
+def _usable(folder: Path) -> bool:
+    """Return whether a folder is there, or can be made, and has room for code."""
+    try:
+        for path in (folder.parent, folder):
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(_LEAST))  # on a full disk files can be made, but not filled
+            file.flush()
+            return True
+    except OSError:
+        return False
+
+
+def _ours(folder: Path, user: int) -> bool:
+    """Return whether only ``user`` and root can change the content of a folder, or replace the folder."""
+    if os.name == "nt":
+        return True  # user_cache_dir is below the user's profile, which others cannot write to
+    folder = folder.resolve()
+    for path in (folder, *folder.parents):
+        status = path.stat()
+        shared = status.st_mode & 0o002 or (status.st_mode & 0o020 and not _is_private(status.st_gid, user))
+        # in a folder with the sticky bit others can add files, but not change ours
+        if status.st_uid not in (user, 0) or (shared and (path == folder or not status.st_mode & 0o1000)):
+            return False
+    with os.scandir(folder) as entries:
+        return folder.stat().st_uid == user and all(_is_owned(entry, user) for entry in entries)
+
+
+def _is_owned(entry: os.DirEntry[str], user: int) -> bool:
+    """Return whether a user owns a file; a file that another process has just renamed or removed does no harm."""
+    try:
+        return entry.stat(follow_symlinks=False).st_uid == user
+    except FileNotFoundError:
+        return True
+
+
+def _is_private(group: int, user: int) -> bool:
+    """Return whether a group has one user alone and that user's name, as many systems make them."""
+    import grp
+    import pwd
+
+    try:
+        name = pwd.getpwuid(user).pw_name
+        return grp.getgrgid(group).gr_name == name and not set(grp.getgrgid(group).gr_mem) - {name}
+    except KeyError:
+        return False

@@ -1,0 +1,277 @@
+"""The problems of the thesis's chapter VI (linkages in appendix 5), converted from cm and degrees to SI.
+
+`PROBLEMS` maps a name to a `PublishedProblem`. The thesis bounds only the lengths of one problem. Its other problems are
+ill-posed: the error tends to zero as the links grow. Each is therefore stated here with no link longer than the longest
+of the printed linkage, and with a least transmission angle of 40 degrees, or, for rocker functions, whose target fixes
+this angle, with a fully turning crank.
+
+>>> from analysis.synthesis import evaluate
+>>> problem = PROBLEMS["ellipse-a"]
+>>> round(problem.convert(evaluate(problem.task, problem.linkage).error), 2)
+5.64
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import degrees, radians
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...synthesis.linkage.linkage import Linkage
+from ...synthesis.task.constraint import USUAL, Constraint, FullTurn, LargestLink
+from ...synthesis.task.formula import path_from_formula
+from ...synthesis.task.target import TargetPath
+from ...synthesis.task.task import RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
+from ...units import CM_PER_METRE
+
+CM2_PER_M2 = CM_PER_METRE**2
+DEG2_PER_RAD2 = degrees(1.0) ** 2
+#: Weight of the weighted rocker function from 60 to 260 degrees; the thesis divides its error by it.
+WEIGHT = 1000.0
+#: Numbers of crank angles for timed paths and the rocker function, and for the weighted one. N is printed for the paths only.
+N, WEIGHTED_N = 72, 24
+#: Points of an ellipse and of a coupler curve for the area between them.
+AREA_N = 360
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PublishedProblem:
+    """Problem of synthesis with the printed linkage.
+
+    Attributes
+    ----------
+    task : Task
+    bounds : mapping
+        As `synthesize` takes them.
+    constraints : tuple
+        As `synthesize` takes them; ours, except for the bounds.
+    printed : Linkage
+        With the printed digits.
+    mended : Linkage, optional
+        With its misprints mended, if it has any.
+    error : float or None
+        Printed error, in ``unit``.
+    goal : float
+        Error to be reached, in ``unit``.
+    unit : str
+        Unit of the error.
+    per_si : float
+        Number of this unit in one m2 or rad2.
+    source : str
+    """
+
+    task: Task
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    constraints: tuple[Constraint, ...]
+    printed: Linkage
+    mended: Linkage | None = None
+    error: float | None
+    goal: float
+    unit: str = "cm2"
+    per_si: float = CM2_PER_M2
+    source: str
+
+    @property
+    def linkage(self) -> Linkage:
+        """The printed linkage with its misprints mended."""
+        return self.mended or self.printed
+
+    def convert(self, error: float) -> float:
+        """Convert an error from SI to the unit of print."""
+        return self.per_si * error
+
+
+def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
+    """Return the target ellipse about (20, 15) cm, with a given semi-axis along x and 5 cm along y, shape (n, 2) in m."""
+    phi = turn(n)
+    return np.column_stack([20.0 + semi_axis_cm * np.cos(phi), 15.0 + 5.0 * np.sin(phi)]) / CM_PER_METRE
+
+
+def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> RockerFunction:
+    """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
+
+    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but its 35.0 is only approached,
+    at N = 24, with 60 included.
+    """
+    phi = turn(n)
+    # in whole numbers, so that the ends of the window are exact
+    within = np.array([60 * n <= 360 * k <= 260 * n for k in range(n)])
+    return RockerFunction(
+        angle=np.radians(70.0 + 100.0 * np.abs(np.sin(0.5 * phi))),
+        weights=np.where(within, WEIGHT, 1.0) if weighted else None,
+        mounting=mounting,
+    )
+
+
+#: The ten points of the packaging machine (appendix 5), offset by (51, 350) cm; 160 and the x of (0, 31) are uncertain in the
+#: scan. The first of them lie on y = 0, the straight part.
+PACKAGING_POINTS_CM = (
+    (164.0, 8.0),
+    (164.0, 0.0),
+    (160.0, 0.0),
+    (50.0, 0.0),
+    (10.0, 0.0),
+    (0.0, 31.0),
+    (0.0, 61.0),
+    (45.0, 61.0),
+    (92.0, 61.0),
+    (128.0, 34.5),
+)
+PACKAGING_OFFSET_CM = (51.0, 350.0)
+#: Least travel on the straight part, and its greatest flatness.
+PACKAGING_TRAVEL, PACKAGING_FLATNESS = 144.0 / CM_PER_METRE, 2.5 / CM_PER_METRE
+#: Crank rotation of the straight part.
+PACKAGING_ROTATION = radians(120.0)
+
+
+def packaging_path() -> TargetPath:
+    """Return the closed polygon of the ten points."""
+    return TargetPath(points=(np.array(PACKAGING_POINTS_CM) + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
+
+
+def _packaging() -> UntimedPath:
+    # the points (160, 0) and (50, 0) give way to the ends of the straight part, half a centimetre more than the travel asked
+    # and clear of the corners: the polygon is the same
+    points = np.array([*PACKAGING_POINTS_CM[:2], (159.5, 0.0), (15.0, 0.0), *PACKAGING_POINTS_CM[4:]])
+    path = TargetPath(points=(points + PACKAGING_OFFSET_CM) / CM_PER_METRE, closed=True)
+    # flatness is kept at the stations: a reserve for what is between them
+    straight = Straight(start=2, end=3, rotation=PACKAGING_ROTATION, flatness=0.9 * PACKAGING_FLATNESS)
+    return UntimedPath(path=path, straight=straight)
+
+
+def _linkage(
+    place_cm: tuple[float, float],
+    links_cm: tuple[float, float, float, float],
+    point_cm: float,
+    angles_deg: tuple[float, float, float],
+    branch: int = 1,
+) -> Linkage:
+    """Build a linkage from X0, Y0; l1 ... l4; r; a1, th20, a2."""
+    l1, l2, l3, l4 = links_cm
+    a1, th20, a2 = angles_deg
+    return Linkage(
+        pivot_x=place_cm[0] / CM_PER_METRE,
+        pivot_y=place_cm[1] / CM_PER_METRE,
+        ground_length=l1 / CM_PER_METRE,
+        crank_length=l2 / CM_PER_METRE,
+        coupler_length=l3 / CM_PER_METRE,
+        rocker_length=l4 / CM_PER_METRE,
+        point_distance=point_cm / CM_PER_METRE,
+        ground_angle=radians(a1),
+        crank_phase=radians(th20),
+        point_angle=radians(a2),
+        branch=branch,
+    )
+
+
+_ELLIPSE_A = _linkage((16.48, -47.89), (65.31, 5.04, 112.85, 104.34), 63.26, (-92.82, 96.26, 114.02))
+_ELLIPSE_B = _linkage((-60.48, 169.45), (165.65, 7.95, 179.09, 216.94), 174.32, (-3.44, -27.05, -136.94))
+_BOUNDED = _linkage((19.6, 0.03), (16.4, 5.01, 26.5, 22.0), 15.4, (93.8, 93.2, 127.3))
+_ROCKER = _linkage((0.0, 0.0), (5.083, 2.615, 4.148, 3.75), 0.0, (0.0, 41.88, 0.0))
+_WEIGHTED = _linkage((0.0, 0.0), (15.65, 6.91, 11.77, 11.56), 0.0, (0.0, 42.74, 0.0))
+_PATH_A = _linkage((154.85, -62.54), (80.216, 5.03, 139.25, 129.46), 77.75, (-93.22, 100.41, 113.83))
+_PATH_B = _linkage((-49.13, 144.98), (142.576, 8.18, 152.743, 183.443), 147.38, (-3.062, -31.19, -136.04))
+# no th20 is printed: an untimed path needs none. The only one with C to the right of B -> D
+_PACKAGING = _linkage((94.53, -48.55), (137.54, 36.05, 134.05, 40.06), 435.15, (116.73, 0.0, 345.01), branch=-1)
+
+
+def _capped(linkage: Linkage) -> tuple[Constraint, ...]:
+    """Return the usual constraints, with no link longer than the longest of this linkage."""
+    return (LargestLink(length=linkage.largest_link), *USUAL)
+
+
+_PATH_B_READ = replace(_PATH_B, rocker_length=184.443 / CM_PER_METRE)
+PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
+    {
+        "ellipse-a": PublishedProblem(
+            task=TimedPath(points=ellipse(10.0, N)),
+            constraints=_capped(_ELLIPSE_A),
+            printed=_ELLIPSE_A,
+            error=0.889,
+            goal=0.46,
+            source="Youssef, chapter VI, ellipse (a), timed",
+        ),
+        "ellipse-b": PublishedProblem(
+            task=TimedPath(points=ellipse(15.0, N)),
+            constraints=_capped(_ELLIPSE_B),
+            printed=_ELLIPSE_B,
+            error=4.001,
+            goal=0.62,
+            source="Youssef, chapter VI, ellipse (b), timed",
+        ),
+        "ellipse-a-bounded": PublishedProblem(
+            task=TimedPath(points=ellipse(10.0, N)),
+            bounds=MappingProxyType(
+                {
+                    **dict.fromkeys(("ground_length", "coupler_length", "rocker_length"), (0.1, 0.3)),
+                    # l2 <= 10 cm; a link of no length is none
+                    "crank_length": (1e-3, 0.1),
+                    "point_distance": (0.0, 0.3),
+                }
+            ),
+            constraints=USUAL,
+            printed=_BOUNDED,
+            # ERRATA: a1 = 93.8 deg is printed without its sign
+            mended=replace(_BOUNDED, ground_angle=radians(-93.8)),
+            error=53.6,
+            goal=6.4,
+            source="Youssef, chapter VI, ellipse (a), timed, with bounds on the lengths",
+        ),
+        "rocker": PublishedProblem(
+            task=rocker_function(N),
+            constraints=(FullTurn(),),
+            printed=_ROCKER,
+            error=700.0,
+            goal=1025.0,
+            unit="deg2",
+            per_si=DEG2_PER_RAD2,
+            source="Youssef, chapter VI, rocker function, unweighted; N is not printed",
+        ),
+        "rocker-weighted": PublishedProblem(
+            task=rocker_function(WEIGHTED_N, weighted=True),
+            constraints=(FullTurn(),),
+            printed=_WEIGHTED,
+            error=35.0,
+            goal=35.6,
+            unit="deg2",
+            per_si=DEG2_PER_RAD2 / WEIGHT,
+            source="Youssef, chapter VI, rocker function, weighted; N is not printed",
+        ),
+        "path-a": PublishedProblem(
+            task=UntimedPath(path=path_from_formula("0.20 + 0.10*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
+            constraints=_capped(_PATH_A),
+            printed=_PATH_A,
+            # ERRATA: X0 = 154.85 cm, the point misplaced by a digit: the curve would lie 139 cm beside its target
+            mended=replace(_PATH_A, pivot_x=15.485 / CM_PER_METRE),
+            error=2.3,
+            goal=0.125,
+            source="Youssef, chapter VI, path (a), area",
+        ),
+        "path-b": PublishedProblem(
+            task=UntimedPath(path=path_from_formula("0.20 + 0.15*cos(t)", "0.15 + 0.05*sin(t)", n=AREA_N)),
+            constraints=_capped(_PATH_B_READ),
+            printed=_PATH_B,
+            # ERRATA: l4 = 183.443 cm
+            mended=_PATH_B_READ,
+            error=12.6,
+            goal=0.31,
+            source="Youssef, chapter VI, path (b), area",
+        ),
+        "packaging": PublishedProblem(
+            task=_packaging(),
+            # the crank shaft lies below the line, by no more than the coupler point's reach
+            bounds=MappingProxyType(
+                {"pivot_y": ((PACKAGING_OFFSET_CM[1] - 500.0) / CM_PER_METRE, PACKAGING_OFFSET_CM[1] / CM_PER_METRE)}
+            ),
+            constraints=(LargestLink(length=_PACKAGING.point_distance), *USUAL),
+            printed=_PACKAGING,
+            error=None,
+            goal=620.0,
+            source="Youssef, chapter VI and appendix 5, packaging machine",
+        ),
+    }
+)

@@ -1,0 +1,303 @@
+"""A synthesis from the tables of a TOML or JSON file, every quantity with its unit; see `docs/synthesis-cases.md`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from math import pi
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import ParameterError
+
+from ...files import (
+    Choice,
+    Many,
+    Quantity,
+    Range,
+    Table,
+    Whole,
+    as_it_is,
+    entry,
+    flag,
+    overridden,
+    read,
+    read_tables,
+    table_of,
+    text,
+)
+from ...units import quantity
+from ..exact.quick_return import QuickReturn, QuickSwing
+from ..linkage.kind import Kind
+from ..linkage.linkage import ANGLES
+from ..linkage.machine import PINS, Make, PinForces, pin_forces
+from ..result.solution import Solution
+from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
+from ..search.start import Search
+from ..task.constraint import (
+    FORCES,
+    SECOND_LENGTH,
+    UNKNOWNS,
+    USUAL,
+    Assembly,
+    Constraint,
+    FullTurn,
+    Grashof,
+    GrashofType,
+    LargestLink,
+    LeastPinForce,
+    LeastTransmission,
+    MaxPinForce,
+    PivotRegion,
+    Stroke,
+    TimeRatio,
+)
+from ..task.formula import requirement
+from ..task.limit_position import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
+from ..task.limits import GEARS, limits_by_kind
+from ..task.task import Task, normal_form
+from .tables import read_plane_points, read_task
+
+FloatArray = NDArray[np.float64]
+
+
+def _cores(value: Any, name: str) -> int:
+    number = Whole(-1)(value, name)
+    if number == 0:
+        raise ParameterError(name, value, "be a number of cores, or -1 for all")
+    return number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchTable:
+    """How it is searched, and among what; see `Search` and `synthesize`."""
+
+    seed: int = entry(Whole(0), 0)
+    candidates: int = entry(Whole(1), 1 << 16)
+    starts: int = entry(Whole(1), 24)
+    solutions: int = entry(Whole(1), 6)
+    kinds: tuple[Kind, ...] | None = entry(Many(Choice(get_args(Kind)), least=1), None)
+    gears: tuple[float, ...] = entry(Many(Quantity("1"), least=1), GEARS)
+    jobs: int = entry(_cores, 1)
+
+    def search(self, **changes: Any) -> Search:
+        """Return the `Search` of the table, with some of its values changed."""
+        own = {name: value for name, value in asdict(self).items() if name not in ("kinds", "gears")}
+        return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
+
+
+def _transmission(value: Any, name: str) -> float | None:
+    if value is False:
+        return None
+    requirement = "be at least 0 and below 90 deg; a number without a unit is in rad"
+    return Quantity("rad", least=0.0, below=0.5 * pi, requirement=requirement)(value, name)
+
+
+def _error(value: Any, name: str) -> Any:
+    """Check the greatest error allowed for the least pin force: a length, or an angle of a rocker function."""
+    try:
+        quantity(value, "m", name)
+    except ParameterError:
+        # of a function of the rocker
+        quantity(value, "rad", name)
+    return value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constraints:
+    """The table ``[constraints]``; a least transmission angle of None asks nothing.
+
+    Attributes
+    ----------
+    time_ratio : (float, float)
+        Of a crank-rocker's slow swing to its quick one.
+    least_mechanical_advantage, greatest_mechanical_advantage : float
+        Torque of the rocker for one of the crank.
+    mechanical_advantage_at : list
+        Crank rotations where that is asked; by default all the way.
+    dead_centre_stretched, dead_centre_folded : (float, float)
+        Crank rotation, or range of it, at which crank and coupler are in line.
+    toggle_stretched, toggle_folded : (float, float)
+        The same of coupler and rocker.
+    no_toggle : (float, float)
+        Crank rotations between which there is none.
+    max_pin_force : float
+        No pin carries more, at the speed and under the load of make.
+    pins : str
+        Those that this is about.
+    """
+
+    least_transmission_angle: float | None = entry(_transmission, LeastTransmission().angle)
+    over: str | None = entry(Choice(("turn", "task")), None)
+    full_turn: bool = entry(flag, False)
+    grashof: GrashofType | None = entry(Choice(get_args(GrashofType)), None)
+    time_ratio: tuple[float, float] | None = entry(Range(Quantity("1", least=1.0, requirement="be 1 or greater")), None)
+    stroke: tuple[float, float] | None = entry(Range(Quantity("m", least=0.0)), None)
+    largest_link: float | None = entry(Quantity("m"), None)
+    assembly: int | None = entry(Whole(), None)
+    pivot_A: FloatArray | None = entry(read_plane_points, None)
+    pivot_D: FloatArray | None = entry(read_plane_points, None)
+    least_mechanical_advantage: float | None = entry(Quantity("1", least=0.0), None)
+    greatest_mechanical_advantage: float | None = entry(Quantity("1", above=0.0), None)
+    mechanical_advantage_at: tuple[float, ...] | None = entry(Many(Quantity("rad"), single=True), None)
+    dead_centre_stretched: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    dead_centre_folded: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    toggle_stretched: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    toggle_folded: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    no_toggle: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    max_pin_force: float | None = entry(Quantity("N", above=0.0), None)
+    least_pin_force_within: Any = entry(_error, None)
+    pins: str = entry(text, PINS)
+    require: tuple[Constraint, ...] = entry(Many(requirement), ())
+
+    def constraints(self) -> tuple[Constraint | Stroke, ...]:
+        """Return the constraints; the transmission angle of a crank that cannot turn fully holds over the task alone."""
+        swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
+        over: Any = self.over or ("task" if swings else "turn")
+        made: tuple[tuple[Any, Callable[[Any], Constraint | Stroke]], ...] = (
+            (self.least_transmission_angle, lambda angle: LeastTransmission(angle=angle, over=over)),
+            (self.full_turn or None, lambda _: FullTurn()),
+            (self.grashof, lambda kind: Grashof(type=kind)),
+            (self.time_ratio, lambda ends: TimeRatio(least=ends[0], greatest=ends[1])),
+            (self.stroke, lambda ends: Stroke(least=ends[0], greatest=ends[1])),
+            (self.largest_link, lambda length: LargestLink(length=length)),
+            (self.assembly, lambda branch: Assembly(branch=branch)),
+            (self.pivot_A, lambda corners: PivotRegion(pivot="A", polygon=corners)),
+            (self.pivot_D, lambda corners: PivotRegion(pivot="D", polygon=corners)),
+            (self._advantage(), lambda bounds: MechanicalAdvantage(**bounds)),
+            (self.dead_centre_stretched, lambda at: DeadCentre(at=at)),
+            (self.dead_centre_folded, lambda at: DeadCentre(at=at, position="folded")),
+            (self.toggle_stretched, lambda at: Toggle(at=at)),
+            (self.toggle_folded, lambda at: Toggle(at=at, position="folded")),
+            (self.no_toggle, lambda ends: NoToggle(between=ends)),
+            (self.max_pin_force, lambda force: MaxPinForce(force=force, pins=self.pins)),
+            (self.least_pin_force_within, lambda error: LeastPinForce(error=error, pins=self.pins)),
+        )
+        return (*(make(value) for value, make in made if value is not None), *self.require)
+
+    def _advantage(self) -> dict[str, Any] | None:
+        """Return the arguments of `MechanicalAdvantage`; None if it is not asked for."""
+        ends = {"least": self.least_mechanical_advantage, "greatest": self.greatest_mechanical_advantage}
+        given = {name: end for name, end in ends.items() if end is not None}
+        if self.mechanical_advantage_at is not None and not given:
+            raise ParameterError(
+                "constraints.mechanical_advantage_at", self.mechanical_advantage_at, "come with a least or greatest one"
+            )
+        return {**given, "at": self.mechanical_advantage_at} if given else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TradeOffTable:
+    """The table ``[trade_off]``: arguments of `trade_off`."""
+
+    over: Any = entry(Choice(OVER))
+    limits: tuple[float, ...] = entry(Many(as_it_is, least=2))
+    starts: int = entry(Whole(1), 12)
+
+
+#: The table ``[bounds]``: [least, greatest], or one value that fixes the dimension.
+BOUNDS = Table(
+    dict,
+    {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in (*UNKNOWNS, SECOND_LENGTH)},
+)
+#: The tables of a case beside the task's, for `linkwork new`.
+TABLES: Mapping[str, type] = {
+    "constraints": Constraints,
+    "search": SearchTable,
+    "make": Make,
+    "trade_off": TradeOffTable,
+}
+
+
+def _constraints(value: Any, name: str) -> tuple[Constraint | Stroke, ...]:
+    return read(Constraints, value, name).constraints()
+
+
+def _trade_off(value: Any, name: str) -> TradeOffTable:
+    over = table_of(value, name).get("over")
+    limit = Quantity(OVER[over].unit if isinstance(over, str) and over in OVER else "m")
+    return read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SynthesisCase:
+    """What a case file asks for."""
+
+    title: str = entry(text)
+    task: Task = entry(as_it_is)
+    bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
+    constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
+    search: SearchTable = entry(Table(SearchTable), SearchTable())
+    make: Make = entry(Table(Make), Make())
+    trade_off: TradeOffTable | None = entry(_trade_off, None)
+
+    def __post_init__(self) -> None:
+        made = (replace(c, make=self.make) if isinstance(c, FORCES) else c for c in self.constraints)
+        object.__setattr__(self, "constraints", tuple(made))
+        # contradictions are reported before anything is searched
+        if not isinstance(self.task, QuickReturn | QuickSwing):
+            limits_by_kind(
+                self.task, normal_form(self.task), self.bounds, self.constraints, self.search.kinds, self.search.gears
+            )
+
+    def solve(self, *, progress: bool = False) -> Synthesis:
+        """Search for linkages; see `synthesize`."""
+        search, (kinds, gears) = self.search.search(progress=progress), (self.search.kinds, self.search.gears)
+        return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
+
+    def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
+        """Run the plant for the pin forces of solutions; None where no constraint is about them."""
+        if not any(isinstance(c, FORCES) for c in self.constraints):
+            return None
+        return [pin_forces(s.linkage, self.make, s.way) for s in solutions]
+
+    def trade(self, *, progress: bool = False) -> TradeOff | None:
+        """Compute the trade-off that is asked for; None if there is none. See `trade_off`."""
+        wanted = self.trade_off
+        if wanted is None:
+            return None
+        constraints = self.constraints
+        if wanted.over == "pin-force" and not any(isinstance(c, MaxPinForce) for c in constraints):
+            constraints = (*constraints, MaxPinForce(force=max(wanted.limits), make=self.make))
+        return trade_off(
+            self.task,
+            wanted.over,
+            np.array(wanted.limits),
+            self.bounds,
+            constraints,
+            search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.jobs, progress=progress),
+            kinds=self.search.kinds,
+            gears=self.search.gears,
+        )
+
+
+def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> SynthesisCase:
+    """Read a synthesis from a TOML or JSON file; see `docs/synthesis-cases.md`.
+
+    Parameters
+    ----------
+    path : path
+    overrides : mapping, optional
+        Values by dotted name that replace the file's, such as ``constraints.largest_link`` or ``search.seed``.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If the file cannot be read, or what it says is not usable.
+    InfeasibleError
+        If bounds and constraints contradict one another.
+    """
+    path = Path(path)
+    return synthesis_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+
+
+def synthesis_case_from(
+    data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
+) -> SynthesisCase:
+    """Read a synthesis from the tables of a case file; ``folder`` is where its files are looked for."""
+    tables = {"title": title} | overridden(data, overrides or {})
+    return read(SynthesisCase, tables, "", readers={"task": partial(read_task, folder=folder)})

@@ -1,0 +1,389 @@
+"""The task of a synthesis case: its table, of points, files and formulas, and the task that it describes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import cos, sin, tau
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, MissingParameterError, ParameterError
+
+from ...files import Choice, Kinds, Many, Quantity, Table, Whole, as_it_is, entry, flag, read, read_points, text
+from ...units import quantity
+from ..exact.quick_return import QuickReturn, QuickSwing
+from ..task.formula import function_from_formula, path_from_formula
+from ..task.target import TargetPath
+from ..task.task import (
+    Motion,
+    Objective,
+    PrecisionPoints,
+    RockerFunction,
+    SliderFunction,
+    Straight,
+    Task,
+    TimedPath,
+    UntimedPath,
+    turn,
+)
+
+FloatArray = NDArray[np.float64]
+
+
+# Readers
+
+
+def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatArray:
+    """Read points, shape (n, 2) in m; numbers without a unit are in ``bare``, by default m."""
+    return np.array(Many(Many(Quantity("m", bare=bare), length=2))(value, name)).reshape(-1, 2)
+
+
+def _unit(value: Any, name: str, kind: str, si: str, example: str) -> str:
+    """Read the unit of numbers that have none."""
+    try:
+        quantity(f"1 {value}", si, name)
+    except ParameterError:
+        raise ParameterError(name, value, f"be a unit of {kind}, such as {example}") from None
+    return str(value)
+
+
+_length_unit = partial(_unit, kind="length", si="m", example="'mm'")
+_angle_unit = partial(_unit, kind="angle", si="rad", example="'deg'")
+
+
+def _end(value: Any, name: str) -> float | str:
+    """Read an end of the range of a formula's parameter; "360 deg" is an angle, "2*pi" a formula."""
+    angle = r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z]+\s*"
+    if isinstance(value, str) and not re.fullmatch(angle, value):
+        return value
+    return quantity(value, "rad", name)
+
+
+# Tables inside the task's
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steps:
+    """Crank rotations in equal steps."""
+
+    begin: float = entry(Quantity("rad"), key="from")
+    end: float = entry(Quantity("rad"), key="to")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """Targets that are weighted: from one crank rotation, or number of a point, to another."""
+
+    begin: float = entry(Quantity("rad"), key="from")
+    end: float = entry(Quantity("rad"), key="to")
+    weight: float = entry(Quantity("1"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Smoothing:
+    """How a path is smoothed; see `TargetPath.smoothed`."""
+
+    points: int = entry(Whole(8), 180)
+    deviation: float | None = entry(Quantity("m"), None)
+
+
+_STRAIGHT = Table(
+    Straight,
+    {
+        "start": Whole(0),
+        "end": Whole(0),
+        "rotation": Quantity("rad"),
+        "flatness": Quantity("m"),
+        "weight": Quantity("1"),
+    },
+)
+
+
+def _smoothing(value: Any, name: str) -> Smoothing | None:
+    if isinstance(value, bool):
+        return Smoothing() if value else None
+    if not isinstance(value, Mapping):
+        raise ParameterError(name, value, "be true, false, or a table with points and deviation")
+    return read(Smoothing, value, name)
+
+
+def _steps_or_list(value: Any, name: str) -> Any:
+    return read(Steps, value, name) if isinstance(value, Mapping) else Many(Quantity("rad"))(value, name)
+
+
+def _rotation(value: Any, n: int) -> FloatArray | None:
+    """Return the crank rotations of n targets."""
+    if value is None:
+        return None
+    return np.linspace(value.begin, value.end, n) if isinstance(value, Steps) else np.array(value)
+
+
+def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
+    """Read weights, as a list or as windows of crank rotation; of an untimed task windows count points, both ends included."""
+    if value is None:
+        return None
+    name = "task.weights"
+    rows = Many(as_it_is)(value, name)
+    if not any(isinstance(row, Mapping) for row in rows):
+        return np.array(Many(Quantity("1"))(value, name))
+    at = np.arange(n, dtype=float) if rotation is None else rotation
+    numbers = {"begin": Whole(0), "end": Whole(0)} if rotation is None else {}
+    weights = np.ones(len(at))
+    for k, row in enumerate(rows):
+        window = read(Window, row, f"{name}[{k}]", readers=numbers)
+        within = (at >= window.begin - 1e-9) & (at <= window.end + 1e-9)
+        if not within.any():
+            raise ParameterError(f"{name}[{k}]", dict(row), "hold at least one target")
+        weights[within] = window.weight
+    return weights
+
+
+# The task
+
+
+def _source(table: Any, sources: tuple[str, ...]) -> str:
+    """Return which of the ways of giving a target is used."""
+    there = [name for name in sources if getattr(table, name) is not None]
+    if len(there) != 1:
+        ways = " or ".join(f"task.{name}" for name in sources)
+        both = f"there are {' and '.join(f'task.{name}' for name in there)}" if there else "there is none of them"
+        raise InputError(f"the target must be given by one of {ways}: {both}")
+    return there[0]
+
+
+def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
+    for name in names:
+        if getattr(table, name) is not None:
+            raise ParameterError(f"task.{name}", getattr(table, name), f"come with task.{source} only")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Formula:
+    """What is made small, and the range of the parameter of a formula: how many points of it, from where to where."""
+
+    objective: Objective = entry(Choice(get_args(Objective)), "error")
+    n: int | None = entry(Whole(3), None)
+    start: float | str | None = entry(_end, None)
+    end: float | str | None = entry(_end, None)
+
+    def _range(self) -> dict[str, Any]:
+        usual = {"n": 72, "start": 0.0, "end": tau}
+        return {
+            name: default if getattr(self, name) is None else getattr(self, name) for name, default in usual.items()
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Curve(_Formula):
+    """Points of a target: written down, of a file, or by formulas; then scaled, turned and shifted."""
+
+    points: Any = entry(as_it_is, None)
+    file: str | None = entry(text, None)
+    name: str | None = entry(text, None)
+    closed: bool | None = entry(flag, None)
+    unit: str | None = entry(_length_unit, None)
+    x: str | None = entry(text, None)
+    y: str | None = entry(text, None)
+    scale: float | None = entry(Quantity("1", above=0.0), None)
+    turn: float | None = entry(Quantity("rad"), None)
+    shift: Any = entry(as_it_is, None)
+
+    def _placed(self, folder: Path) -> tuple[FloatArray, bool]:
+        """Return the points in m, and whether their curve is closed."""
+        source = _source(self, ("points", "file", "x"))
+        if source != "x":
+            _only_with(self, ("y", "n", "start", "end"), "x")
+        if source != "file":
+            _only_with(self, ("name",), "file")
+        if source == "points":
+            found, closed = read_plane_points(self.points, "task.points", self.unit), True
+        elif source == "file":
+            found, closed = read_points(folder / str(self.file), unit=self.unit, name=self.name)
+        elif self.y is None:
+            raise MissingParameterError("task.y")
+        else:
+            path = path_from_formula(str(self.x), self.y, unit=self.unit or "m", **self._range())
+            found, closed = path.points, path.closed
+        shift = np.zeros(2) if self.shift is None else read_plane_points([self.shift], "task.shift", self.unit)[0]
+        if not (self.scale is None and self.turn is None and self.shift is None):
+            scale, turned = 1.0 if self.scale is None else self.scale, self.turn or 0.0
+            c, s = scale * cos(turned), scale * sin(turned)
+            found = found @ np.array([[c, s], [-s, c]]) + shift
+        return found, closed if self.closed is None else self.closed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimedPathTable(_Curve):
+    """The table of a `TimedPath`."""
+
+    rotation: Any = entry(_steps_or_list, None)
+    weights: Any = entry(as_it_is, None)
+
+    def task(self, folder: Path) -> Task:
+        points, _ = self._placed(folder)
+        rotation = _rotation(self.rotation, len(points))
+        at = turn(len(points)) if rotation is None else rotation
+        return TimedPath(points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UntimedPathTable(_Curve):
+    """The table of a `UntimedPath`."""
+
+    measure: Any = entry(Choice(("area", "distance")), "area")
+    samples: int = entry(Whole(8), 72)
+    smoothing: Smoothing | None = entry(_smoothing, None)
+    straight: Straight | None = entry(_STRAIGHT, None)
+    weights: Any = entry(as_it_is, None)
+
+    def task(self, folder: Path) -> Task:
+        points, closed = self._placed(folder)
+        path = TargetPath(points=points, closed=closed)
+        if self.smoothing is not None:
+            if self.straight is not None:
+                requirement = "not come with task.straight, which counts the points given"
+                raise ParameterError("task.smoothing", True, requirement)
+            path = path.smoothed(self.smoothing.points, deviation=self.smoothing.deviation)
+        weights = _weights(self.weights, None, len(path.points))
+        return UntimedPath(
+            path=path,
+            weights=weights,
+            measure=self.measure,
+            samples=self.samples,
+            straight=self.straight,
+            objective=self.objective,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrecisionPointsTable(_Curve):
+    """The table of a `PrecisionPoints`."""
+
+    angle: Any = entry(as_it_is, None)
+    angle_unit: str | None = entry(_angle_unit, None)
+    rotation: Any = entry(_steps_or_list, None)
+    length: float | None = entry(Quantity("m"), None)
+
+    def _body(self, folder: Path) -> dict[str, Any]:
+        """Return the points and directions of a body, turned with its points."""
+        points, _ = self._placed(folder)
+        rotation = _rotation(self.rotation, len(points))
+        angle = None
+        if self.angle is not None:
+            angles = Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle")
+            angle = np.array(angles) + (self.turn or 0.0)
+        return {
+            "points": points, "angle": angle, "rotation": rotation, "length": self.length, "objective": self.objective,
+        }  # fmt: skip
+
+    def task(self, folder: Path) -> Task:
+        return PrecisionPoints(**self._body(folder))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionTable(PrecisionPointsTable):
+    """The table of a `Motion`."""
+
+    weights: Any = entry(as_it_is, None)
+
+    def task(self, folder: Path) -> Task:
+        body = self._body(folder)
+        if body["angle"] is None:
+            raise MissingParameterError("task.angle")
+        return Motion(**body, weights=_weights(self.weights, body["rotation"], len(body["points"])))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RockerFunctionTable(_Formula):
+    """The table of a `RockerFunction`."""
+
+    angle: Any = entry(as_it_is, None)
+    angle_unit: str | None = entry(_angle_unit, None)
+    file: str | None = entry(text, None)
+    rotation: Any = entry(_steps_or_list, None)
+    weights: Any = entry(as_it_is, None)
+    mounting: bool = entry(flag, False)
+    spacing: Any = entry(Choice(("even", "chebyshev")), "even")
+
+    def task(self, folder: Path) -> Task:
+        written = isinstance(self.angle, str)
+        if _source(self, ("angle", "file")) == "file" or written:
+            _only_with(self, ("rotation",), "angle as a list")
+        if not written:
+            _only_with(self, ("n", "start", "end"), "angle as a formula")
+        unit = self.angle_unit or "rad"
+        rotation: FloatArray | None
+        if written:
+            rotation, angle = function_from_formula(self.angle, unit=unit, spacing=self.spacing, **self._range())
+        elif self.file is not None:
+            columns, _ = read_points(folder / self.file)
+            rotation, angle = (quantity(f"1 {unit}", "rad", "task.angle_unit") * columns).T
+        else:
+            angle = np.array(Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle"))
+            rotation = _rotation(self.rotation, len(angle))
+        at = turn(len(angle)) if rotation is None else rotation
+        weights = _weights(self.weights, at)
+        return RockerFunction(
+            angle=angle, rotation=rotation, weights=weights, mounting=self.mounting, objective=self.objective
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderFunctionTable(_Formula):
+    """The table of a `SliderFunction`."""
+
+    position: Any = entry(as_it_is)
+    unit: str | None = entry(_length_unit, None)
+    rotation: Any = entry(_steps_or_list, None)
+    weights: Any = entry(as_it_is, None)
+
+    def task(self, folder: Path) -> Task:
+        if isinstance(self.position, str):
+            _only_with(self, ("rotation",), "position as a list")
+            rotation, numbers = function_from_formula(self.position, **self._range())
+            position = quantity(f"1 {self.unit or 'm'}", "m", "task.unit") * numbers
+        else:
+            _only_with(self, ("n", "start", "end"), "position as a formula")
+            position = np.array(Many(Quantity("m", bare=self.unit))(self.position, "task.position"))
+            given = _rotation(self.rotation, len(position))
+            rotation = turn(len(position)) if given is None else given
+        weights = _weights(self.weights, rotation)
+        return SliderFunction(position=position, rotation=rotation, weights=weights, objective=self.objective)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuickReturnTable:
+    """The table of a `QuickReturn`, or of a `QuickSwing`."""
+
+    stroke: float | None = entry(Quantity("m", above=0.0), None)
+    swing: float | None = entry(Quantity("rad"), None)
+    time_ratio: float = entry(Quantity("1", least=1.0), 1.0)
+
+    def task(self, folder: Path) -> Task:
+        if _source(self, ("stroke", "swing")) == "swing":
+            return QuickSwing(swing=float(self.swing or 0.0), time_ratio=self.time_ratio)
+        return QuickReturn(stroke=float(self.stroke or 0.0), time_ratio=self.time_ratio)
+
+
+#: The table ``[task]`` of each kind.
+KINDS: Mapping[str, type] = {
+    "timed-path": TimedPathTable,
+    "untimed-path": UntimedPathTable,
+    "rocker-function": RockerFunctionTable,
+    "slider-function": SliderFunctionTable,
+    "quick-return": QuickReturnTable,
+    "motion": MotionTable,
+    "precision-points": PrecisionPointsTable,
+}
+
+
+def read_task(value: Any, name: str, *, folder: Path) -> Task:
+    """Read the task of a table ``[task]``; ``folder`` is where its files are looked for."""
+    task: Task = Kinds({kind: Table(table) for kind, table in KINDS.items()})(value, name).task(folder)
+    return task

@@ -1,0 +1,472 @@
+"""Rigid-body guidance in closed form: every four-bar that carries a body exactly through four or five poses.
+
+A dyad is a fixed pivot m and a point of the body that stays at one distance from it. With the body's reference point at p_j and
+the body turned by e_j = exp(i theta_j) since the first pose, its point z from there keeps its distance where
+
+    |p_j|^2 / 2 + Re(conj(p_j) e_j z) - Re(conj(p_j) m) - Re((e_j - 1) w) = 0,   w = conj(m) z,   j = 2 ... n,
+
+which is linear in (1, z, m, w). Five poses leave a plane of solutions, in which w = conj(m) z is two conics: they meet in
+four points, so that there are four dyads, real or complex (L. Burmester, Lehrbuch der Kinematik, 1888; J. M. McCarthy and
+G. S. Soh, Geometric Design of Linkages, 2nd ed., 2011, chapter 5). Two real dyads make a four-bar: at most six, each driven
+from either side. All of them are judged, so that "none is sound" is proved for these poses. Four poses leave a cubic curve of
+points z, each with its pivot m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import permutations
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ...display import Shown, format_count
+from ..linkage.linkage import Linkage
+from ..result.solution import Solution, evaluate, judge, ranked
+from ..task.task import Motion, PrecisionPoints, Task, normal_form
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Poses = PrecisionPoints | Motion
+#: Below this share of the largest singular value the conditions of the poses are not independent.
+INDEPENDENT = 1e-10
+#: Imaginary part, in units of the poses' size, up to which a dyad is real.
+REAL = 1e-7
+#: Points of the curve of four poses, on each of the two branches that a line through its pole meets.
+CURVE_POINTS = 180
+#: Links longer than this many times the poses' size are left out of the map of four poses, as in a search without bounds.
+LONGEST = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dyad:
+    """A link on a fixed pivot that guides a body.
+
+    Attributes
+    ----------
+    pivot : complex
+        Its fixed end (m): a point of the centre-point curve.
+    point : complex
+        Its other end with the body in the first pose (m): a point of the circle-point curve.
+    """
+
+    pivot: complex
+    point: complex
+
+    @property
+    def length(self) -> float:
+        """Return its length (m)."""
+        return abs(self.point - self.pivot)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Guidance(Shown):
+    """Every four-bar that carries a body exactly through five poses, sound or not.
+
+    Attributes
+    ----------
+    task : PrecisionPoints or Motion
+    dyads : tuple of Dyad
+        The real ones; of five poses there are four, two or none.
+    complex_dyads : int
+        How many are complex, and so cannot be built.
+    nearest_complex : float
+        Imaginary part of the complex ones, the least, as a share of the poses' size: next to zero a small change of the
+        poses makes them real. Infinite where there are none.
+    solutions : tuple of Solution
+        Each pair of dyads, driven from either side; sound ones first, then by transmission angle.
+    """
+
+    task: Poses
+    dyads: tuple[Dyad, ...]
+    complex_dyads: int
+    nearest_complex: float
+    solutions: tuple[Solution, ...]
+
+    @property
+    def sound(self) -> tuple[Solution, ...]:
+        """Return the solutions without circuit, branch or order defect."""
+        return tuple(s for s in self.solutions if s.verdicts.sound)
+
+    def describe(self) -> str:
+        """Say in a sentence how many linkages there are."""
+        there = f"{format_count(len(self.dyads), 'real dyad')} of {len(self.dyads) + self.complex_dyads}"
+        if not self.solutions:
+            return f"{there}: no four-bar carries a body through these poses"
+        linkages = format_count(len(self.solutions) // 2, "four-bar")
+        if not self.sound:
+            return f"{there}, {linkages}, driven from either side: each has a defect, so that no sound four-bar exists"
+        return f"{there}, {linkages}, driven from either side: {len(self.sound)} of {len(self.solutions)} sound"
+
+    def __repr__(self) -> str:
+        return f"<Guidance: {self.describe()}>"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GuidanceMap(Shown):
+    """The four-bars that carry a body exactly through four poses: two points of a curve of dyads.
+
+    Attributes
+    ----------
+    task : PrecisionPoints or Motion
+    pivots, points : ndarray of complex, shape (n,)
+        The centre-point and the circle-point curve, place by place a dyad (m); sampled by the lines through a pole, which meet
+        the curve twice more.
+    sound : ndarray of bool, shape (n, n)
+        Whether the linkage with the crank of a row and the rocker of a column is free of defects.
+    transmission : ndarray, shape (n, n)
+        Least distance of its transmission angle from 0 and pi on the way from the first pose to the last (rad); 0 where it is
+        not sound.
+    solutions : tuple of Solution
+        The best by that angle, different ones.
+    """
+
+    task: Poses
+    pivots: ComplexArray
+    points: ComplexArray
+    sound: NDArray[np.bool_]
+    transmission: FloatArray
+    solutions: tuple[Solution, ...]
+
+    def describe(self) -> str:
+        """Say in a sentence how many linkages there are."""
+        n = len(self.points)
+        return (
+            f"{n} dyads on the curve of four poses: {int(self.sound.sum())} of {n * (n - 1)} pairs make a sound four-bar with "
+            f"no link longer than {LONGEST:g} times the poses' size"
+        )
+
+    def __repr__(self) -> str:
+        return f"<GuidanceMap: {self.describe()}>"
+
+
+def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
+    """Find all four-bars that carry a body exactly through four or five poses, with their defects.
+
+    Parameters
+    ----------
+    task : PrecisionPoints or Motion
+        Poses: points with angles, no crank rotations.
+    count : int
+        Of four poses, solutions that are returned.
+
+    Returns
+    -------
+    Guidance or GuidanceMap
+        Of five poses, of four.
+
+    Raises
+    ------
+    InputError
+        If there are not four or five poses, the crank rotations are given, or the poses leave more freedom: two are the same,
+        or the body does not turn.
+
+    Examples
+    --------
+    >>> from analysis.synthesis import PrecisionPoints, guidance
+    >>> points = [[1.5, 0.2], [1.4, 0.4], [0.9, 0.8], [-1.2, 0.6], [-1.3, 0.5]]
+    >>> found = guidance(PrecisionPoints(points=points, angle=[-0.2, -0.1, 0.1, 0.5, 0.5]))
+    >>> print(found.describe())
+    4 real dyads of 4, 6 four-bars, driven from either side: 7 of 12 sound
+    """
+    task, p, angle = _poses(task)
+    return _guide_five_poses(task, p, angle) if len(p) == 5 else _guide_four_poses(task, p, angle, count)
+
+
+def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
+    """Return the places and angles, four or five of each; raises InputError as `guidance`."""
+    if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
+        raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
+    if task.rotation is not None:
+        raise InputError(
+            "poses at given crank rotations: closed-form guidance leaves the rotations free; leave them out"
+        )
+    points, angle = np.asarray(task.points), np.asarray(task.angle)
+    if len(points) not in (4, 5):
+        raise InputError(
+            f"{len(points)} poses: in closed form there must be five, which have up to six four-bars, or four, which have a "
+            "curve of dyads"
+        )
+    return task, points @ np.array([1.0, 1j]), angle
+
+
+def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Compute the four dyads of five poses, complex ones too.
+
+    Parameters
+    ----------
+    p : ndarray of complex, shape (5,)
+        Places of the body's reference point, from the first, in units of the poses' size.
+    angle : ndarray, shape (5,)
+        rad.
+
+    Returns
+    -------
+    z, m : ndarray of complex, shape (4, 2)
+        Cartesian parts of the point from the first place, and of the pivot: real numbers of a dyad that can be built.
+
+    Raises
+    ------
+    InputError
+        If the conditions are not independent.
+    """
+    rows = _conditions(p, angle)
+    plane = _kernel(rows, 3)
+    # no root may lie at infinity of the plane's coordinates: turned at random, always in the same way
+    turned, _ = np.linalg.qr(np.random.default_rng(1888).standard_normal((3, 3)))
+    plane = plane @ turned
+    first, second = (plane.T @ form @ plane for form in _FORMS)
+    found = np.array([plane @ root for root in _meeting(first, second)])
+    solved = np.array([_polished(rows, v[1:5] / v[0]) for v in found])
+    return solved[:, :2], solved[:, 2:]
+
+
+def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
+    """Return the linear conditions of the second and later poses on (1, zx, zy, mx, my, wx, wy), shape (n - 1, 7)."""
+    p, e = p[1:] - p[0], np.exp(1j * (angle[1:] - angle[0]))
+    seen = np.conj(p) * e
+    return np.column_stack(
+        [0.5 * np.abs(p) ** 2, seen.real, -seen.imag, -p.real, -p.imag, -(e.real - 1.0), e.imag],
+    )
+
+
+def _forms() -> tuple[FloatArray, FloatArray]:
+    """Return the quadratic forms by which w = conj(m) z, of (1, zx, zy, mx, my, wx, wy)."""
+    real, imaginary = np.zeros((7, 7)), np.zeros((7, 7))
+    real[0, 5], real[3, 1], real[4, 2] = -1.0, 1.0, 1.0
+    imaginary[0, 6], imaginary[3, 2], imaginary[4, 1] = -1.0, 1.0, -1.0
+    return 0.5 * (real + real.T), 0.5 * (imaginary + imaginary.T)
+
+
+_FORMS = _forms()
+
+
+def _kernel(rows: FloatArray, size: int) -> FloatArray:
+    """Return a basis of the null space of the rows, in columns.
+
+    Raises InputError if there are more than ``size`` of them.
+    """
+    _, values, right = np.linalg.svd(rows)
+    if values[-1] < INDEPENDENT * values[0]:
+        raise InputError(
+            "the poses are not independent: two of them are the same, or the body does not turn between them; then there are "
+            "infinitely many dyads. Change a pose, or leave one out"
+        )
+    return right[-size:].T
+
+
+def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
+    """Intersect two conics: (x, y, 1) in rows, shape (4, 3), from the resultant of their quadratics in x."""
+
+    def quadratics(y: complex) -> list[tuple[complex, complex, complex]]:
+        return [
+            (a[0, 0], 2.0 * (a[0, 1] * y + a[0, 2]), a[1, 1] * y * y + 2.0 * a[1, 2] * y + a[2, 2])
+            for a in (first, second)
+        ]
+
+    def sylvester(y: complex) -> ComplexArray:
+        (a, b, c), (d, e, f) = quadratics(y)
+        return np.array([[a, b, c, 0.0], [0.0, a, b, c], [d, e, f, 0.0], [0.0, d, e, f]], dtype=complex)
+
+    # the resultant is a quartic in y: from its values at the fifth roots of one
+    values = [np.linalg.det(sylvester(y)) for y in np.exp(2j * pi * np.arange(5) / 5.0)]
+    quartic = np.fft.fft(values) / 5.0
+    roots = np.roots(quartic.real[::-1])
+    places = []
+    for y in roots:
+        (a, b, c), (d, e, f) = quadratics(y)
+        # the common root of both
+        x = -(a * f - c * d) / (a * e - b * d)
+        places.append([x, y, 1.0])
+    return np.array(places)
+
+
+def _polished(rows: FloatArray, v: ComplexArray) -> ComplexArray:
+    """Polish a solution (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
+    for _ in range(8):
+        zx, zy, mx, my = v
+        full = np.array([1.0, zx, zy, mx, my, mx * zx + my * zy, mx * zy - my * zx])
+        slope = np.zeros((7, 4), dtype=complex)
+        slope[1:5] = np.eye(4)
+        slope[5] = mx, my, zx, zy
+        slope[6] = -my, mx, zy, -zx
+        step = np.linalg.lstsq(rows @ slope, rows @ full, rcond=None)[0]
+        v = v - step
+        if np.abs(step).max() <= 1e-15 * np.abs(v).max():
+            break
+    return v
+
+
+def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidance:
+    unit = normal_form(task).unit
+    z, m = dyads_of_five(p / unit, angle)
+    off = np.abs(np.column_stack([z, m]).imag).max(axis=1)
+    real = off <= REAL
+    dyads = tuple(
+        Dyad(
+            pivot=p[0] + unit * complex(mx.real, my.real),
+            point=p[0] + unit * complex(zx.real, zy.real),
+        )
+        for (zx, zy), (mx, my) in zip(z[real], m[real])
+    )
+    # two dyads on one pivot, or at one point of the body, hold it as a single one does
+    made = [
+        four_bar(task, a, b)
+        for a, b in permutations(dyads, 2)
+        if min(abs(a.pivot - b.pivot), abs(a.point - b.point), a.length, b.length) > REAL * unit
+    ]
+    return Guidance(
+        task=task,
+        dyads=dyads,
+        complex_dyads=int((~real).sum()),
+        nearest_complex=float(off[~real].min(initial=np.inf)),
+        solutions=ranked(made),
+    )
+
+
+def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
+    """Make the four-bar of two dyads, and judge it from the first pose to the last."""
+    points, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
+    turned = np.exp(1j * (angle - angle[0]))
+    b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
+    ground, arm, coupler = rocker.pivot - crank.pivot, b - crank.pivot, c - b
+    sides = np.sign(np.imag(np.conj(rocker.pivot - b) * coupler))
+    rotation = in_order(np.angle(arm * np.conj(arm[0])))
+    linkage = Linkage(
+        pivot_x=crank.pivot.real,
+        pivot_y=crank.pivot.imag,
+        ground_length=abs(ground),
+        crank_length=abs(arm[0]),
+        coupler_length=abs(coupler[0]),
+        rocker_length=rocker.length,
+        point_distance=abs(points[0] - b[0]),
+        ground_angle=float(np.angle(ground)),
+        crank_phase=float(np.angle(arm[0] * np.conj(ground))),
+        point_angle=float(np.angle((points[0] - b[0]) * np.conj(coupler[0]))),
+        output_angle=float(np.angle(np.exp(1j * angle[0]) * np.conj(coupler[0]))),
+        branch=1 if sides[0] >= 0.0 else -1,
+    )
+    return exact_solution(task, linkage, rotation, sides)
+
+
+def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: FloatArray) -> Solution:
+    """Judge a linkage that meets all targets; ``sides`` is the assembly at each, +1 with C to the left of B -> D.
+
+    Where the targets lie on both assemblies there is a branch defect; and a circuit defect if, by Grashof's criterion, one
+    cannot be reached from the other.
+    """
+    verdicts = judge(linkage, rotation, closed=False)
+    if (sides != sides[0]).any():
+        apart = linkage.grashof not in ("triple-rocker", "change-point")
+        verdicts = replace(verdicts, branch=False, circuit=not apart)
+    return Solution(task=task, linkage=linkage, evaluation=evaluate(task, linkage, rotation), verdicts=verdicts)
+
+
+def in_order(turned: FloatArray) -> FloatArray:
+    """Return angles, known to within whole turns, as rotations from the first that go one way if they can."""
+    forward = turned % (2.0 * pi)
+    # the first is 0, also where rounding made it a whole turn
+    forward[0] = 0.0
+    if (np.diff(forward) > 0.0).all():
+        return forward
+    backward = np.append(0.0, forward[1:] - 2.0 * pi)
+    return backward if (np.diff(backward) < 0.0).all() else forward
+
+
+def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Compute the circle-point curve of four poses, from the first place, and the pivots, where both are finite.
+
+    The condition that three lines in m meet is a cubic in z that vanishes at the pole of two poses: a line through it meets the
+    curve twice more.
+
+    Raises InputError if the poses are not independent.
+    """
+    rows = _conditions(p, angle)
+    _kernel(rows, 4)
+    e = np.exp(1j * (angle[1:] - angle[0]))
+    chosen = int(np.argmax(np.abs(e - 1.0)))
+    pole = -(p[chosen + 1] - p[0]) / (e[chosen] - 1.0)
+    others = [j for j in range(3) if j != chosen]
+    nearer: list[complex] = []
+    farther: list[complex] = []
+    for direction in np.exp(1j * pi * (np.arange(CURVE_POINTS) + 0.5) / CURVE_POINTS):
+        # the row of the pole is zero there, and so proportional to the way from it
+        along = _lines(rows[chosen], pole + direction)
+
+        def cubic(way: float, direction: complex = direction, along: FloatArray = along) -> float:
+            met = [_lines(rows[j], pole + way * direction) for j in others]
+            return float(np.linalg.det(np.array([along, *met])))
+
+        back, here, ahead = cubic(-1.0), cubic(0.0), cubic(1.0)
+        ways = np.roots([0.5 * (ahead + back) - here, 0.5 * (ahead - back), here])
+        for branch, way in zip((nearer, farther), sorted(ways, key=lambda w: float(w.real))):
+            if abs(way.imag) <= REAL:
+                branch.append(pole + way.real * direction)
+    z = np.array(nearer + farther)
+    lines = np.array([[_lines(row, at) for row in rows] for at in z])
+    m = np.array([np.linalg.lstsq(a[:, :2], -a[:, 2], rcond=None)[0] for a in lines]) @ np.array([1.0, 1j])
+    near = (np.abs(z) < 1e3) & (np.abs(m) < 1e3)
+    return z[near], m[near]
+
+
+def _lines(row: FloatArray, z: complex) -> FloatArray:
+    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot of a point z; all are linear in z."""
+    turned = complex(-row[5], row[6]) * z
+    constant = row[0] + row[1] * z.real + row[2] * z.imag
+    return np.array([row[3] - turned.real, row[4] - turned.imag, constant])
+
+
+def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: int) -> GuidanceMap:
+    unit = normal_form(task).unit
+    z, m = dyads_of_four(p / unit, angle)
+    sound, transmission = _pairs(p / unit - p[0] / unit, np.exp(1j * (angle - angle[0])), z, m)
+    pivots, points = p[0] + unit * m, p[0] + unit * z
+    chosen: list[tuple[int, int]] = []
+    for place in np.argsort(-transmission, axis=None)[: int(sound.sum())]:
+        i, k = (int(n) for n in np.unravel_index(place, sound.shape))
+        # neighbours on the curve are much the same linkage
+        if all(abs(z[i] - z[a]) + abs(z[k] - z[b]) > 0.1 for a, b in chosen):
+            chosen.append((i, k))
+        if len(chosen) == count:
+            break
+    dyads = [Dyad(pivot=complex(a), point=complex(b)) for a, b in zip(pivots, points)]
+    return GuidanceMap(
+        task=task,
+        pivots=pivots,
+        points=points,
+        sound=sound,
+        transmission=transmission,
+        solutions=ranked([four_bar(task, dyads[i], dyads[k]) for i, k in chosen]),
+    )
+
+
+def _pairs(p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Judge every pair of crank (row) and rocker (column): soundness and transmission angle of `GuidanceMap`."""
+    places = p[:, None] + e[:, None] * z
+    arms = places - m
+    turned = np.array([in_order(np.angle(column / column[0])) for column in arms.T])
+    steps = np.diff(turned, axis=1)
+    order: NDArray[np.bool_] = np.asarray((steps > 0.0).all(axis=1) | (steps < 0.0).all(axis=1))
+    ground = m[None, :] - m[:, None]
+    l1, l2, l4 = np.abs(ground), np.abs(arms[0])[:, None], np.abs(arms[0])[None, :]
+    l3 = np.abs(z[None, :] - z[:, None])
+    largest = np.maximum(np.maximum(l1, l2), np.maximum(l3, l4))
+    there = (np.minimum(np.minimum(l1, l2), np.minimum(l3, l4)) > 1e-6) & (largest <= LONGEST)
+    sides = np.array([np.sign(np.imag(np.conj(m[None, :] - b[:, None]) * (b[None, :] - b[:, None]))) for b in places])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        begin = np.angle(arms[0][:, None] / ground)
+        end = begin + turned[:, -1:]
+        low, high = np.minimum(begin, end) / pi, np.maximum(begin, end) / pi
+        # the distance from crank pin to rocker pivot at the ends, and with the crank along the ground link where it comes there
+        even, odd = 2.0 * np.ceil(0.5 * low), 2.0 * np.ceil(0.5 * (low - 1.0)) + 1.0
+        distances = [np.abs(m[None, :] - b[:, None]) for b in (places[0], places[-1])]
+        distances += [np.where(even <= high, np.abs(l1 - l2), distances[0])]
+        distances += [np.where(odd <= high, l1 + l2, distances[0])]
+        cosines = [np.abs((l3 * l3 + l4 * l4 - d * d) / (2.0 * l3 * l4)) for d in distances]
+        greatest = np.max(cosines, axis=0)
+    one_side = np.abs(sides.sum(axis=0)) == float(len(p))
+    sound = there & order[:, None] & one_side & (greatest < 1.0)
+    return sound, np.where(sound, np.arccos(np.where(sound, greatest, 1.0)), 0.0)

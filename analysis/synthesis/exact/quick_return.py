@@ -1,0 +1,291 @@
+"""Slider-cranks of a given stroke and crank-rockers of a given swing, each with a time ratio: the best of them in closed form.
+
+In the dead centres C is l3 + l2 and l3 - l2 away from A, the two directions advance = pi (Q - 1)/(Q + 1) apart, so that by the
+laws of cosines and sines
+
+    l2^2 (1 + cos advance) = H^2/2 - l3^2 (1 - cos advance),    l1 H = (l3^2 - l2^2) sin advance
+
+with the stroke H, the time ratio Q and the offset l1. That leaves l3, for which (l1 + l2)/l3, the cosine of the least
+transmission angle, is made small. Of a crank-rocker C is in the same two places, their distance the chord
+H = 2 l4 sin(swing/2) of its swing about D, which lies on A's side of that chord where a crank that turns to the left is slow
+while the rocker turns to the left. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import acos, cos, degrees, hypot, inf, isfinite, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+
+from linkwork.errors import InputError, ParameterError
+
+from ...units import Amount, in_si
+from ..linkage.linkage import LINKS, Linkage, SliderCrank
+from ..result.solution import Solution, ranked
+from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission
+from ..task.limit_position import dead_centres
+from ..task.limits import GROUND, LARGEST
+from ..task.task import RockerFunction, SliderFunction
+
+FloatArray = NDArray[np.float64]
+#: Couplers that are looked at before the best is found exactly.
+COUPLERS = 2001
+#: Dimensions of a slider-crank that bounds may be of.
+BOUNDED = ("ground_length", "crank_length", "coupler_length")
+
+
+@in_si(stroke="m")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class QuickReturn(SliderFunction):
+    """The slider goes a stroke along the x axis in the slow part of a turn, and back in the quick one.
+
+    Attributes
+    ----------
+    stroke : float
+        m.
+    time_ratio : float
+        Time of the way out over that of the way back, the crank turning evenly: 1 at least.
+    position, rotation : ndarray, shape (3,)
+        Made of them: 0, the stroke, and 0 again.
+    """
+
+    stroke: Amount
+    time_ratio: float = 1.0
+    position: ArrayLike = field(init=False)
+    rotation: ArrayLike | None = field(init=False)
+    weights: ArrayLike | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        if not (isfinite(float(self.stroke)) and float(self.stroke) > 0.0):
+            raise ParameterError("stroke", float(self.stroke), "be a finite number above zero (m)")
+        slow = pi + _advance(self.time_ratio)
+        object.__setattr__(self, "position", np.array([0.0, float(self.stroke), 0.0]))
+        object.__setattr__(self, "rotation", np.array([0.0, slow, 2.0 * pi]))
+        SliderFunction.__post_init__(self)
+
+    @property
+    def advance(self) -> float:
+        """Return the crank's rotation in the slow part beyond half a turn (rad)."""
+        return _advance(self.time_ratio)
+
+
+@in_si(swing="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class QuickSwing(RockerFunction):
+    """The rocker of a crank-rocker turns by an angle in the slow part of a turn, and back in the quick one.
+
+    Attributes
+    ----------
+    swing : float
+        To the left, the crank turning to the left (rad), short of half a turn; below zero to the right, which is the same
+        seen from behind.
+    time_ratio : float
+        As of `QuickReturn`.
+    angle, rotation : ndarray, shape (3,)
+        Made of them: 0, the swing, and 0 again, from any mounting angle.
+    """
+
+    swing: Amount
+    time_ratio: float = 1.0
+    angle: ArrayLike = field(init=False)
+    rotation: ArrayLike | None = field(init=False)
+    weights: ArrayLike | None = field(init=False, default=None)
+    mounting: bool = field(init=False, default=True)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < abs(float(self.swing)) < pi:
+            raise ParameterError("swing", float(self.swing), "be an angle above zero and below half a turn (rad)")
+        object.__setattr__(self, "angle", np.array([0.0, float(self.swing), 0.0]))
+        object.__setattr__(self, "rotation", np.array([0.0, pi + _advance(self.time_ratio), 2.0 * pi]))
+        RockerFunction.__post_init__(self)
+
+
+def _advance(time_ratio: float) -> float:
+    """Return the crank's rotation in the slow part beyond half a turn (rad).
+
+    Raises ParameterError if the time ratio is not a finite number of 1 or more.
+    """
+    if not (isfinite(time_ratio) and time_ratio >= 1.0):
+        raise ParameterError("time ratio", time_ratio, "be a finite number of 1 or more")
+    return pi * (time_ratio - 1.0) / (time_ratio + 1.0)
+
+
+def quick_returns(
+    task: QuickReturn | QuickSwing, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Any]
+) -> tuple[Solution, ...]:
+    """Find the linkage with the greatest least transmission angle, in either assembly.
+
+    Raises InputError if a bound or a constraint is none that this can keep; InfeasibleError if there is none; it says what
+    transmission angle can be had.
+    """
+    for c in constraints:
+        if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):
+            other = "SliderFunction" if isinstance(task, QuickReturn) else "RockerFunction"
+            raise InputError(
+                f"a {type(task).__name__} cannot keep {type(c).__name__}: leave it out, or ask for a {other}"
+            )
+    branches = {c.branch for c in constraints if isinstance(c, Assembly)}
+    if len(branches) > 1:
+        raise InfeasibleError("both assemblies are asked for at once")
+    cosine: Callable[[float], float]
+    if isinstance(task, QuickReturn):
+        ends = _ends(task, bounds, constraints)
+        asked, kind = f"a stroke of {1e3 * float(task.stroke):g} mm", "slider-crank"
+        cosine, couplers = partial(_cosine, task=task, ends=ends), ends["coupler_length"]
+    else:
+        shape = _Swing(task, bounds, constraints)
+        asked, kind = f"a swing of {degrees(float(task.swing)):g} deg", "crank-rocker"
+        cosine, couplers = shape.cosine, shape.couplers
+    asked += f" and a time ratio of {task.time_ratio:g}"
+    l3, least = _best_coupler(cosine, couplers), _least_angle(constraints)
+    if not cosine(l3) < 1.0:
+        raise InfeasibleError(f"no {kind} with {asked} has a crank that turns fully within these bounds")
+    if acos(cosine(l3)) < least:
+        raise InfeasibleError(
+            f"a transmission angle of {degrees(least):g} deg is asked for: with {asked} the best {kind} has "
+            f"{degrees(acos(cosine(l3))):.4g} deg"
+        )
+    made = [
+        _linkage(task, l3, b) if isinstance(task, QuickReturn) else shape.linkage(l3, b) for b in branches or (1, -1)
+    ]
+    return ranked([Solution.of(task, linkage) for linkage in made])
+
+
+def _least_angle(constraints: Sequence[Any]) -> float:
+    return max((float(c.angle) for c in constraints if isinstance(c, LeastTransmission)), default=0.0)
+
+
+def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -> float:
+    """Find the coupler between two lengths that has the least cosine of the transmission angle."""
+    couplers = np.linspace(*ends, COUPLERS)
+    cosines = np.array([cosine(float(l3)) for l3 in couplers])
+    best = int(np.argmin(cosines))
+    low, high = couplers[max(best - 1, 0)], couplers[min(best + 1, COUPLERS - 1)]
+    found = minimize_scalar(cosine, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * high})
+    return float(min((couplers[best], float(found.x)), key=cosine))
+
+
+class _Swing:
+    """Crank-rockers of a swing and a time ratio, by their couplers in rockers; and their size, by bounds and caps."""
+
+    def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
+        self.task, self.advance = task, _advance(task.time_ratio)
+        self.bounds: dict[str, tuple[float, float]] = {}
+        for name, (low, high) in dict(bounds or {}).items():
+            if name not in LINKS:
+                raise ParameterError(name, (low, high), f"be one of {', '.join(LINKS)}: the others follow")
+            self.bounds[name] = low or 0.0, inf if high is None else high
+        self.cap = min((float(c.length) for c in constraints if isinstance(c, LargestLink)), default=inf)
+        chord = 2.0 * sin(0.5 * abs(float(task.swing)))
+        most = chord / (2.0 * sin(0.5 * self.advance)) if self.advance > 0.0 else inf
+        self.couplers = 0.5 * chord, min(most, LARGEST)
+        self.chord = chord
+
+    def links(self, l3: float) -> tuple[float, float, float, float] | None:
+        """Return l1 ... l4 (m); None where the dead centres are not of one assembly, or a bound is not kept."""
+        e, l2 = _lengths(l3, self.advance, self.chord)
+        far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
+        side = 1.0 if float(self.task.swing) > 0.0 else -1.0
+        x, y = far - 0.5 * self.chord, side * sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
+        # D from A to the same side of both places of C
+        sides = [x * -e - y * reach for reach in (far, far - self.chord)]
+        if l2 <= 0.0 or sides[0] * sides[1] <= 0.0:
+            return None
+        found = dict(zip(LINKS, (hypot(x, y), l2, l3, 1.0)))
+        fixed = [ends[0] / found[name] for name, ends in self.bounds.items() if ends[0] == ends[1]]
+        scale = fixed[0] if fixed else min(GROUND / found["ground_length"], self.cap / max(found.values()))
+        made = tuple(scale * value for value in found.values())
+        kept = all(
+            low * (1.0 - 1e-9) <= value <= min(high, self.cap) * (1.0 + 1e-9)
+            for value, (low, high) in zip(made, (self.bounds.get(name, (0.0, inf)) for name in LINKS))
+        )
+        return made if kept else None  # type: ignore[return-value]
+
+    def cosine(self, l3: float) -> float:
+        """Return the cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
+        links = self.links(l3)
+        if links is None:
+            return 1.0
+        l1, l2, l3, l4 = links
+        both = [abs(l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4) for reach in (l1 - l2, l1 + l2)]
+        return min(1.0, max(both))
+
+    def linkage(self, l3: float, branch: int) -> Linkage:
+        """Make the crank-rocker, starting from the dead centre at which the slow part begins."""
+        links = self.links(l3)
+        assert links is not None
+        l1, l2, l3, l4 = links
+        made = Linkage(ground_length=l1, crank_length=l2, coupler_length=l3, rocker_length=l4, branch=branch)
+        first, second = dead_centres(made)
+        slow = [
+            (abs((end - start) % (2.0 * pi) - pi - self.advance), start)
+            for start, end in ((first, second), (second, first))
+        ]
+        begun = [replace(made, crank_phase=start) for off, start in slow if off < 1e-6]
+        begun = [replace(one, output_angle=-float(one.rocker_angle([0.0])[0])) for one in begun]
+        return min(begun, key=lambda one: Solution.of(self.task, one).error)
+
+
+def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
+    """Return the least and greatest offset, crank and coupler (m)."""
+    cap = min(
+        (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
+    )
+    ends = dict.fromkeys(BOUNDED, (0.0, cap))
+    for name, (low, high) in dict(bounds or {}).items():
+        if name not in BOUNDED:
+            raise ParameterError(name, (low, high), f"be one of {', '.join(BOUNDED)}: the others follow")
+        ends[name] = max(low or 0.0, 0.0), min(cap, inf if high is None else high)
+    # the crank has a length, and l3 is at least that of an even stroke
+    low, high = ends["coupler_length"]
+    turned = task.advance
+    most = float(task.stroke) / (2.0 * sin(0.5 * turned)) if turned > 0.0 else inf
+    ends["coupler_length"] = max(low, 0.5 * float(task.stroke)), min(high, most)
+    if not ends["coupler_length"][0] <= ends["coupler_length"][1]:
+        raise InfeasibleError(
+            f"the coupler is to be {1e3 * low:g} to {1e3 * high:g} mm: with this stroke and time ratio it is "
+            f"{500.0 * float(task.stroke):g} mm at least"
+            + (f" and {1e3 * most:g} mm at most" if isfinite(most) else "")
+        )
+    return ends
+
+
+def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
+    """Return the offset and crank for a coupler, an advance and a stroke (m)."""
+    l2 = sqrt(max(0.5 * h * h - l3 * l3 * (1.0 - cos(turned)), 0.0) / (1.0 + cos(turned)))
+    return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
+
+
+def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
+    """Return the cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
+    l1, l2 = _lengths(l3, task.advance, float(task.stroke))
+    for name, value in (("ground_length", l1), ("crank_length", l2)):
+        low, high = ends[name]
+        if not low * (1.0 - 1e-12) <= value <= high * (1.0 + 1e-12) or l2 == 0.0:
+            return 1.0
+    return min(1.0, (l1 + l2) / l3)
+
+
+def _linkage(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
+    """Make the slider-crank, its guide below the shaft: a crank that turns to the left goes slowly to the right."""
+    l1, l2 = _lengths(l3, task.advance, float(task.stroke))
+    far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
+    # crank angle where the slider is at 0: folded, or on the other side of the shaft in line
+    phase = pi + acos(l1 / (l3 - l2)) if branch > 0 else -acos(l1 / (l3 + l2))
+    return SliderCrank(
+        pivot_x=-near if branch > 0 else far,
+        pivot_y=l1,
+        ground_length=l1,
+        crank_length=l2,
+        coupler_length=l3,
+        point_distance=l3,
+        ground_angle=-0.5 * pi,
+        crank_phase=phase,
+        branch=branch,
+    )

@@ -1,0 +1,458 @@
+"""Compiled: the path of the coupler point and its exact derivatives, for many crank angles or many linkages.
+
+The loop is closed by `kinematics.joined`, the plant's own function; the derivatives are those of loop closure, projected on
+the rocker and on the coupler as in `kinematics.coefficients`, with respect to every dimension. The loops run over arrays
+without branches, so that the compiler takes several crank angles at a time; where the links cannot be joined the square root
+leaves a NaN, which the callers look for.
+
+A linkage is the vector ``q`` of `PLACES`: the thesis's ten parameters in its order. Crank directions come as cosines and
+sines of the crank's rotation, which a timed task knows beforehand; the rocker pivot D may be moved by (dx, dy) in the frame
+of the ground link, which is how a slider or a second crank enters. With a rocker of length zero there is none: C is on a
+guide at right angles to the ground link at its end, which is a rocker whose pivot lies at infinity.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin
+
+import numpy as np
+from numba import boolean, complex128, float64, int64, void
+
+from linkwork.five_bar import kinematics
+
+from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel, part
+
+
+def guided(c2, s2, dx, dy, l3, l4, branch):
+    """Close the loop with C on a guide at right angles to the ground link, a distance dx from B; see `joined`.
+
+    Of CasADi's symbols too. For branch +1 C lies to the left of the way from B to the guide.
+    """
+    c3 = dx / l3
+    s3 = branch * (1.0 - c3 * c3) ** 0.5
+    return kinematics.Position(c2, s2, c3, s3, -1.0, 0.0, -c3, s3)
+
+
+#: The plant's own loop closure, and that of a slider-crank.
+joined, _guided = inner(kinematics.joined), inner(guided)
+
+
+@inner
+def closed(c2, s2, dx, dy, l3, l4, branch):
+    """Close the loop of a four-bar, or of a slider-crank where there is no rocker."""
+    if l4 > 0.0:
+        return joined(c2, s2, dx, dy, l3, l4, branch)
+    return _guided(c2, s2, dx, dy, l3, l4, branch)
+
+
+#: The vector q: fields of `analysis.synthesis.Linkage`.
+PLACES = (
+    "pivot_x",
+    "pivot_y",
+    "ground_length",
+    "crank_length",
+    "coupler_length",
+    "rocker_length",
+    "point_distance",
+    "ground_angle",
+    "crank_phase",
+    "point_angle",
+)
+#: After q, the displacement of D: derivatives with respect to it follow those with respect to q.
+COLUMNS = (*PLACES, "dx", "dy")
+
+
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
+def coupler_path(c, s, dx, dy, q, branch, out):
+    """Compute the coupler point in the plane: out[0] = x, out[1] = y, shape (2, n)."""
+    l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
+    ct, st = cos(q[8]), sin(q[8])
+    ca, sa = cos(q[7]), sin(q[7])
+    # l2 and r turned by the ground link's angle
+    ax, ay = l2 * ca, l2 * sa
+    px, py = q[6] * cos(q[7] + q[9]), q[6] * sin(q[7] + q[9])
+    x0, y0 = q[0], q[1]
+    x, y = out[0], out[1]
+    for j in range(c.shape[0]):
+        c2 = ct * c[j] - st * s[j]
+        s2 = st * c[j] + ct * s[j]
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        x[j] = x0 + ax * c2 - ay * s2 + px * g.c3 - py * g.s3
+        y[j] = y0 + ay * c2 + ax * s2 + py * g.c3 + px * g.s3
+
+
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
+def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
+    """Compute the coupler point and jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n)."""
+    l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
+    ct, st = cos(q[8]), sin(q[8])
+    ca, sa = cos(q[7]), sin(q[7])
+    ux, uy = cos(q[7] + q[9]), sin(q[7] + q[9])
+    r = q[6]
+    x0, y0 = q[0], q[1]
+    for j in range(c.shape[0]):
+        c2 = ct * c[j] - st * s[j]
+        s2 = st * c[j] + ct * s[j]
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        # directions of crank and BP in the plane
+        ex, ey = ca * c2 - sa * s2, sa * c2 + ca * s2
+        fx, fy = ux * g.c3 - uy * g.s3, uy * g.c3 + ux * g.s3
+        vx, vy = l2 * ex + r * fx, l2 * ey + r * fy
+        # turning the coupler by one radian moves P by this, and 1 m of closure along the rocker turns it by 1/(l3 s43)
+        w = 1.0 / (l3 * g.s43)
+        tx, ty = -r * fy * w, r * fx * w
+        out[0, j] = x0 + vx
+        out[1, j] = y0 + vy
+        jac[0, 0, j] = 1.0
+        jac[0, 1, j] = 0.0
+        jac[1, 0, j] = 0.0
+        jac[1, 1, j] = 1.0
+        jac[2, 0, j] = g.c4 * tx
+        jac[2, 1, j] = g.c4 * ty
+        along = c2 * g.c4 + s2 * g.s4
+        jac[3, 0, j] = ex - along * tx
+        jac[3, 1, j] = ey - along * ty
+        jac[4, 0, j] = -g.c43 * tx
+        jac[4, 1, j] = -g.c43 * ty
+        jac[5, 0, j] = tx
+        jac[5, 1, j] = ty
+        jac[6, 0, j] = fx
+        jac[6, 1, j] = fy
+        jac[7, 0, j] = -vy
+        jac[7, 1, j] = vx
+        across = l2 * (s2 * g.c4 - c2 * g.s4)
+        jac[8, 0, j] = -l2 * ey + across * tx
+        jac[8, 1, j] = l2 * ex + across * ty
+        jac[9, 0, j] = -r * fy
+        jac[9, 1, j] = r * fx
+        jac[10, 0, j] = g.c4 * tx
+        jac[10, 1, j] = g.c4 * ty
+        jac[11, 0, j] = g.s4 * tx
+        jac[11, 1, j] = g.s4 * ty
+
+
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
+def link_directions(c, s, dx, dy, q, branch, out):
+    """Compute the directions of coupler and rocker: out = c3, s3, c4, s4, c43, s43, shape (6, n)."""
+    l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
+    ct, st = cos(q[8]), sin(q[8])
+    for j in range(c.shape[0]):
+        c2 = ct * c[j] - st * s[j]
+        s2 = st * c[j] + ct * s[j]
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        out[0, j] = g.c3
+        out[1, j] = g.s3
+        out[2, j] = g.c4
+        out[3, j] = g.s4
+        out[4, j] = g.c43
+        out[5, j] = g.s43
+
+
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
+def link_jacobian(c, s, dx, dy, q, branch, out, jac):
+    """Compute the angles of coupler and rocker, out = th3, th4 in (-pi, pi], shape (2, n), and their derivatives.
+
+    jac[k, 0] = dth3/d(k), jac[k, 1] = dth4/d(k) for k in `COLUMNS`, shape (12, 2, n): loop closure differentiated, projected on
+    the rocker for the coupler and on the coupler for the rocker.
+    """
+    l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
+    ct, st = cos(q[8]), sin(q[8])
+    jac[:] = 0.0
+    for j in range(c.shape[0]):
+        c2 = ct * c[j] - st * s[j]
+        s2 = st * c[j] + ct * s[j]
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        out[0, j] = atan2(g.s3, g.c3)
+        out[1, j] = atan2(g.s4, g.c4)
+        w3 = 1.0 / (l3 * g.s43)
+        w4 = 1.0 / (l4 * g.s43)
+        jac[2, 0, j] = g.c4 * w3
+        jac[2, 1, j] = g.c3 * w4
+        jac[3, 0, j] = -(c2 * g.c4 + s2 * g.s4) * w3
+        jac[3, 1, j] = -(c2 * g.c3 + s2 * g.s3) * w4
+        jac[4, 0, j] = -g.c43 * w3
+        jac[4, 1, j] = -w4
+        jac[5, 0, j] = w3
+        jac[5, 1, j] = g.c43 * w4
+        jac[8, 0, j] = l2 * (s2 * g.c4 - c2 * g.s4) * w3
+        jac[8, 1, j] = l2 * (s2 * g.c3 - c2 * g.s3) * w4
+        jac[10, 0, j] = g.c4 * w3
+        jac[10, 1, j] = g.c3 * w4
+        jac[11, 0, j] = g.s4 * w3
+        jac[11, 1, j] = g.s3 * w4
+
+
+@kernel(
+    void(VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, float64, complex128[:, ::1], complex128[:, ::1]),
+    purpose="the curves of linkages",
+)
+def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
+    """Compute the directions of coupler and rocker of many linkages at the same crank rotations.
+
+    ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7), with l5 = 0 where there is
+    no second crank; ``c, s`` are of the crank's rotations, ``cg, sg`` of the second crank's. The directions come as complex
+    numbers, shape (m, n), NaN where the links cannot be joined.
+    """
+    for i in range(shapes.shape[0]):
+        l1, l2, l3, l4, l5 = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3], shapes[i, 5]
+        ct, st = cos(shapes[i, 4]), sin(shapes[i, 4])
+        cp, sp = l5 * cos(shapes[i, 6]), l5 * sin(shapes[i, 6])
+        for j in range(c.shape[0]):
+            c2 = ct * c[j] - st * s[j]
+            s2 = st * c[j] + ct * s[j]
+            dx = cp * cg[j] - sp * sg[j]
+            dy = sp * cg[j] + cp * sg[j]
+            g = closed(c2, s2, l1 + dx - l2 * c2, dy - l2 * s2, l3, l4, branch)
+            coupler[i, j] = complex(g.c3, g.s3)
+            rocker[i, j] = complex(g.c4, g.s4)
+
+
+@kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX), purpose="the curves of linkages")
+def match_windows(curves, target, starts, spans, best):
+    """Find the piece of each curve that is most like an open target, up to a similarity.
+
+    Each curve is given at even steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and goes over
+    one of ``spans`` steps. It is compared at even arc length with the target, given at even arc length about its mean, shape
+    (k,), run through forwards and backwards. ``best`` takes (misfit as a share of the target's sum of squares, start, span,
+    direction), shape (m, 4). Pieces with a point that is not finite are passed over.
+    """
+    m, n = curves.shape
+    k = target.shape[0]
+    size = 0.0
+    for i in range(k):
+        size += target[i].real ** 2 + target[i].imag ** 2
+    length = np.empty(2 * n + 1)
+    piece = np.empty(k, dtype=np.complex128)
+    for row in range(m):
+        curve = curves[row]
+        length[0] = 0.0
+        for j in range(2 * n):
+            length[j + 1] = length[j] + abs(curve[(j + 1) % n] - curve[j % n])
+        best[row, 0] = np.inf
+        for start in starts:
+            for span in spans:
+                total = length[start + span] - length[start]
+                if not total > 0.0:
+                    continue
+                at = start
+                mean = 0.0 + 0.0j
+                for i in range(k):
+                    place = length[start] + total * i / (k - 1)
+                    while at + 1 < start + span and length[at + 1] < place:
+                        at += 1
+                    step = length[at + 1] - length[at]
+                    share = min(1.0, max(0.0, (place - length[at]) / step)) if step > 0.0 else 0.0
+                    piece[i] = (1.0 - share) * curve[at % n] + share * curve[(at + 1) % n]
+                    mean += piece[i]
+                mean /= k
+                forward = 0.0 + 0.0j
+                backward = 0.0 + 0.0j
+                energy = 0.0
+                for i in range(k):
+                    z = piece[i] - mean
+                    energy += z.real**2 + z.imag**2
+                    forward += z.conjugate() * target[i]
+                    backward += z.conjugate() * target[k - 1 - i]
+                for direction in (1.0, -1.0):
+                    product = forward if direction > 0.0 else backward
+                    misfit = 1.0 - (product.real**2 + product.imag**2) / (energy * size)
+                    if misfit < best[row, 0]:
+                        best[row, 0] = misfit
+                        best[row, 1] = start
+                        best[row, 2] = span
+                        best[row, 3] = direction
+
+
+#: Most crossings of one segment that are looked at, but for one.
+CROSSINGS = 64
+#: Sine of the angle between segments, and share of the extent by which they are apart, up to which they lie on one another.
+PARALLEL = 1e-12
+#: Horizontal bands by which segments are found: a segment is compared with those in its own bands alone.
+BANDS = 96
+#: Segments of a polyline that are passed over together where none of them can be the nearest.
+STRETCH = 12
+
+
+@part
+def _segments(curve, target):
+    """Return the ends of all segments of two closed polygons, rows xa, ya, xb, yb, and their boxes: x, then y."""
+    n, m = curve.shape[1], target.shape[1]
+    ends, box = np.empty((4, n + m)), np.empty((4, n + m))
+    for i in range(n + m):
+        for axis in range(2):
+            if i < n:
+                ends[axis, i], ends[2 + axis, i] = curve[axis, i], curve[axis, (i + 1) % n]
+            else:
+                ends[axis, i], ends[2 + axis, i] = target[axis, i - n], target[axis, (i - n + 1) % m]
+            box[2 * axis, i] = min(ends[axis, i], ends[2 + axis, i])
+            box[2 * axis + 1, i] = max(ends[axis, i], ends[2 + axis, i])
+    return ends, box
+
+
+@part
+def _banded(box, floor, scale):
+    """Sort segments into horizontal bands: the first and last band of each, and the segments of each band."""
+    total = box.shape[1]
+    first, last = np.empty(total, np.int64), np.empty(total, np.int64)
+    begin = np.zeros(BANDS + 1, np.int64)
+    for i in range(total):
+        first[i] = min(int(scale * (box[2, i] - floor)), BANDS - 1)
+        last[i] = min(int(scale * (box[3, i] - floor)), BANDS - 1)
+        # a sum of slices has Numba compile the writing of messages about shapes
+        for band in range(first[i], last[i] + 1):
+            begin[band + 1] += 1
+    for band in range(BANDS):
+        begin[band + 1] += begin[band]
+    members, filled = np.empty(begin[BANDS], np.int64), begin[:BANDS].copy()
+    for i in range(total):
+        for band in range(first[i], last[i] + 1):
+            members[filled[band]] = i
+            filled[band] += 1
+    return first, last, begin, members
+
+
+@inner
+def _cut(i, ends, box, bands, near, cuts, twins, spans):
+    """Cut a segment where others cross it, from 0 to 1; list the segments that lie on it and where.
+
+    Returns the number of pieces and that of these segments.
+    """
+    first, last, begin, members = bands
+    dx, dy = ends[2, i] - ends[0, i], ends[3, i] - ends[1, i]
+    size, square = abs(dx) + abs(dy), dx * dx + dy * dy
+    low_x, high_x, low_y, high_y = box[0], box[1], box[2], box[3]
+    left, right, low, high = low_x[i], high_x[i], low_y[i], high_y[i]
+    cuts[0] = 0.0
+    count, like = 1, 0
+    for band in range(first[i], last[i] + 1):
+        for k in members[begin[band] : begin[band + 1]]:
+            # once, in the first band that both are in
+            apart = (high_x[k] < left) | (low_x[k] > right) | (high_y[k] < low) | (low_y[k] > high)
+            if apart or k == i or band != max(first[i], first[k]) or count >= CROSSINGS:
+                continue
+            ex, ey = ends[2, k] - ends[0, k], ends[3, k] - ends[1, k]
+            cross = dx * ey - dy * ex
+            wx, wy = ends[0, k] - ends[0, i], ends[1, k] - ends[1, i]
+            if abs(cross) <= PARALLEL * size * (abs(ex) + abs(ey)):
+                if square > 0.0 and abs(wx * dy - wy * dx) <= near * size:
+                    own = (wx * dx + wy * dy) / square
+                    other = own + (ex * dx + ey * dy) / square
+                    spans[0, like], spans[1, like], twins[like] = min(own, other), max(own, other), k
+                    like += 1
+                    for place in (own, other):
+                        if 0.0 < place < 1.0:
+                            cuts[count] = place
+                            count += 1
+                continue
+            own, other = (wx * ey - wy * ex) / cross, (wx * dy - wy * dx) / cross
+            if 0.0 < own < 1.0 and 0.0 <= other <= 1.0:
+                cuts[count] = own
+                count += 1
+    cuts[count] = 1.0
+    return count, like
+
+
+@kernel(float64(MATRIX, MATRIX, MATRIX), purpose="the curves of linkages")
+def symmetric_difference(curve, target, gradient):
+    """Compute the area between two closed polygons by the even-odd rule, and its gradient by the curve's vertices.
+
+    ``curve`` and ``target`` have the rows x, y, shape (2, n) and (2, m); ``gradient`` takes the derivatives, shape (2, n).
+    """
+    n = curve.shape[1]
+    ends, box = _segments(curve, target)
+    xa, ya, xb, yb = ends[0], ends[1], ends[2], ends[3]
+    gradient[:] = 0.0
+    floor, height = box[2].min(), box[3].max() - box[2].min()
+    if not np.isfinite(height):
+        return np.nan
+    scale, near = BANDS / max(height, 1e-300), PARALLEL * (height + box[1].max() - box[0].min())
+    bands = _banded(box, floor, scale)
+    _, _, begin, members = bands
+    area = 0.0
+    cuts, twins, spans = np.empty(CROSSINGS + 2), np.empty(CROSSINGS, np.int64), np.empty((2, CROSSINGS))
+    # the last piece that a segment lies on
+    covered, number = np.full(ends.shape[1], -1), 0
+    for i in range(ends.shape[1]):
+        count, like = _cut(i, ends, box, bands, near, cuts, twins, spans)
+        cuts[: count + 1].sort()
+        xi, yi = xa[i], ya[i]
+        dx, dy = xb[i] - xi, yb[i] - yi
+        for piece in range(count):
+            a, b = cuts[piece], cuts[piece + 1]
+            if b <= a:
+                continue
+            middle = 0.5 * (a + b)
+            number += 1
+            shared = 1
+            for t in range(like):
+                if spans[0, t] < middle < spans[1, t]:
+                    covered[twins[t]] = number
+                    shared += 1
+            if shared % 2 == 0:
+                # an even number of them on one another bounds nothing
+                continue
+            # left of the middle of this piece: the ray from there to the right counts what is gone round
+            x, y = xi + middle * dx, yi + middle * dy
+            # a horizontal segment has its left above or below, any other to one side
+            odd = (dy > 0.0) or (dy == 0.0 and dx < 0.0)
+            band = min(max(int(scale * (y - floor)), 0), BANDS - 1)
+            for k in members[begin[band] : begin[band + 1]]:
+                spanned = k != i and (ya[k] > y) != (yb[k] > y)
+                if spanned and xa[k] + (y - ya[k]) * (xb[k] - xa[k]) / (yb[k] - ya[k]) > x and covered[k] != number:
+                    odd = not odd
+            side = (1.0 if odd else -1.0) / shared
+            x0, y0 = xi + a * dx, yi + a * dy
+            area += 0.5 * side * (b - a) * (x0 * dy - y0 * dx)
+            if i < n:
+                # shares of the piece's sweep that go to the segment's two ends
+                late = 0.5 * (b * b - a * a)
+                early = (b - a) - late
+                j = (i + 1) % n
+                gradient[0, i] += side * early * dy
+                gradient[1, i] -= side * early * dx
+                gradient[0, j] += side * late * dy
+                gradient[1, j] -= side * late * dx
+    return area
+
+
+@kernel(void(MATRIX, MATRIX, boolean, VECTOR, int64[::1], VECTOR), purpose="the curves of linkages")
+def nearest(points, line, closed, distance, segment, share):
+    """Find the nearest place of a polyline to each point: distance, number of the segment, share of it, shape (k,).
+
+    ``points`` and ``line`` have the rows x, y, shape (2, k) and (2, m); a closed line goes on from its last point to its first.
+    """
+    m = line.shape[1]
+    count = m if closed else m - 1
+    # boxes about stretches of the line: one that is farther off than the nearest segment so far is passed over
+    stretches = -(-count // STRETCH)
+    box = np.empty((stretches, 4))
+    for b in range(stretches):
+        low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+        for k in range(b * STRETCH, min((b + 1) * STRETCH, count) + 1):
+            low_x, high_x = min(low_x, line[0, k % m]), max(high_x, line[0, k % m])
+            low_y, high_y = min(low_y, line[1, k % m]), max(high_y, line[1, k % m])
+        box[b, 0], box[b, 1], box[b, 2], box[b, 3] = low_x, low_y, high_x, high_y
+    begin = 0
+    for i in range(points.shape[1]):
+        x, y = points[0, i], points[1, i]
+        least = np.inf
+        segment[i], share[i] = 0, 0.0
+        # first where the point before was nearest
+        for turn in range(stretches):
+            b = (begin + turn) % stretches
+            ex, ey = max(box[b, 0] - x, x - box[b, 2], 0.0), max(box[b, 1] - y, y - box[b, 3], 0.0)
+            if ex * ex + ey * ey >= least:
+                continue
+            for k in range(b * STRETCH, min((b + 1) * STRETCH, count)):
+                j = (k + 1) % m
+                dx, dy = line[0, j] - line[0, k], line[1, j] - line[1, k]
+                wx, wy = x - line[0, k], y - line[1, k]
+                length = dx * dx + dy * dy
+                t = min(1.0, max(0.0, (wx * dx + wy * dy) / length)) if length > 0.0 else 0.0
+                ex, ey = wx - t * dx, wy - t * dy
+                square = ex * ex + ey * ey
+                if square < least:
+                    least = square
+                    segment[i], share[i] = k, t
+        distance[i] = np.sqrt(least)
+        begin = segment[i] // STRETCH

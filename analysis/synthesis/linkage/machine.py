@@ -1,0 +1,372 @@
+"""What a linkage is made of, how fast it runs and what loads it: the plant's parameters, and a case that runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cache
+from math import cos, pi, sin
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.five_bar.dynamics import Inputs as Acting
+from linkwork.five_bar.dynamics import Motion
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.slider_crank.parameters import SliderCrankParameters
+
+from ...files import Many, Quantity, entry
+from ...mechanisms import FIVE_BAR
+from ...numerics import symbolic
+from ...run import Inputs, of_parameters, simulate
+from . import linkage as geometry
+from .linkage import Linkage, SliderCrank, on_line
+
+#: Links that have a mass.
+WEIGHED = ("crank", "coupler", "rocker")
+#: Distance of the rocker pivot that stands for one at infinity, in couplers.
+FAR = 1e7
+#: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
+STIFF, STIFF_TURNS = 1000.0, 50.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Make:
+    """What the linkage is made of, and how fast it runs; see `Linkage.to_five_bar`.
+
+    Attributes
+    ----------
+    density : float
+        kg/m3.
+    width, thickness : float
+        Of every bar (m).
+    pin : float, optional
+        Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
+    slider_mass, slider_stiffness, slider_damping : float, optional
+        Of the slider that carries D (kg, N/m, N.s/m); by default of a block, held so stiffly that it stands for a fixed pivot.
+    slider_coulomb_friction : float
+        N.
+    gravity : float
+        m/s2.
+    speed : float
+        Of the crank (rad/s).
+    crank_mass, coupler_mass, rocker_mass : float, optional
+        In the place of what density and section make of a link (kg); its moment of inertia in proportion.
+    load : (float, float)
+        Force at the coupler point P, in the plane's own directions (N).
+    """
+
+    density: float = entry(Quantity("kg/m**3", above=0.0), 7850.0)
+    width: float = entry(Quantity("m", above=0.0), 0.02)
+    thickness: float = entry(Quantity("m", above=0.0), 0.005)
+    pin: float | None = entry(Quantity("m", above=0.0), None)
+    slider_mass: float | None = entry(Quantity("kg", least=0.0), None)
+    slider_stiffness: float | None = entry(Quantity("N/m", least=0.0), None)
+    slider_damping: float | None = entry(Quantity("N.s/m", least=0.0), None)
+    slider_coulomb_friction: float = entry(Quantity("N", least=0.0), 0.0)
+    gravity: float = entry(Quantity("m/s2", least=0.0), 9.81)
+    speed: float = entry(Quantity("rad/s", above=0.0), 2.0 * pi)
+    crank_mass: float | None = entry(Quantity("kg", above=0.0), None)
+    coupler_mass: float | None = entry(Quantity("kg", above=0.0), None)
+    rocker_mass: float | None = entry(Quantity("kg", above=0.0), None)
+    load: tuple[float, float] = entry(Many(Quantity("N"), length=2), (0.0, 0.0))
+
+    def __post_init__(self) -> None:
+        # in Python as in a case file: texts with a unit
+        for field in fields(self):
+            given = getattr(self, field.name)
+            if given is not None:
+                value = field.metadata["reader"](list(given) if isinstance(given, tuple) else given, field.name)
+                object.__setattr__(self, field.name, value)
+
+    @property
+    def hole(self) -> float:
+        """Return the diameter of the pins' holes (m)."""
+        return 0.4 * self.width if self.pin is None else self.pin
+
+    def describe(self, *, forces: bool = True) -> str:
+        """Describe the bars and, with forces, the speed in a line, for a sheet."""
+        bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
+        if not forces:
+            return bars
+        return f"{bars}; forces at {self.speed * 30.0 / pi:g} rpm, gravity {self.gravity:g} m/s²" + (
+            f", {self.load[0]:g} and {self.load[1]:g} N at P" if any(self.load) else ""
+        )
+
+    def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
+        """Replace the masses of `bodies` by those that are given; moments of inertia in proportion."""
+        own: dict[str, Any] = {}
+        for link in WEIGHED:
+            mass, inertia, given = made[f"{link}_mass"], made[f"{link}_inertia"], getattr(self, f"{link}_mass")
+            share = 1.0 if given is None else given / mass
+            own |= {f"{link}_mass": share * mass, f"{link}_inertia": share * inertia}
+        return own
+
+    def load_along(self, c: Any, s: Any) -> tuple[Any, Any]:
+        """Return the components of the load along and across the ground link, from cosine and sine of its direction (N)."""
+        x, y = self.load
+        return c * x + s * y, c * y - s * x
+
+    @property
+    def block(self) -> float:
+        """Return the mass of the slider (kg): as given, or of a block of four widths by two widths by four thicknesses."""
+        return 32.0 * self.density * self.width**2 * self.thickness if self.slider_mass is None else self.slider_mass
+
+    def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:
+        """Return the parameters of the slider-crank's plant, its guide at right angles to the crank shaft.
+
+        Its rod has its mass on the line of its joints: an arm to a coupler point off that line counts where it projects to.
+        """
+        made = self.moving(linkage)
+        a1 = linkage.ground_angle
+        return SliderCrankParameters(
+            crank_length=linkage.crank_length,
+            rod_length=linkage.coupler_length,
+            # the common normal is from the guide to the shaft
+            guide_offset=-linkage.ground_length,
+            guide_twist=-0.5 * pi,
+            crank_mass=made.crank_mass,
+            crank_inertia=made.crank_inertia,
+            crank_cog_x=made.crank_cog_distance,
+            rod_mass=made.coupler_mass,
+            rod_inertia=made.coupler_inertia,
+            rod_cog_distance=made.coupler_cog_distance * cos(made.coupler_cog_angle),
+            slider_mass=self.block,
+            slider_stiffness=self.slider_stiffness or 0.0,
+            slider_damping=self.slider_damping or 0.0,
+            slider_coulomb_friction=self.slider_coulomb_friction,
+            gravity_x=-self.gravity * sin(a1),
+            gravity_y=-self.gravity * cos(a1),
+            assembly_branch=linkage.branch,
+        )
+
+    def moving(self, linkage: Linkage) -> FiveBarParameters:
+        """Return the parameters of the plant for a linkage, its slider free to move.
+
+        A slider-crank is a four-bar whose rocker pivot is `FAR` away, its slider the mass at the rocker's end.
+        """
+        far, sliding, four_bar = FAR * linkage.coupler_length, isinstance(linkage, SliderCrank), linkage
+        if sliding:
+            away: Any = {"rocker_length": far, "ground_length": linkage.ground_length + far}
+            four_bar = Linkage(**linkage.values() | away)
+        made = four_bar.to_five_bar(
+            density=self.density,
+            section=(self.width, self.thickness),
+            slider_mass=self.block,
+            slider_stiffness=self.slider_stiffness or 0.0,
+            slider_damping=self.slider_damping or 0.0,
+            slider_coulomb_friction=self.slider_coulomb_friction,
+            gravity=self.gravity,
+        )
+        return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if sliding else {}))
+
+    def sliding(self, far: Any) -> dict[str, Any]:
+        """Return the mass of the slider as that of a rocker whose pivot is so far away (m), see `moving`."""
+        return {"rocker_mass": self.block, "rocker_inertia": 0.0, "rocker_cog_distance": far}
+
+    def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
+        """Return the parameters of the plant that a linkage runs as: the slider-crank, or the five-bar with its slider held."""
+        return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
+
+    def five_bar(self, linkage: Linkage) -> FiveBarParameters:
+        """Return the parameters of the plant for a linkage, its slider held."""
+        free = self.moving(linkage)
+        mass = free.slider_mass + free.rocker_mass + free.coupler_mass
+        frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
+        stiffness = mass * frequency**2 if self.slider_stiffness is None else self.slider_stiffness
+        # seven tenths of critical
+        damping = 1.4 * (stiffness * mass) ** 0.5 if self.slider_damping is None else self.slider_damping
+        return replace(free, slider_stiffness=stiffness, slider_damping=damping)
+
+
+#: Bars of steel at 60 rpm.
+USUAL_MAKE = Make()
+
+
+FloatArray = NDArray[np.float64]
+PINS = "ABCD"
+#: Samples of a turn that is run.
+SAMPLES = 720
+#: Mass of the slider that stands for a fixed pivot in such a run, in masses of the links.
+HEAVY = 1e8
+
+
+def pin_functions(
+    d: Any, make: Make, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
+) -> dict[str, tuple[Any, Any]]:
+    """Compute the force in each pin along and across the ground link (N), for CasADi's symbols and numbers.
+
+    Parameters
+    ----------
+    d : namespace
+        Dimensions by their names in `Linkage`, the branch too.
+    make : Make
+    crank_angle : column
+        th2 (rad).
+    straight : bool
+        Whether the coupler point is on the line of B and C, see `masses.bodies`.
+    linkage : type
+        Of a slider-crank D is the force of the guide on its slider.
+    """
+    casadi = symbolic.library()
+    kind, plant, law = _traced()
+    line = make.density * make.width * make.thickness
+    links = {name: getattr(d, name) for name in ("ground_length", "crank_length", "coupler_length", "rocker_length")}
+    far = FAR * d.coupler_length
+    sliding = linkage is SliderCrank
+    if sliding:
+        links |= {"ground_length": d.ground_length + far, "rocker_length": far}
+    made = law(
+        d.crank_length,
+        d.coupler_length,
+        links["rocker_length"],
+        d.point_distance,
+        d.point_angle,
+        line,
+        make.width,
+        straight,
+    )
+    parameters = kind(
+        **_DEFAULTS
+        | links
+        | made
+        | make.weighed(made)
+        | (make.sliding(far) if sliding else {})
+        | {
+            "slider_mass": 1.0,
+            "coupler_point_distance": d.point_distance,
+            "coupler_point_angle": d.point_angle,
+            "gravity": make.gravity,
+            "ground_inclination": d.ground_angle,
+            "assembly_branch": d.branch,
+        }
+    )
+    p = parameters.constants()
+    load = make.load_along(casadi.cos(d.ground_angle), casadi.sin(d.ground_angle))
+    w2 = make.speed
+    g = plant.position(crank_angle, 0.0, p)
+    k = plant.coefficients(g, p)
+    w3, w4 = k.k32 * w2, k.k42 * w2
+    # the slider is held and the crank's speed constant: what is left are the centripetal accelerations
+    e3, e4 = plant.centripetal(g, w2, w3, w4, p)
+    held = Motion(w3, w4, 0.0, 0.0, e3, e4, 0.0, 0.0, 0.0, 0.0, 0.0)
+    f = plant.reactions(g, (crank_angle, 0.0, w2, 0.0, 0.0, 0.0), held, Acting(1.0, 0.0, 0.0, 0.0, *load), p)
+    return {"A": (f.ax, f.ay), "B": (f.bx, f.by), "C": (f.cx, f.cy), "D": (f.dx, f.dy)}
+
+
+@cache
+def _traced() -> tuple[Any, Any, Any]:
+    """Trace the plant's parameters and functions, and the law of the masses, for CasADi's symbols."""
+    casadi = symbolic.library()
+    plant = of_parameters(FIVE_BAR)
+    law = symbolic.traced((geometry,), min=casadi.fmin, max=casadi.fmax)
+    return type(plant.parameters), plant.functions, law.bodies
+
+
+_DEFAULTS: dict[str, Any] = {
+    field.name: field.default
+    for field in FiveBarParameters.__dataclass_fields__.values()
+    if isinstance(field.default, float)
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PinForces:
+    """The forces on the pins over a turn at constant speed, or over the way of a task.
+
+    Attributes
+    ----------
+    rotation : ndarray, shape (n,)
+        Of the crank, from the start of the task (rad).
+    force : ndarray, shape (n, 4)
+        On the pins A to D (N).
+    moved : float
+        How far the slider that stands for the fixed pivot moved (m).
+    """
+
+    rotation: FloatArray
+    force: FloatArray
+    moved: float
+
+    @property
+    def greatest(self) -> float:
+        """Return the greatest force on any pin (N)."""
+        return float(self.force.max())
+
+    @property
+    def pin(self) -> str:
+        """Return the pin with the greatest force."""
+        return PINS[int(self.force.max(axis=0).argmax())]
+
+    @property
+    def at(self) -> float:
+        """Return the crank's rotation at the greatest force (rad)."""
+        return float(self.rotation[int(self.force.max(axis=1).argmax())])
+
+    def of(self, pins: str) -> float:
+        """Return the greatest force on some of the pins (N)."""
+        return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
+
+
+def pin_forces(
+    linkage: Linkage, make: Make, rotation: tuple[float, float] | None = None, *, run: bool = True
+) -> PinForces:
+    """Compute the forces on the pins of a linkage at constant speed.
+
+    They are of a run of the compiled plant, its slider so heavy that it stays where it is, its weight carried by the control
+    force; or of the plant's equations alone.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        With a fixed pivot, or a slider-crank: D is then the force of the guide on its slider.
+    make : Make
+    rotation : (float, float), optional
+        From which rotation of the crank to which one (rad); a turn by default.
+    run : bool
+        Whether the plant is run.
+
+    Raises
+    ------
+    ParameterError
+        If the rocker pivot moves.
+    AssemblyError
+        If the links cannot be joined somewhere.
+    """
+    if linkage.pivot is not None:
+        raise ParameterError("pivot", linkage.pivot, "be fixed: of a moved one see motion.inverse_dynamics")
+    begin, end = (0.0, 2.0 * pi) if rotation is None else rotation
+    if not run:
+        return _held(linkage, make, np.linspace(begin, end, SAMPLES + 1))
+    made = make.moving(linkage)
+    heavy = HEAVY * (made.crank_mass + made.coupler_mass + made.rocker_mass)
+    parameters = replace(made, slider_mass=heavy, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0)
+    x, y = make.load_along(np.cos(linkage.ground_angle), np.sin(linkage.ground_angle))
+    weight = heavy * make.gravity * float(np.sin(linkage.ground_angle))
+    acting = Inputs(speed=make.speed, force=weight, load_x=float(x), load_y=float(y))
+    start = InitialState(crank_angle=begin + linkage.crank_phase)
+    samples = np.linspace(0.0, (end - begin) / make.speed, SAMPLES + 1)
+    done = simulate(parameters, acting, initial=start, samples=samples)
+    if done.time[-1] < samples[-1]:
+        raise InputError(
+            f"the plant did not run from a crank rotation of {begin:.6g} rad to {end:.6g} rad: {done.message}"
+        )
+    force = np.column_stack([np.hypot(done[f"pin.{pin}.fx"], done[f"pin.{pin}.fy"]) for pin in PINS])
+    moved = float(np.abs(done["slider.position"]).max())
+    return PinForces(rotation=begin + make.speed * done.time, force=force, moved=moved)
+
+
+def _held(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
+    """Compute the pin forces by the plant's equations, its slider held."""
+    casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
+    straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
+    th2 = casadi.DM(linkage.crank_angle(rotation))
+    found = pin_functions(d, make, th2, straight=straight, linkage=type(linkage))
+    force = np.column_stack([np.hypot(*(np.array(f).ravel() for f in found[pin])) for pin in PINS])
+    if not np.isfinite(force).all():
+        at = float(rotation[np.argmin(np.isfinite(force).all(axis=1))])
+        raise AssemblyError(f"the links cannot be joined at a crank rotation of {at:.6g} rad")
+    return PinForces(rotation=rotation, force=force, moved=0.0)

@@ -1,0 +1,10 @@
+"""A linkage that was found: how well it does its task, what its dimensions cost, its report and its drawings.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,388 @@
+"""What a picture or a drawing of a solution shows: the linkage in its positions, its curve, its target."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from math import hypot, isfinite, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import AssemblyError, ParameterError
+
+from ...files import Circle, Dimension, Drawing, Layer, Line, Polyline, Text
+from ..linkage.linkage import FiveBar, Linkage, SliderCrank
+from ..linkage.pivot import format_ratio
+from ..task.task import UntimedPath
+from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
+
+FloatArray = NDArray[np.float64]
+
+#: Layers in the order in which they are drawn; their colours are seen on white and on black.
+LAYERS = {
+    "poses": Layer(colour=0x808080, width=0.13e-3),
+    "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
+    "guide": Layer(colour=0x808080, width=0.25e-3),
+    "crank": Layer(colour=0xC0392B, width=0.5e-3),
+    "coupler": Layer(colour=0x1F6FB4, width=0.5e-3),
+    "rocker": Layer(colour=0x2E8B57, width=0.5e-3),
+    "slider": Layer(colour=0x8E44AD, width=0.35e-3),
+    "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
+    "target": Layer(colour=0xD35400, width=0.25e-3),
+    "plate": Layer(colour=0x202020, width=0.5e-3, foreground=True),
+    "hole": Layer(colour=0xC0392B, width=0.35e-3),
+    "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
+    "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class LinkageScene:
+    """A solution as it is drawn, in m and rad, with the title of the picture."""
+
+    solution: Solution
+    title: str = ""
+
+    @property
+    def linkage(self) -> Linkage:
+        """Return the linkage of the solution."""
+        return self.solution.linkage
+
+    def pins(self, rotation: float) -> Mapping[str, tuple[float, float]] | None:
+        """Return the places of A to E and, for target points, of P; None where the links cannot be joined."""
+        try:
+            pins = self.linkage.pins(rotation)
+        except AssemblyError:
+            return None
+        if self.target is None:
+            del pins["P"]
+        return pins
+
+    @property
+    def _closed(self) -> bool:
+        return isinstance(self.solution.task, UntimedPath) and self.solution.task.path.closed
+
+    @cached_property
+    def turn(self) -> FloatArray:
+        """Return the crank rotations over a whole turn, from the least at which the task is done, shape (n,)."""
+        begin = 0.0 if self._closed else float(self.solution.rotation.min())
+        return begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
+
+    @cached_property
+    def way(self) -> FloatArray:
+        """Return crank rotations over which the task is done, densely spaced, shape (n,)."""
+        at = self.solution.rotation
+        if self._closed or whole_turn(at):
+            return self.turn
+        return np.linspace(at.min(), at.min() + np.ptp(at), 2 * CURVE + 1)
+
+    @property
+    def rotation(self) -> FloatArray:
+        """Return the crank rotations over which the task is done, in their order: its stations, or a turn."""
+        return self.turn if self.way is self.turn else self.solution.rotation
+
+    @cached_property
+    def target(self) -> FloatArray | None:
+        """Return the target points, shape (n, 2); None of a rocker function."""
+        return target_points(self.solution.task)
+
+    @property
+    def target_closed(self) -> bool | None:
+        """Return whether the target is a closed line (True), an open one (False), or only points (None)."""
+        task = self.solution.task
+        return task.path.closed if isinstance(task, UntimedPath) else None
+
+    @property
+    def timed(self) -> bool:
+        """Return whether the task gives the crank rotations of its targets."""
+        task = self.solution.task
+        return not isinstance(task, UntimedPath) and task.rotation is not None
+
+    @cached_property
+    def stations(self) -> dict[str, FloatArray]:
+        """Return the columns by name with unit, such as ``error [m]``; see `Solution.columns`."""
+        return self.solution.columns()
+
+    @cached_property
+    def curves(self) -> tuple[FloatArray, ...]:
+        """Return the coupler curve over a whole turn in pieces, each shape (n, 2); none without target points."""
+        if self.target is None:
+            return ()
+        points = self.linkage.path(self.turn)
+        there = np.isfinite(points).all(axis=1)
+        pieces = np.split(points, np.flatnonzero(np.diff(there.astype(int))) + 1)
+        return tuple(p for p in pieces if np.isfinite(p).all() and len(p) > 1)
+
+    @cached_property
+    def traced(self) -> FloatArray | None:
+        """Return the part of the coupler curve that does the task, shape (n, 2); None of a rocker function."""
+        return None if self.target is None else self.linkage.path(self.way)
+
+    @cached_property
+    def function(self) -> FloatArray | None:
+        """Return crank rotation and rocker angle over the task of a rocker function, shape (2, n); None of another."""
+        return np.vstack([self.way, self.linkage.rocker_angle(self.way)]) if self.target is None else None
+
+    @cached_property
+    def guide(self) -> FloatArray | None:
+        """Return the ends of the slider's travel, shape (2, 2); None without a slider."""
+        linkage, slider = self.linkage, self.linkage.slider(self.turn)
+        if slider is None:
+            return None
+        u, direction = slider[0], np.exp(1j * slider[1])
+        ends = complex(linkage.pivot_x, linkage.pivot_y) + np.exp(1j * linkage.ground_angle) * (
+            linkage.ground_length + np.array([np.nanmin(u), np.nanmax(u)]) * direction
+        )
+        return np.column_stack([ends.real, ends.imag])
+
+    @property
+    def second_crank(self) -> bool:
+        """Return whether D is on a second crank about E."""
+        return isinstance(self.linkage, FiveBar)
+
+    @property
+    def lettered(self) -> str:
+        """Return the pins that are drawn with their letters."""
+        return self.linkage.letters + ("" if self.linkage.point_is_pin else "P")
+
+    @cached_property
+    def transmission(self) -> FloatArray:
+        """Return crank rotations over a turn and the angle between coupler and rocker, NaN where not joined, shape (2, n)."""
+        return np.vstack([self.turn, angle_at_c(self.linkage, self.turn)])
+
+    @property
+    def motion(self) -> tuple[str, FloatArray] | None:
+        """Return heading and values of the pivot's motion over a turn, also of a slider-crank's slider; None if it is fixed.
+
+        Of a slider-crank the slider's position.
+        """
+        if isinstance(self.linkage, FiveBar):
+            return "second crank [rad]", self.linkage.pivot.angle(self.turn)
+        slider = self.linkage.slider(self.turn)
+        return None if slider is None else ("slider position [m]", slider[0])
+
+
+Point = tuple[float, float]
+#: Radius of a pin and height of a letter, as shares of the drawing's extent.
+PIN, LETTER = 0.008, 0.022
+
+
+def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
+    """Draw links with their lengths, pins, guide, coupler curve and target in the plane's own coordinates (m).
+
+    Parameters
+    ----------
+    solution : Solution
+    rotation : float, optional
+        Of the crank (rad); the first at which the links are joined by default.
+    poses : int
+        Further positions, at even steps over the task, thin.
+    title : str
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined there, or anywhere.
+    """
+    scene = LinkageScene(solution, title)
+    tried = (*scene.rotation, *scene.transmission[0]) if rotation is None else (rotation,)
+    pins = next((found for phi in tried if (found := scene.pins(float(phi))) is not None), None)
+    if pins is None:
+        where = "at any rotation of the crank" if rotation is None else f"at a crank rotation of {rotation:.6g} rad"
+        raise AssemblyError(f"the links cannot be joined {where}: there is nothing to draw")
+    a, b, c, d, e = (pins[name] for name in "ABCDE")
+    p = pins.get("P")
+    drawn = [np.array(list(pins.values())), *(q for q in (*scene.curves, scene.target) if q is not None)]
+    size = float(np.ptp(np.vstack(drawn), axis=0).max())
+    radius, height = PIN * size, LETTER * size
+    bars = solution.linkage.bars
+    lines = [Line(layer=layer, start=pins[ends[0]], end=pins[ends[1]]) for layer, ends in bars]
+    held = "ground" if scene.guide is None else "slider"
+    circles = [
+        Circle(layer=layer, centre=pin, radius=radius)
+        for layer, pin in (
+            ("ground", a),
+            ("crank", b),
+            *([("rocker", c)] if ("rocker", "DC") in bars else []),
+            (held, d),
+        )
+    ]
+    further = np.linspace(scene.way[0], scene.way[-1], poses, endpoint=scene.way is not scene.turn)
+    polylines = [
+        Polyline(layer="poses", points=np.array([there[name] for name in names]))
+        for phi in further
+        if (there := scene.pins(float(phi))) is not None
+        for names in (("ABCDE" if scene.second_crank else "ABCD"), *(["BPC"] if "P" in there else []))
+    ]
+    if scene.second_crank:
+        circles.append(Circle(layer="ground", centre=e, radius=radius))
+    if p is None or abs((c[0] - b[0]) * (p[1] - b[1]) - (c[1] - b[1]) * (p[0] - b[0])) < 1e-9 * size * size:
+        lines.append(Line(layer="coupler", start=b, end=c))
+        if p is not None:
+            lines.append(Line(layer="coupler", start=b, end=p))
+    else:
+        polylines.append(Polyline(layer="coupler", points=np.array([b, c, p]), closed=True))
+    if p is not None:
+        circles.append(Circle(layer="coupler", centre=p, radius=0.7 * radius))
+    if scene.guide is not None:
+        guide, block = _guide_and_block(scene.guide, np.array(d), radius)
+        lines.append(guide)
+        polylines.append(block)
+    polylines += [_curve("coupler-curve", piece) for piece in scene.curves]
+    if scene.target is not None and scene.target_closed is not None:
+        polylines.append(Polyline(layer="target", points=scene.target, closed=scene.target_closed))
+    elif scene.target is not None:
+        circles += [Circle(layer="target", centre=(x, y), radius=0.5 * radius) for x, y in scene.target.tolist()]
+    texts = [
+        Text(layer="text", position=(x + 1.5 * radius, y + 1.5 * radius), height=height, text=name)
+        for name, (x, y) in pins.items()
+        if name in scene.lettered
+    ]
+    return Drawing(
+        title=scene.title,
+        layers=LAYERS,
+        lines=tuple(lines),
+        circles=tuple(circles),
+        polylines=tuple(polylines),
+        dimensions=tuple(_links(pins, solution.linkage, height)),
+        texts=tuple(texts),
+    )
+
+
+def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterator[Dimension]:
+    """Yield the dimension of each link, beside it; of a slider-crank the offset of its guide."""
+    named = [ends for _, ends in linkage.bars]
+    names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
+    names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
+    for name in names:
+        start, end = name[0], name[1]
+        if hypot(pins[end][0] - pins[start][0], pins[end][1] - pins[start][1]) > height:
+            # the ground link's on the other side: crank or second crank may lie over it
+            offset = -1.5 * height if name == "AE" else 1.5 * height
+            yield Dimension(layer="dimension", start=pins[start], end=pins[end], offset=offset, height=0.7 * height)
+
+
+def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
+    """Draw the links as plates with round ends and holes for the pins, one above the other, with dimensions.
+
+    The ground link is among them where both its ends are pivots; a slider's guide is not. The coupler reaches to the coupler
+    point where the task has one.
+
+    Parameters
+    ----------
+    width, thickness : float
+        Of each plate about its holes (m).
+    pin : float
+        Diameter of the holes (m), below the width.
+    title : str
+
+    Raises
+    ------
+    ParameterError
+        If the holes are not narrower than the plates, or a size is not greater than zero.
+    """
+    for name, value in (("width", width), ("thickness", thickness), ("pin", pin)):
+        if not (isfinite(value) and value > 0.0):
+            raise ParameterError(name, value, "be a finite number greater than zero (m)")
+    if pin >= width:
+        raise ParameterError("pin", pin, f"be below the width of the plates, {width:g} m")
+    linkage = solution.linkage
+    coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
+    if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.point_is_pin:
+        coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
+    made: dict[str, dict[str, complex]] = {
+        "crank": {"A": 0j, "B": complex(linkage.crank_length)},
+        "coupler": coupler,
+    }
+    if not isinstance(linkage, SliderCrank):
+        made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
+    if linkage.slider(0.0) is None:
+        made = {
+            "ground": {"A": 0j, "E" if isinstance(linkage, FiveBar) else "D": complex(linkage.ground_length)}
+        } | made
+    if isinstance(linkage, FiveBar):
+        made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}
+    height = 0.2 * width
+    polylines, circles, dimensions, texts = [], [], [], []
+    top = 0.0
+    for name, holes in made.items():
+        places = np.array(list(holes.values()))
+        places = places + 1j * (top - places.imag.max() - 0.5 * width)
+        outline, bulges = rounded_hull(places, 0.5 * width)
+        polylines.append(Polyline(layer="plate", points=outline, closed=True, bulges=bulges))
+        at = [(float(z.real), float(z.imag)) for z in places]
+        circles += [Circle(layer="hole", centre=place, radius=0.5 * pin) for place in at]
+        texts += [
+            Text(layer="text", position=(x + 0.5 * pin + 0.05 * width, y - 0.5 * height), height=height, text=letter)
+            for letter, (x, y) in zip(holes, at)
+        ]
+        dimensions += [
+            Dimension(layer="dimension", start=here, end=there, offset=offset, height=height)
+            for here, there, offset in _beside(places, width)
+        ]
+        label = f"{name}: {1e3 * width:g} x {1e3 * thickness:g} mm, holes {1e3 * pin:g} mm"
+        if name == "second crank" and isinstance(linkage, FiveBar):
+            label += f", geared {format_ratio(linkage.pivot.ratio)} : 1 to the first"
+        right = float(places.real.max()) + 1.2 * width
+        texts.append(Text(layer="text", position=(right, float(places.imag.max())), height=height, text=label))
+        top = float(places.imag.min()) - 2.6 * width
+    return Drawing(
+        title=title,
+        layers=LAYERS,
+        circles=tuple(circles),
+        polylines=tuple(polylines),
+        dimensions=tuple(dimensions),
+        texts=tuple(texts),
+    )
+
+
+def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
+    """Yield each pair of holes that are apart, with the offset of its dimension: outside the plate, none over another."""
+    for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
+        way = places[k] - places[i]
+        if abs(way) <= 1e-9:
+            continue
+        sides = [float(((z - places[i]) * way.conjugate()).imag) / abs(way) for z in places]
+        flat = max(map(abs, sides)) < 0.5 * width
+        offset = (0.8 + (0.35 * number if flat else 0.0)) * width
+        (x1, y1), (x2, y2) = ((float(z.real), float(z.imag)) for z in (places[i], places[k]))
+        yield (x1, y1), (x2, y2), -offset if max(sides, key=abs) > 0.0 and not flat else offset
+
+
+def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
+    """Return the outline of edges and arcs around two or three points: points, and bulges as of `files.Polyline`."""
+    farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
+    ends = places[list(farthest)]
+    if len(places) == 3:
+        a, b, c = places
+        turned = ((b - a).conjugate() * (c - a)).imag
+        if abs(turned) > 1e-9 * abs(ends[1] - ends[0]) ** 2:
+            ends = places if turned > 0.0 else places[::-1]
+    edges = np.roll(ends, -1) - ends
+    normals = -1j * edges / np.abs(edges)
+    before = np.roll(normals, 1)
+    # about each corner an arc from the edge before to the edge after, then that edge
+    points = np.column_stack([ends + radius * before, ends + radius * normals]).ravel()
+    turns = np.angle(normals / before) % (2.0 * pi)
+    bulges = np.column_stack([np.minimum(np.tan(0.25 * turns), 1.0), np.zeros(len(ends))]).ravel()
+    return np.column_stack([points.real, points.imag]), tuple(bulges.tolist())
+
+
+def _curve(layer: str, points: FloatArray) -> Polyline:
+    """Make the polyline of a curve, closed where it ends at its first point."""
+    closed = len(points) > 3 and hypot(*(points[-1] - points[0])) <= 1e-9 * float(np.ptp(points, axis=0).max())
+    return Polyline(layer=layer, points=points[:-1] if closed else points, closed=closed)
+
+
+def _guide_and_block(guide: FloatArray, d: FloatArray, radius: float) -> tuple[Line, Polyline]:
+    way = guide[1] - guide[0]
+    length = hypot(*way)
+    along = way / length if length > 0.0 else np.array([1.0, 0.0])
+    left = np.array([-along[1], along[0]])
+    ends = [guide[0] - 4.0 * radius * along, guide[1] + 4.0 * radius * along]
+    block = np.array([d + radius * (3.0 * s * along + 2.0 * n * left) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    start, end = ((float(x), float(y)) for x, y in ends)
+    return Line(layer="guide", start=start, end=end), Polyline(layer="slider", points=block, closed=True)

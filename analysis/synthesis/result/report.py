@@ -1,0 +1,543 @@
+"""What each dimension of a solution does to its error, and what rounding the dimensions costs: by exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees, inf, isfinite, log10, pi, radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ..linkage.kernels import PLACES
+from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCrank, wrapped
+from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
+from ..task.constraint import SECOND_LENGTH, stroke
+from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
+from ..task.task import Normal, RockerFunction, Task, UntimedPath, normal_form
+from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, path_rate
+
+FloatArray = NDArray[np.float64]
+#: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
+LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
+#: Angles of a moved pivot, besides the coefficients of its motion.
+PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
+#: Step of the differences of exact derivatives, in rad or as a share of the longest link.
+DIFFERENCE = 1e-5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensitivity:
+    """What one dimension does to the error.
+
+    Attributes
+    ----------
+    name : str
+        Field of `Linkage`, or of its pivot's motion.
+    value : float
+        m or rad.
+    slope : float
+        Derivative with respect to it of the sum of weighted squared errors, which is the quality function, or of a path whose
+        quality is an area stands in for it: zero at an optimum of it that no bound holds.
+    shift : float
+        Root mean square displacement of the traced point, or error of angle, per unit of it.
+    """
+
+    name: str
+    value: float
+    slope: float
+    shift: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rounding:
+    """What rounding the dimensions costs.
+
+    Attributes
+    ----------
+    linkage : Linkage
+        Rounded; a link to no less than one step, the coefficients of a slider's or a second crank's motion, which is commanded
+        and not made, not at all.
+    error : float
+        Its quality function.
+    expected : float
+        Mean quality function of dimensions that are off by random amounts, evenly within half a step: a sum of squares to
+        second order, by exact derivatives of the errors and their differences; an area by the spread of the distances, as of
+        normal variables. Infinite where there are no derivatives.
+    """
+
+    linkage: Linkage
+    error: float
+    expected: float
+
+
+def length_step(linkage: Linkage) -> float:
+    """Return the step to which lengths are rounded (m): 0.1 mm, or less for a link below 1 mm."""
+    least = min(getattr(linkage, name) for name in LINKS if _is_link(linkage, name))
+    return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
+
+
+def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
+    """Compute names, derivatives (m, k) of the residuals by the dimensions, residuals (m,), and weights (m,).
+
+    The residuals are those of the quality function; of an untimed path, the distances along the target's normals.
+    """
+    task, linkage = solution.task, solution.linkage
+    normal = normal_form(task)
+    at = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
+    if at is None:
+        assert normal.points is not None
+        at = nearest_rotations(linkage, normal.places)
+    weights = np.tile(normal.weights, 1 if normal.points is None or isinstance(task, UntimedPath) else 2)
+    if normal.points is not None and normal.angle is not None:
+        weights = np.append(weights, normal.weights)
+    return _names(linkage, normal), *_residuals(linkage, normal, at, isinstance(task, UntimedPath)), weights
+
+
+def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
+    """Compute derivatives (m, k) and values (m,) of the residuals: of points, ``across`` the curve or x and y; of angles."""
+    columns = [column for _, _, column in _pivot(linkage, at)]
+    angular = normal.angle is not None
+    parts, blocks = [], []
+    if normal.points is not None:
+        points = normal.places
+        place, jacobian = linkage.path_jacobian(at)
+        left = place @ np.array([1.0, 1j]) - points
+        both = jacobian[:, 0] + 1j * jacobian[:, 1]
+        still = [np.zeros(len(at), dtype=complex)] if angular else []
+        whole = np.vstack([both[: len(PLACES)], *still, *[bx * both[10] + by * both[11] for bx, by in columns]]).T
+        if linkage.point_is_pin:
+            # the pin and the point are one
+            whole[:, PLACES.index("coupler_length")] += whole[:, PLACES.index("point_distance")]
+        if across:
+            rate = path_rate(linkage, at, both)
+            normals = 1j * rate / np.abs(rate)
+            parts, blocks = [(left * normals.conj()).real], [(whole * normals.conj()[:, None]).real]
+        else:
+            parts, blocks = [left.real, left.imag], [whole.real, whole.imag]
+    if angular:
+        which = 1 if normal.of_rocker else 0
+        angles, jacobian = linkage.link_jacobian(at)
+        turned = 0.0 if normal.of_rocker else linkage.ground_angle
+        left_angle = angles[which] + linkage.output_angle + turned - normal.angle
+        own = np.vstack(
+            [
+                jacobian[: len(PLACES), which],
+                np.ones(len(at)),
+                *[bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in columns],
+            ]
+        ).T
+        if not normal.of_rocker:
+            own[:, PLACES.index("ground_angle")] += 1.0
+        leverage = normal.leverage * normal.unit
+        parts.append(leverage * wrapped(left_angle))
+        blocks.append(leverage * own)
+    return np.vstack(blocks), np.concatenate(parts)
+
+
+def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
+    """Compute by exact derivatives how each dimension changes the error.
+
+    Of an untimed path, the squared distances to the curve at its stations, the crank rotations following.
+    """
+    names, jacobian, residual, weights = derivatives(solution)
+    slopes = 2.0 * jacobian.T @ (weights * residual)
+    stations = len(normal_form(solution.task).weights)
+    shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
+    values = _values(solution.linkage)
+    # a rocker's angle has nothing to do with where the linkage stands, nor with its coupler point
+    idle = (
+        set(PLACES) - {*LINKS, "crank_phase"}
+        if isinstance(solution.task, RockerFunction)
+        else set(solution.linkage.absent)
+    )
+    return tuple(
+        Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
+        for name, slope, shift in zip(names, slopes, shifts)
+        if name not in idle
+    )
+
+
+def rounded(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
+    """Compute the cost of rounding lengths and angles to whole steps.
+
+    Parameters
+    ----------
+    length, angle : float
+        Steps (m, rad); `length_step` and 0.1 degrees by default.
+
+    Raises
+    ------
+    InputError
+        If a step is not above zero.
+    """
+    length = length_step(solution.linkage) if length is None else length
+    for what, step in (("length", length), ("angle", angle)):
+        if not (np.isfinite(step) and step > 0.0):
+            raise InputError(f"step of {what} is {step}: it must be greater than zero")
+    linkage = solution.linkage
+    steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _made(linkage)}
+    rounded_to = linkage
+    for name, value in _made(linkage).items():
+        whole = round(value / steps[name])
+        # a link is not rounded away
+        rounded_to = _with(rounded_to, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole))
+    error = evaluate(solution.task, rounded_to, solution.evaluation.rotation).error
+    return Rounding(linkage=rounded_to, error=error, expected=_expected(solution, steps))
+
+
+def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
+    """Return the mean quality function of dimensions that are off by random amounts, evenly within half a step."""
+    task, linkage = solution.task, solution.linkage
+    area = isinstance(task, UntimedPath) and task.measure == "area"
+    if isinstance(task, UntimedPath) and area:
+        # as many stations as it is evaluated at
+        task = replace(task, samples=max(task.samples, CURVE))
+    normal = normal_form(task)
+    given = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
+    names = _names(linkage, normal)
+
+    def residuals(made: Linkage) -> tuple[FloatArray, FloatArray]:
+        at = given
+        if isinstance(task, UntimedPath):
+            # the crank rotations follow
+            assert normal.points is not None
+            ends = () if normal.closed or given is None else (float(given.min()), float(given.max()))
+            at = nearest_rotations(made, normal.places, *ends)
+        assert at is not None
+        return _residuals(made, normal, at, isinstance(task, UntimedPath))
+
+    jacobian, left = residuals(linkage)
+    square, shift = np.zeros(len(left)), np.zeros(len(left))
+    for name, step in steps.items():
+        if name not in names:
+            continue
+        k, variance = names.index(name), step**2 / 12.0
+        square += variance * jacobian[:, k] ** 2
+        if area:
+            continue
+        small = DIFFERENCE * (1.0 if name in (*ANGLES, *PIVOT_ANGLES) else linkage.largest_link)
+        value = _made(linkage)[name]
+        if _is_link(linkage, name):
+            small = min(small, 0.1 * value)
+        ahead, behind = (residuals(_with(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0))
+        shift += 0.5 * variance * (ahead - behind) / (2.0 * small)
+    if area:
+        # an area: the mean of the distances, as of a normal variable of that spread about what is there
+        grown = normal.weights * normal.arc * normal.unit @ (_mean_absolute(left, np.sqrt(square)) - np.abs(left))
+    else:
+        weights = np.tile(normal.weights, len(left) // normal.n)
+        grown = weights @ (square + 2.0 * left * shift)
+    return solution.error + float(grown) if np.isfinite(grown) else inf
+
+
+def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
+    """Compute how much the quality function grows if one dimension is off by a step, in the worse direction.
+
+    By evaluating the linkages, so that it holds of steps of any size; infinite where the links cannot be joined.
+
+    Parameters
+    ----------
+    length, angle : float
+        Steps (m, rad).
+
+    Returns
+    -------
+    dict
+        By the name of the dimension, without those of a slider's motion.
+    """
+    linkage, grown = solution.linkage, {}
+    for name, value in _made(linkage).items():
+        if name == "guide_angle":
+            continue
+        step = angle if name in (*ANGLES, *PIVOT_ANGLES) else length
+        # a link cannot be shorter than nothing
+        link = _is_link(linkage, name)
+        ends = [value + side * step for side in (-1.0, 1.0) if not link or value + side * step > 0.0]
+        grown[name] = max(
+            evaluate(solution.task, _with(linkage, name, end), solution.evaluation.rotation).error for end in ends
+        )
+    return {name: error - solution.error for name, error in grown.items()}
+
+
+def _is_link(linkage: Linkage, name: str) -> bool:
+    """Return whether a dimension is a length that must be above zero."""
+    return name in (*linkage.links, SECOND_LENGTH)
+
+
+def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
+    """Return the mean of |x| of a normal variable."""
+    from scipy.special import erf
+
+    safe = np.maximum(spread, 1e-300)
+    ratio = mean / safe
+    value: FloatArray = safe * np.sqrt(2.0 / pi) * np.exp(-0.5 * ratio**2) + mean * erf(ratio / np.sqrt(2.0))
+    return value
+
+
+def _names(linkage: Linkage, normal: Normal) -> list[str]:
+    """Return the dimensions that there are derivatives with respect to, in their order."""
+    mounted = [] if normal.angle is None else ["output_angle"]
+    return [*PLACES, *mounted, *(name for name, _, _ in _pivot(linkage, np.zeros(1)))]
+
+
+def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
+    """List the dimensions of a moved pivot: name, value, and derivatives of its displacement at crank rotations."""
+    pivot = linkage.pivot
+    if isinstance(pivot, SliderMotion):
+        c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
+        own, first, along = "slider", 0, (c, s)
+        found = [("guide_angle", pivot.guide_angle, (-s * u, c * u))]
+    elif isinstance(pivot, SecondCrank):
+        c, s = np.cos(pivot.angle(at)), np.sin(pivot.angle(at))
+        # the mean of the series is the phase's
+        own, first, along = "second_crank", 1, (-pivot.length * s, pivot.length * c)
+        found = [(SECOND_LENGTH, pivot.length, (c, s)), ("second_crank_phase", pivot.phase, along)]
+    else:
+        return []
+    for k in range(first, pivot.series.order + 1):
+        waves = (("cos", pivot.series.cos[k], np.cos(k * at)), ("sin", pivot.series.sin[k], np.sin(k * at)))
+        for kind, value, wave in waves[: 1 if k == 0 else 2]:
+            found.append((f"{own} {kind} {k}", float(value), (along[0] * wave, along[1] * wave)))
+    return found
+
+
+def _values(linkage: Linkage) -> dict[str, float]:
+    return linkage.values() | {name: value for name, value, _ in _pivot(linkage, np.zeros(1))}
+
+
+def _made(linkage: Linkage) -> dict[str, float]:
+    """Return the dimensions that are manufactured, and so have errors: a commanded motion is not among them."""
+    values = _values(linkage)
+    made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
+    return {name: values[name] for name in made if name in values and name not in linkage.absent}
+
+
+def _with(linkage: Linkage, name: str, value: float) -> Linkage:
+    """Return the linkage with another value of one dimension."""
+    if name in (*LENGTHS, *ANGLES):
+        changed: dict[str, Any] = {name: value}
+        if name == "coupler_length" and linkage.point_is_pin:
+            changed["point_distance"] = value
+        return replace(linkage, **changed)
+    assert linkage.pivot is not None
+    own: Mapping[str, Any] = {{SECOND_LENGTH: "length", "second_crank_phase": "phase"}.get(name, name): value}
+    return replace(linkage, pivot=replace(linkage.pivot, **own))
+
+
+def quality_unit(task: Task) -> tuple[float, str]:
+    """Return the factor from SI, and the unit, in which a task's quality function is written."""
+    return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
+
+
+def error_unit(task: Task) -> tuple[float, str]:
+    """Return the factor from SI, and the unit, in which a task's errors are written."""
+    return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
+
+
+def quality_name(task: Task) -> str:
+    """Return the name of a task's quality function."""
+    if isinstance(task, UntimedPath) and task.measure == "area":
+        return "area between the curves"
+    weighted = not np.all(np.asarray(getattr(task, "weights", 1.0)) == 1.0)
+    what = "errors of angle" if isinstance(task, RockerFunction) else "errors"
+    return f"sum of {'weighted ' if weighted else ''}squared {what}"
+
+
+def format_dimension(name: str, value: float) -> str:
+    """Format a dimension with its unit."""
+    if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
+        # + 0.0: no minus before a zero
+        return f"{round(degrees(value), 3) + 0.0:.3f} deg"
+    return f"{value * 1e3:.6g} mm"
+
+
+def headline(solution: Solution) -> str:
+    """Return error, size, transmission angle and defects in two or three lines."""
+    factor, unit = quality_unit(solution.task)
+    scale, length = error_unit(solution.task)
+    v = solution.verdicts
+    low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
+    return (
+        f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
+        f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
+        + (f"\n{straight}" if (straight := solution.straight()) else "")
+        + (f"\n{', '.join(v.defects)}" if v.defects else "")
+    )
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Format rows in columns, the first to the left, the others to the right."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = [
+        "  ".join(cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths)))
+        for row in rows
+    ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Assessment:
+    """A solution with what errors in its dimensions cost, computed once for the shell, the report and the sheet.
+
+    Attributes
+    ----------
+    solution : Solution
+    dimensions : list of tuple
+        Headings, then a row for each dimension: name, value, error, and what that does to output and quality function.
+    rounding : str
+        What rounding the dimensions costs, in a line.
+    """
+
+    solution: Solution
+    dimensions: list[tuple[str, str, str, str, str]]
+    rounding: str
+
+    @property
+    def report(self) -> str:
+        """Return verdicts, dimensions with what an error in each costs, rounding, errors target by target."""
+        solution, linkage = self.solution, self.solution.linkage
+        task, pivot = solution.task, linkage.pivot
+        error, rms, worst = quality_cells(solution, digits=6)
+        head = (
+            f"{solution.verdicts}\n"
+            f"{quality_name(task)}: {error} {quality_unit(task)[1]}; "
+            f"rms error {rms} {error_unit(task)[1]}, worst {worst} {error_unit(task)[1]}\n"
+            f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
+            f"largest link {1e3 * linkage.largest_link:.6g} mm"
+        )
+        if pivot is None:
+            head += _slider_line(linkage) + _limits(linkage, solution.rotation)
+        elif isinstance(pivot, SliderMotion):
+            head += f"\nslider at D: stroke {1e3 * pivot.stroke:.6g} mm"
+        else:
+            head += f"\nsecond crank at D: {format_ratio(pivot.ratio)} turns for one of the first"
+        if pivot is not None:
+            head += _places("toggles", toggles(linkage))
+        if straight := solution.straight():
+            head += f"\n{straight}"
+        return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
+
+
+def assess(solution: Solution) -> Assessment:
+    """Compute what errors in the dimensions of a solution cost."""
+    factor, unit = quality_unit(solution.task)
+    step = length_step(solution.linkage)
+    rounding = rounded(solution, step)
+    words = (
+        f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
+        f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
+    )
+    return Assessment(solution=solution, dimensions=_dimension_rows(solution, step), rounding=words)
+
+
+def report(solution: Solution) -> str:
+    """Return the text report of a solution, in mm and degrees; see `Assessment`."""
+    return assess(solution).report
+
+
+def quality_headings(task: Task) -> tuple[str, str, str]:
+    """Return the headings of `quality_cells`, with their units."""
+    length = error_unit(task)[1]
+    return f"{quality_name(task)} [{quality_unit(task)[1]}]", f"rms error [{length}]", f"worst [{length}]"
+
+
+def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
+    """Return quality function, rms error and greatest error of a solution as they are written."""
+    factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
+    found = solution.evaluation
+    return f"{factor * solution.error:.{digits}g}", f"{scale * found.rms:.4g}", f"{scale * found.worst:.4g}"
+
+
+def _slider_line(linkage: Linkage) -> str:
+    """Return a line with the offset and the stroke of a slider-crank; of another linkage none."""
+    if not isinstance(linkage, SliderCrank):
+        return ""
+    line = f"\nslider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
+    return line + (f": stroke {1e3 * float(stroke(linkage)):.6g} mm" if linkage.turns_fully else "")
+
+
+def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
+    """Return the dead centres, toggles, time ratio and mechanical advantage of a four-bar or a slider-crank, a line each."""
+    last, motions, what = linkage.driven
+    lines = _places(f"{last} at rest", dead_centres(linkage)) + _places("toggles", toggles(linkage))
+    ratio = time_ratio(linkage)
+    if ratio is not None:
+        lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
+    gained = np.abs(mechanical_advantage(linkage, rotation))
+    if np.isfinite(gained).any():
+        lines += f"\n{what}: {np.nanmin(gained):.3g} at least on the way"
+    return lines
+
+
+def _places(what: str, places: Sequence[float]) -> str:
+    """Format crank rotations as a line, if there are any."""
+    return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
+
+
+def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str, str, str]]:
+    """Return the rows of `Assessment.dimensions`: what happens if a dimension is off by a step, or by 0.1 degrees."""
+    factor, unit = quality_unit(solution.task)
+    scale, length = error_unit(solution.task)
+    dear = costs(solution, step, ANGLE_STEP)
+    rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
+    # where the crank's rotation is free, so is where it starts
+    left_out = ("crank_phase",) if isinstance(solution.task, UntimedPath) else ()
+    for s in sensitivities(solution):
+        if s.name in left_out:
+            continue
+        if s.name not in dear:
+            rows.append((s.name, format_dimension(s.name, s.value), "", "", ""))
+            continue
+        off = ANGLE_STEP if s.name in (*ANGLES, *PIVOT_ANGLES) else step
+        cost = factor * max(dear[s.name], 0.0)
+        grown = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
+        moved = f"{scale * off * s.shift:.3g} {length}"
+        rows.append((s.name, format_dimension(s.name, s.value), format_dimension(s.name, off), moved, grown))
+    return rows
+
+
+def format_transmission(verdicts: Verdicts) -> str:
+    """Format the range of the transmission angle."""
+    return f"{degrees(verdicts.least_transmission):.1f} to {degrees(verdicts.greatest_transmission):.1f}"
+
+
+def _stations(solution: Solution) -> list[list[str]]:
+    """Return the errors target by target, in mm and degrees."""
+    columns = solution.columns()
+    heads = [name.replace("[m]", "[mm]").replace("[rad]", "[deg]") for name in columns]
+    factors = [1e3 if name.endswith("[m]") else 180.0 / pi for name in columns]
+    values = np.column_stack([factor * column for factor, column in zip(factors, columns.values())])
+    rows = [[str(k), *(f"{v:.4f}" for v in row)] for k, row in enumerate(values)]
+    return [["target", *heads], *rows]
+
+
+def solution_columns(solutions: Sequence[Solution]) -> dict[str, list[float]]:
+    """Return the columns of `Synthesis.columns` for any solutions; a length of 0 stands for a missing link."""
+    columns: dict[str, list[float]] = {}
+
+    def put(name: str, value: float) -> None:
+        columns.setdefault(name, []).append(float(value))
+
+    for rank, s in enumerate(solutions, start=1):
+        angular = isinstance(s.task, RockerFunction)
+        unit, length = ("rad2", "rad") if angular else ("m2", "m")
+        put("rank", rank)
+        put(f"quality [{unit}]", s.error)
+        put(f"rms error [{length}]", s.evaluation.rms)
+        put(f"worst error [{length}]", s.evaluation.worst)
+        for name in ("full_turn", "circuit", "branch", "order"):
+            put(f"{name.replace('_', ' ')} (1 or 0)", getattr(s.verdicts, name))
+        put("least transmission angle [rad]", s.verdicts.least_transmission)
+        put("greatest transmission angle [rad]", s.verdicts.greatest_transmission)
+        for name, value in s.linkage.values().items():
+            put(name if name == "branch" else f"{name} [{'rad' if name in ANGLES else 'm'}]", value)
+        if any(isinstance(other.linkage, FiveBar) for other in solutions):
+            second = s.linkage.pivot if isinstance(s.linkage, FiveBar) else None
+            put(f"{SECOND_LENGTH} [m]", 0.0 if second is None else second.length)
+            put("second_crank_phase [rad]", 0.0 if second is None else second.phase)
+            put("second_crank_ratio", 0.0 if second is None else second.ratio)
+    return columns

@@ -1,0 +1,479 @@
+"""A linkage that was found, and everything a designer asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, degrees, inf, pi, remainder, sin, tau
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import FiveBarParameters
+
+from ...display import Shown
+from ...files import write_csv
+from ...run import parameters_to
+from ...units import with_unit
+from ..linkage.kernels import PLACES
+from ..linkage.linkage import Linkage, SliderCrank, wrapped
+from ..linkage.machine import Make
+from ..task.target import area_between, distance_to, halves, hausdorff, straightness
+from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
+
+FloatArray = NDArray[np.float64]
+#: Share of the target's size squared below which an error is rounding.
+EXACT = 1e-14
+#: Points of a coupler curve by which an untimed path is judged: the thesis's 360.
+CURVE = 360
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evaluation:
+    """How well a linkage does a task.
+
+    Attributes
+    ----------
+    error : float
+        The task's quality function: m2, of a rocker function rad2.
+    value : float
+        What the task's objective makes small: the quality function, or the greatest error (m, of a rocker function rad).
+    errors : ndarray, shape (n,)
+        At each target: distance (m), of an untimed path from the target's point to the curve; of a rocker function, angle
+        (rad).
+    angle_errors : ndarray, shape (n,), or None
+        Of a motion (rad).
+    rotation : ndarray, shape (n,), or None
+        Crank rotations at which the targets are compared; None where the linkage was given without.
+    length : float
+        Of a motion, the length at which an error of angle counts as an error of place (m); see `Motion`.
+    """
+
+    error: float
+    value: float
+    errors: FloatArray
+    angle_errors: FloatArray | None
+    rotation: FloatArray | None
+    length: float = 0.0
+
+    @property
+    def combined(self) -> FloatArray:
+        """Return the errors of place and angle together, as they count in the quality function (m or rad), shape (n,)."""
+        if self.angle_errors is None:
+            return np.abs(self.errors)
+        both: FloatArray = np.hypot(self.errors, self.length * self.angle_errors)
+        return both
+
+    @property
+    def rms(self) -> float:
+        """Return the root mean square of the combined errors (m or rad)."""
+        return float(np.sqrt(np.mean(self.combined**2)))
+
+    @property
+    def worst(self) -> float:
+        """Return the largest of the combined errors (m or rad)."""
+        return float(self.combined.max())
+
+
+def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
+    """Compare a linkage with its task, by the task's own measure.
+
+    Nothing of a search is used: an untimed path is compared as a polygon of `CURVE` points with the target's.
+
+    Parameters
+    ----------
+    task : Task
+    linkage : Linkage
+    rotation : ndarray, optional
+        Crank rotations of an untimed task's stations; needed but for closed paths.
+
+    Raises
+    ------
+    InputError
+        If rotations are needed and not given.
+    """
+    if isinstance(task, UntimedPath):
+        return _evaluate_path(task, linkage, rotation)
+    given = task.rotation if task.rotation is not None else rotation
+    if given is None:
+        raise InputError("the task gives no crank rotations: say at which ones the linkage is to be compared")
+    at = np.asarray(given, dtype=float)
+    if isinstance(task, RockerFunction):
+        left = wrapped(linkage.rocker_angle(at) - np.asarray(task.angle))
+        error, value = _objective_values(task, np.asarray(task.weights) * left**2)
+        return Evaluation(error=error, value=value, errors=left, angle_errors=None, rotation=at)
+    points = np.asarray(task.points)
+    distance = np.hypot(*(linkage.path(at) - points).T)
+    weights = np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights)
+    squares = distance**2
+    turned, length = None, 0.0
+    if not isinstance(task, TimedPath) and task.angle is not None:
+        turned, length = wrapped(linkage.coupler_angle(at) - np.asarray(task.angle)), float(task.length or 0.0)
+        squares = squares + (length * turned) ** 2
+    error, value = _objective_values(task, weights * squares)
+    return Evaluation(error=error, value=value, errors=distance, angle_errors=turned, rotation=at, length=length)
+
+
+def _objective_values(task: Task, squares: FloatArray) -> tuple[float, float]:
+    """Return quality function and objective from the weighted squared errors."""
+    error = float(squares.sum())
+    if not np.isfinite(error):
+        return inf, inf
+    return error, error if task.objective == "error" else float(squares.max()) ** 0.5
+
+
+def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -> Evaluation:
+    path = task.path
+    if path.closed:
+        phi = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
+    elif rotation is None:
+        raise InputError("an open path has no crank rotations of its own: say between which ones it is traced")
+    else:
+        phi = np.linspace(rotation[0], rotation[-1], CURVE)
+    curve = linkage.path(phi)
+    points = np.asarray(path.points)
+    if not np.isfinite(curve).all():
+        return Evaluation(error=inf, value=inf, errors=np.full(len(points), inf), angle_errors=None, rotation=rotation)
+    distance = distance_to(curve, points, closed=path.closed)
+    weights = np.asarray(task.weights)
+    normal = normal_form(task)
+    stations = normal.places
+    apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
+    if task.measure == "distance":
+        error = float(normal.weights @ apart**2)
+    elif (weights == weights[0]).all():
+        error = float(weights[0]) * area_between(curve, path, closed=path.closed)
+    else:
+        # a weighted area: along the target with its weights, and along the curve with those of the nearest stations, by halves
+        traced = curve @ np.array([1.0, 1j])
+        steps = np.abs(np.diff(np.append(traced, traced[0]) if path.closed else traced))
+        nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
+        back = halves(steps, path.closed) * distance_to(points, curve, closed=path.closed)
+        error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
+    value = error if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
+    return Evaluation(error=error, value=value, errors=distance, angle_errors=None, rotation=rotation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdicts:
+    """Whether a linkage really does its task.
+
+    Attributes
+    ----------
+    grashof : str
+        Type of the four-bar, or slider-crank, see `Linkage.grashof`; where the rocker pivot moves, what moves it.
+    full_turn : bool
+        The crank can turn fully.
+    circuit : bool
+        The links stay joined all the way through the task: every target is on one circuit.
+    branch : bool
+        Coupler and rocker never come to be collinear on the way.
+    order : bool
+        The targets come in their order, the crank turning one way.
+    least_transmission, greatest_transmission : float
+        Range of the angle between coupler and rocker over the way of the task (rad), over a turn where it is closed.
+    """
+
+    grashof: str
+    full_turn: bool
+    circuit: bool
+    branch: bool
+    order: bool
+    least_transmission: float
+    greatest_transmission: float
+
+    @property
+    def defects(self) -> tuple[str, ...]:
+        """Return the defects, such as "circuit defect"."""
+        return tuple(f"{name} defect" for name in ("circuit", "branch", "order") if not getattr(self, name))
+
+    @property
+    def sound(self) -> bool:
+        """Return whether there is no circuit, branch or order defect."""
+        return not self.defects
+
+    def __str__(self) -> str:
+        words = [self.grashof, "full turn" if self.full_turn else "no full turn", *self.defects]
+        angles = f"{degrees(self.least_transmission):.1f} to {degrees(self.greatest_transmission):.1f} deg"
+        return ", ".join(words) + f", transmission angle {angles}"
+
+
+def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
+    """Judge a linkage over the crank rotations from the first to the last of ``rotation``, or over a turn.
+
+    The distance from crank pin to rocker pivot, on which everything depends, is evaluated densely and, with a fixed pivot,
+    where the crank lies along the ground link.
+    """
+    steps = np.diff(rotation)
+    order = bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+    begin, end = (0.0, 2.0 * pi) if closed else (float(rotation.min()), float(rotation.max()))
+    way = np.linspace(begin, end, 1441)
+    if linkage.pivot is None:
+        # th2 a multiple of pi
+        first = np.ceil((begin + linkage.crank_phase) / pi)
+        last = np.floor((end + linkage.crank_phase) / pi)
+        way = np.concatenate([way, np.arange(first, last + 1) * pi - linkage.crank_phase])
+    cosine = linkage.cosine_at_c(linkage.reach(way))
+    joined = bool((np.abs(cosine) <= 1.0).all())
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return Verdicts(
+        grashof=linkage.title,
+        full_turn=linkage.turns_fully,
+        circuit=joined,
+        branch=joined and bool((np.abs(cosine) < 1.0).all()),
+        order=order,
+        least_transmission=float(angle.min()),
+        greatest_transmission=float(angle.max()),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StraightPart:
+    """The straight part of a path as it is traced, evaluated densely.
+
+    Attributes
+    ----------
+    travel, flatness : float
+        Along the line from its first point to its last, and extent across it (m).
+    begin, end : float
+        Crank rotations at its ends (rad).
+    """
+
+    travel: float
+    flatness: float
+    begin: float
+    end: float
+
+    @property
+    def rotation(self) -> float:
+        """Return the crank rotations over which the task is done: its stations, or a turn."""
+        return abs(self.end - self.begin)
+
+    def __str__(self) -> str:
+        angle = degrees(self.rotation)
+        return f"straight part {1e3 * self.travel:.4g} mm long, {1e3 * self.flatness:.3g} mm off straight, in {angle:.1f} deg"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution(Shown):
+    """A linkage for a task.
+
+    Attributes
+    ----------
+    task : Task
+    linkage : Linkage
+    evaluation : Evaluation
+    verdicts : Verdicts
+    """
+
+    task: Task
+    linkage: Linkage
+    evaluation: Evaluation
+    verdicts: Verdicts
+
+    def __repr__(self) -> str:
+        return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
+
+    def describe(self) -> str:
+        """Return error and verdicts in one line."""
+        unit = "rad" if isinstance(self.task, RockerFunction) else "m"
+        found = self.evaluation
+        return (
+            f"error {self.error:.4g} {unit}2, rms {found.rms:.4g} {unit}, worst {found.worst:.4g} {unit}; largest link "
+            f"{self.linkage.largest_link:.4g} m; {self.verdicts}"
+        )
+
+    @classmethod
+    def of(cls, task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Solution:
+        """Evaluate and judge a linkage; see `evaluate`."""
+        evaluation = evaluate(task, linkage, rotation)
+        closed = isinstance(task, UntimedPath) and task.path.closed
+        at = np.array([0.0, 2.0 * pi]) if evaluation.rotation is None else evaluation.rotation
+        closed = closed or whole_turn(at)
+        return cls(task=task, linkage=linkage, evaluation=evaluation, verdicts=judge(linkage, at, closed=closed))
+
+    @property
+    def error(self) -> float:
+        """Return the quality function (m2; of a rocker function, rad2)."""
+        return self.evaluation.error
+
+    @property
+    def value(self) -> float:
+        """Return the objective of the task: `error`, or the greatest error (m; of a rocker function, rad)."""
+        return self.evaluation.value
+
+    @property
+    def rotation(self) -> FloatArray:
+        """Return the crank rotations over which the task is done: its stations, or a turn."""
+        if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
+            return self.evaluation.rotation
+        return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
+
+    @property
+    def way(self) -> tuple[float, float] | None:
+        """Return the crank rotations between which the task is done; None where the crank turns fully."""
+        return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
+
+    def straight(self) -> StraightPart | None:
+        """Return the straight part of the task as it is traced; None where none is asked."""
+        asked = normal_form(self.task).straight
+        rotation = self.evaluation.rotation
+        if asked is None or rotation is None or not isinstance(self.task, UntimedPath):
+            return None
+        begin, end = float(rotation[asked.start]), float(rotation[asked.end])
+        own = self.task.straight
+        assert own is not None
+        line = np.subtract(*self.task.path.points[[own.end, own.start]])
+        part = straightness(
+            self.linkage.path(np.linspace(begin, end, 721)), direction=float(np.arctan2(line[1], line[0]))
+        )
+        return StraightPart(travel=part.travel, flatness=part.flatness, begin=begin, end=end)
+
+    def curve(self, n: int = CURVE) -> FloatArray:
+        """Return the traced path, shape (n, 2) in m: over a turn, or from the first station to the last."""
+        at = self.rotation
+        if isinstance(self.task, UntimedPath) and not self.task.path.closed:
+            return self.linkage.path(np.linspace(at[0], at[-1], n))
+        return self.linkage.path(np.linspace(0.0, 2.0 * pi, n, endpoint=False))
+
+    def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
+        """Return the parameters of the plant and its FMU; see `Linkage.to_five_bar`."""
+        return self.linkage.to_five_bar(**made_of)
+
+    @property
+    def direction(self) -> float:
+        """Return the direction in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
+        at = self.evaluation.rotation
+        return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
+
+    def run_case(self, make: Make, title: str) -> dict[str, Any]:
+        """Return the tables of a case file that runs the linkage through its task at constant speed.
+
+        A slider-crank runs as the slider-crank's plant, any other linkage as the five-bar slider; see `docs/case-files.md`.
+        """
+        linkage, at = self.linkage, self.evaluation.rotation
+        start = (0.0 if at is None else float(at[0])) + linkage.crank_phase
+        run: dict[str, Any] = {"revolutions": 2.0}
+        if not self.verdicts.full_turn and at is not None:
+            # a crank that cannot turn fully: from the first target to the last
+            run = {"stop_time": with_unit(float(np.ptp(at)) / make.speed, "s")}
+        across, along = make.load_along(cos(linkage.ground_angle), sin(linkage.ground_angle))
+        load: Any = {"fx": with_unit(across, "N"), "fy": with_unit(along, "N")}
+        if isinstance(linkage, SliderCrank):
+            # at the slider alone, which the plant loads along its guide
+            load = with_unit(along if linkage.point_is_pin else 0.0, "N")
+        return {
+            "title": title,
+            **parameters_to(make.plant(linkage)),
+            "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
+            "drive": {"speed": with_unit(self.direction * make.speed, "rad/s")},
+            **({"load": load} if any(make.load) else {}),
+            "run": run,
+        }
+
+    def columns(self) -> dict[str, FloatArray]:
+        """Return crank rotation, target, traced point or angle, error and transmission angle at each target; SI.
+
+        Of an untimed path the point of it that is nearest to each of the target's points.
+        """
+        task = self.task
+        at = self.evaluation.rotation
+        if isinstance(task, UntimedPath):
+            points = np.asarray(task.path.points)
+            begin, end = (0.0, 2.0 * pi) if task.path.closed or at is None else (float(at.min()), float(at.max()))
+            at = nearest_rotations(self.linkage, points @ np.array([1.0, 1j]), begin, end)
+        assert at is not None
+        columns = {"crank rotation [rad]": at}
+        if isinstance(task, RockerFunction):
+            columns |= {
+                "target angle [rad]": np.asarray(task.angle),
+                "rocker angle [rad]": self.linkage.rocker_angle(at),
+            }
+            columns["error of angle [rad]"] = self.evaluation.errors
+        else:
+            wanted = target_points(task)
+            assert wanted is not None
+            made = self.linkage.path(at)
+            for name, both in (("target", wanted), ("path", made)):
+                columns |= {f"{name} {axis} [m]": both[:, k] for k, axis in enumerate("xy")}
+            columns["error [m]"] = self.evaluation.errors
+        if self.evaluation.angle_errors is not None:
+            angle = self.linkage.coupler_angle(at)
+            columns["target angle [rad]"] = angle - self.evaluation.angle_errors
+            columns["coupler angle [rad]"] = angle
+            columns["error of angle [rad]"] = self.evaluation.angle_errors
+        columns["transmission angle [rad]"] = angle_at_c(self.linkage, at)
+        return columns
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write `columns` to a CSV file."""
+        return write_csv(path, self.columns())
+
+
+def whole_turn(rotation: FloatArray) -> bool:
+    """Return whether stations cover a whole turn: as far apart across its end as elsewhere."""
+    gap = 2.0 * pi - float(np.ptp(rotation))
+    return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
+
+
+def target_points(task: Task) -> FloatArray | None:
+    """Return the points that a task asks for (m), shape (n, 2); None of a rocker function."""
+    if isinstance(task, RockerFunction):
+        return None
+    return np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
+
+
+def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
+    """Return the angle between coupler and rocker at C (rad), from 0 to pi, NaN where the links cannot be joined."""
+    g = linkage.directions(rotation)
+    angle: FloatArray = np.arctan2(np.abs(g[5]), g[4])
+    return angle
+
+
+def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return dP/dphi, by the crank's phase and by the pivot's own motion."""
+    step = 1e-6
+    ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
+    vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
+    rate: NDArray[np.complex128] = linkage.turns * both[PLACES.index("crank_phase")] + vx * both[10] + vy * both[11]
+    return rate
+
+
+def nearest_rotations(
+    linkage: Linkage, points: NDArray[np.complex128], begin: float = 0.0, end: float = 2.0 * pi
+) -> FloatArray:
+    """Find the crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
+
+    Looked for from ``begin`` to ``end``: the whole turn by default.
+    """
+    whole = end - begin >= 2.0 * pi - 1e-9
+    phi = np.linspace(begin, end, 4 * CURVE, endpoint=not whole)
+    curve = linkage.path(phi) @ np.array([1.0, 1j])
+    distance = np.abs(points[:, None] - curve[None, :])
+    at: FloatArray = phi[np.where(np.isfinite(distance), distance, inf).argmin(axis=1)]
+    for _ in range(3):
+        place, jacobian = linkage.path_jacobian(at)
+        both = jacobian[:, 0] + 1j * jacobian[:, 1]
+        rate = path_rate(linkage, at, both)
+        step = ((points - place @ np.array([1.0, 1j])) * rate.conj()).real / np.abs(rate) ** 2
+        at += np.clip(step, -pi / CURVE, pi / CURVE)
+    if not whole:
+        return np.clip(at, begin, end)
+    unwrapped: FloatArray = np.unwrap(at)
+    return unwrapped
+
+
+def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
+    """Rank solutions: sound ones first, then by the task's objective.
+
+    Those that are exact but for rounding come in the order of their transmission angles.
+    """
+
+    def place(solution: Solution) -> tuple[bool, float, float]:
+        exact = solution.error <= EXACT * normal_form(solution.task).unit ** 2
+        return not solution.verdicts.sound, 0.0 if exact else solution.value, -solution.linkage.least_transmission
+
+    return tuple(sorted(solutions, key=place))

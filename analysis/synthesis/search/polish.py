@@ -1,0 +1,487 @@
+"""From starts to optima: SciPy's least squares where bounds are all that is asked, IPOPT where there are inequalities.
+
+Both have exact Jacobians. What is not a sum of squares is fitted by least squares first: an area, or the greatest distance of a
+path, then goes on in `analysis.synthesis.refine`, the greatest error at given stations as the least bound of all by IPOPT.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ContextDecorator
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from math import inf, pi
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
+
+from linkwork.errors import InputError
+
+from ..linkage.kernels import coupler_path_jacobian, link_jacobian
+from ..linkage.linkage import SliderCrank, wrapped
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
+from ..task.limits import Limits
+from ..task.task import Normal
+from .program import KEPT, Program
+from .refine import ITERATIONS, Refinement
+from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, over_cores
+from .statement import Objective
+
+FloatArray = NDArray[np.float64]
+#: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
+FEW = 20
+#: How many of the fits go on to the greatest error.
+ONWARDS = 6
+#: How many paths go on to the measure between the curves, and by how many iterations: many by a few, the best of them further.
+#: Of an open path, whose ends are free too, the first laps tell less.
+RACE = {
+    "area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)),
+    "open area": ((40, 12), (12, 40), (3, 100), (1, 100), (1, 200)),
+    "worst": ((ONWARDS, ITERATIONS),),
+}
+#: Fits of squares that a path's race begins with besides the starts themselves: most end at the same few optima.
+FITTED = 8
+#: How many of the best are followed to the end, by so many iterations more, where they were cut off.
+FINISHED, LONG = 4, 1500
+#: How many triangles of a region that is not convex are tried at a time.
+PIECES = 3
+#: Starts of one part of the work of several cores, at most: what is lost where it is interrupted.
+MOST = 32
+#: Linkages that differ by less than this, in shares of the longest link and in rad, count as one.
+DIFFERENT = 1e-3
+#: The same for paths that race: less than this would end at the same optimum.
+RACED = 0.02
+#: Share of the quality below which points count as met exactly (units squared).
+EXACT = 1e-14
+
+
+class _OneThread(ContextDecorator):
+    """Inside, linear algebra is on one thread, for as long as any of our own threads is inside.
+
+    The last digits of a sum depend on how many threads share it, and where a slope is flat a search ends by these.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._inside = Lock(), 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._limits = threadpool_limits(1, user_api="blas")
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._limits.restore_original_limits()
+
+
+ONE_THREAD = _OneThread()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Polished:
+    """The answers of all starts: those that keep every constraint, best first, and the others; the starts that keep them."""
+
+    kept: tuple[Answer, ...]
+    others: tuple[Answer, ...]
+    done: int
+    interrupted: bool
+    begun: tuple[Answer, ...] = ()
+
+    @classmethod
+    def of(
+        cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
+    ) -> Polished:
+        """Make the record from all answers, those that keep every constraint, and the starts that keep them as they are."""
+        others = tuple(a for a in found if not a.feasible)
+        return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
+
+    def joined(self, other: Polished) -> Polished:
+        """Join the answers of searches for different kinds of linkages."""
+        return Polished(
+            kept=self.kept + other.kept,
+            others=self.others + other.others,
+            done=self.done + other.done,
+            interrupted=self.interrupted or other.interrupted,
+            begun=self.begun + other.begun,
+        )
+
+
+@ONE_THREAD
+def polish(
+    normal: Normal,
+    limits: Limits,
+    starts: Sequence[Start],
+    *,
+    pivot: PivotUnknown | None = None,
+    search: Search = USUAL_SEARCH,
+) -> Polished:
+    """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted."""
+    worker = Polisher(normal, limits, pivot)
+
+    def spread(name: str, items: Sequence[Any], what: str) -> tuple[list[Answer], bool]:
+        cores = search.cores
+        size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
+        # a polisher holds compiled solvers, which do not travel: each part of the work makes its own
+        step = getattr(worker, name) if cores == 1 else partial(_apart, name, normal, limits, pivot)
+        parts, interrupted = over_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
+        return [answer for part in parts for answer in part], interrupted
+
+    begun = kept_answers([worker.kept(start) for start in starts])
+    given = [answer for answer in begun if answer.start.given]
+    # where enough of the starts themselves can race, few are fitted by squares; the ends of a straight part are not met by few
+    # iterations
+    races = normal.outline is not None and normal.quality != "squares" and pivot is None and normal.straight is None
+    enough = races and len(begun) >= FITTED
+    fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
+    found, interrupted = spread("fit_all", fitted, f"fitting {len(fitted)} starts")
+    kept = kept_answers(found)
+    # an interruption after the last search has nothing to stop
+    if interrupted and len(found) < len(fitted):
+        return Polished.of(found, kept, True, begun)
+    interrupted = False
+    if normal.quality == "squares":
+        if limits.along:
+            kept = distinct(kept, ONWARDS, pivot)
+        kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
+    elif not races:
+        best = [*given, *distinct(kept, ONWARDS, pivot)]
+        kept, interrupted = spread(
+            "onwards", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
+        )
+    else:
+        begin = kept_answers([worker.measured(answer) for answer in [*kept, *begun]])
+        laps = RACE["open area" if normal.quality == "area" and not normal.closed else normal.quality]
+        kept, interrupted = _raced(spread, begin, given, laps)
+    if limits.least is not None and not interrupted:
+        best = distinct(kept_answers(kept) or kept_answers(found), ONWARDS, pivot)
+        kept, interrupted = spread("least", best, f"making least the {limits.least.along.name}")
+        found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
+    elif limits.along:
+        kept = [answer for answer in kept if worker.kept(answer.start).feasible]
+    return replace(Polished.of(found, kept_answers(kept), interrupted, begun), done=len(starts))
+
+
+def _raced(
+    spread: Callable[[str, Sequence[Any], str], tuple[list[Answer], bool]],
+    kept: Sequence[Answer],
+    given: Sequence[Answer],
+    laps: Sequence[tuple[int, int]],
+) -> tuple[list[Answer], bool]:
+    """Refine many answers by few iterations each, then the best of them by more; return whether that was interrupted."""
+    for lap, (count, iterations) in enumerate(laps):
+        # guesses run in the first lap whatever they are worth; what does not run in it is left behind
+        best = distinct([*given, *kept], count + len(given), distance=RACED)
+        stage = "refining" if lap else "comparing"
+        done, interrupted = spread(
+            "onwards", [(answer, iterations) for answer in best], f"{stage} the best {len(best)}"
+        )
+        if interrupted:
+            return [*done, *kept], True
+        rest = [answer for answer in kept if answer not in best] if lap else []
+        # those that have come to the same optimum count as one
+        kept, given = distinct(kept_answers([*done, *rest]), len(done) + len(rest), distance=RACED), []
+    return list(kept), False
+
+
+def kept_answers(answers: Sequence[Answer]) -> list[Answer]:
+    """Return the answers that keep every constraint, best first."""
+    return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
+
+
+@ONE_THREAD
+def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
+    """Call a method of a new `Polisher` by its name, in another process or thread."""
+    return getattr(Polisher(normal, limits, pivot), name)(item)
+
+
+def distinct(
+    answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
+) -> list[Answer]:
+    """Return the first answers that are different linkages, by links as shares of the longest, coupler point and pivot."""
+
+    def mark(answer: Answer) -> FloatArray:
+        q, v = answer.start.q, answer.start.pivot
+        largest = q[2:7].max()
+        if isinstance(pivot, SliderUnknown):
+            # as vectors: a guide is the same one from its other end
+            v = np.concatenate([np.cos(v[0]) * v[1:], np.sin(v[0]) * v[1:]])
+        if isinstance(pivot, CrankUnknown):
+            # seen from where the first crank lies along the ground link, however often either has turned since
+            turned = geared(pivot.ratio)
+            relative = turned[0] * v[1] - turned[1] * q[8]
+            v = np.array([v[0], largest * np.cos(relative), largest * np.sin(relative), *v[2:]])
+        side = 3.0 * answer.start.branch
+        if answer.start.linkage is SliderCrank:
+            # a slider-crank without an offset is the same one seen from the other side of its guide
+            turned = np.exp(1j * q[7])
+            v = np.array(
+                [q[2] * turned.real, q[2] * turned.imag, *(side * largest * np.array([turned.real, turned.imag]))]
+            )
+            q, side = np.array([*q[:2], 0.0, *q[3:7], 0.0, q[7] + q[8], *q[9:]]), 0.0
+        mark = np.concatenate([q[:7] / largest, np.cos(q[7:]), np.sin(q[7:]), v / largest])
+        # the start of an untimed path's rotation is no dimension
+        if answer.start.rotation is not None:
+            mark[[8, 12]] = 0.0
+        return np.append(mark, side)
+
+    return apart(answers, mark, distance, count)
+
+
+class Polisher:
+    """Fits starts to one task; its programs are built when they are first needed."""
+
+    def __init__(self, normal: Normal, limits: Limits, pivot: PivotUnknown | None) -> None:
+        self.normal, self.limits, self.pivot = normal, limits, pivot
+        few = normal.timed or normal.n <= FEW
+        self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
+        self._refinement: Refinement | None = None
+        self._programs: dict[tuple[str, bool], Program] = {}
+
+    def program(self, objective: Objective, *, exact: bool = False) -> Program:
+        """Return the program with this objective; with a fixed pivot all are exact."""
+        key = objective, exact and self.pivot is not None
+        if key not in self._programs:
+            self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1])
+        return self._programs[key]
+
+    def fit(self, start: Start) -> Answer:
+        """Fit the squared errors from a start; where points are met exactly, maximise the transmission angle."""
+        fitted = self.by_least_squares
+        answer = fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start)
+        if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
+            met = self.program("transmission").solve(answer.start)
+            if met.feasible:
+                return replace(met, start=replace(met.start, quality=self.program("squares").value(met.start)))
+        return answer
+
+    def fit_all(self, starts: Sequence[Start]) -> list[Answer]:
+        """Fit each of the starts."""
+        return [self.fit(start) for start in starts]
+
+    def _solved(self, start: Start) -> Answer:
+        """Solve by IPOPT; where a region is not convex in several of its triangles, and on across the edges that hold it up."""
+        program = self.program("squares")
+        if all(len(triangles) == 1 for _, triangles in self.limits.regions):
+            return program.solve(start)
+        best: Answer | None = None
+        tried: set[tuple[int, ...]] = set()
+        now = start
+        while True:
+            ways = product(*(order[:PIECES] for order in program.nearest_pieces(now.q)))
+            fresh = [way for way in ways if way not in tried]
+            tried |= set(fresh)
+            answers = [program.solve(now, pieces=way) for way in fresh]
+            better = min(answers, key=lambda a: (not a.feasible, a.start.quality), default=None)
+            if better is None or (
+                best and (best.feasible, -best.start.quality) >= (better.feasible, -better.start.quality)
+            ):
+                break
+            best, now = better, better.start
+        assert best is not None
+        return best
+
+    def finish(self, answer: Answer) -> Answer:
+        """Go on where a search was cut off on a flat slope: else what is found there would depend on the last digits."""
+        program = None if self.by_least_squares or self.normal.exact else self.program("squares")
+        if program is None:
+            return answer
+        if not answer.converged and self.pivot is None:
+            longer = program.solve(answer.start, iterations=LONG)
+            if longer.feasible and longer.start.quality < answer.start.quality:
+                answer = longer
+        last = self.program("squares", exact=True)
+        return last.exact(answer, lambda start, places: last.solve(start, places=places))
+
+    def least(self, answers: Sequence[Answer]) -> list[Answer]:
+        """Minimise the objective that takes the place of the error, from answers with small errors."""
+        return [self._least(answer) for answer in answers]
+
+    def _least(self, answer: Answer) -> Answer:
+        program = self.program("least", exact=True)
+        size = program.greatest(answer.start)
+        found = program.solve(answer.start, size=size)
+        solve: Callable[..., Answer] = partial(program.solve, size=size)
+        if self.normal.outline is not None:
+            # at stations first, then of the whole curves
+            refinement = Refinement(self.program("least curve", exact=True))
+            program = refinement.program
+
+            def solve(start: Start, *, places: Sequence[FloatArray] | None = None) -> Answer:
+                return refinement.refined(replace(answer, start=start), places=places, size=size)
+
+            for begin in [found.start, answer.start] if found.feasible else [answer.start]:
+                found = solve(begin)
+                if found.feasible:
+                    break
+        return program.exact(found, lambda start, places: solve(start, places=places)) if found.feasible else found
+
+    def measured(self, answer: Answer) -> Answer:
+        """Return the answer with the measure of its path as its quality."""
+        curve, _ = self.refinement.traced(*self.refinement.program.at(answer.start))
+        return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
+
+    def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
+        """Minimise the area or the greatest error from least squares, each by so many iterations at most."""
+        return [self._onwards(*item) for item in items]
+
+    def _onwards(self, answer: Answer, iterations: int) -> Answer:
+        if self.normal.outline is not None:
+            refinement = self.refinement
+            found = refinement.refined(answer, iterations=iterations)
+            return refinement.program.exact(
+                found, lambda start, places: refinement.refined(replace(answer, start=start), places=places)
+            )
+        program = self.program("worst", exact=True)
+        size = max(program.value(answer.start), 1e-9)
+
+        def solve(start: Start, places: Sequence[FloatArray] | None = None) -> Answer:
+            return program.solve(start, size=size, places=places)
+
+        as_it_is = replace(answer, start=replace(answer.start, quality=size))
+        if self.normal.exact and size**2 < EXACT:
+            return as_it_is
+        found = solve(answer.start)
+        if not (found.feasible and found.start.quality < size):
+            return as_it_is
+        return program.exact(found, solve)
+
+    @property
+    def refinement(self) -> Refinement:
+        """Return the refinement of an untimed path; made when it is first needed."""
+        if self._refinement is None:
+            self._refinement = Refinement(self.program("curve", exact=True))
+        return self._refinement
+
+    def kept(self, start: Start) -> Answer:
+        """Judge a start as it is: whether it keeps every constraint and bound."""
+        if self.by_least_squares:
+            within = outside(self.normal, self.limits.low, self.limits.high, start) <= KEPT
+            quality = sum_of_squares(self.normal, start)
+            return replace(
+                Answer.unjoined(start),
+                start=replace(start, q=inside(start.q, self.limits.low, self.limits.high), quality=quality),
+                feasible=within and np.isfinite(quality),
+            )
+        path = self.normal.outline is not None
+        return self.program("curve" if path else "squares", exact=True).kept(start)
+
+
+# Least squares
+
+
+def residuals(
+    normal: Normal, branch: int, q: FloatArray, rotation: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute the weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
+
+    Returns
+    -------
+    residual : ndarray, shape (m,)
+        x, then y, then angle, as far as the task has them, n of each.
+    jacobian : ndarray, shape (m, 11)
+        With respect to `constraints.UNKNOWNS`.
+    rate : ndarray, shape (m,)
+        With respect to the crank rotation at the residual's own station.
+    """
+    n = normal.n
+    c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
+    root = np.sqrt(normal.weights)
+    parts, jacobians, rates = [], [], []
+    if normal.points is not None:
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        coupler_path_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
+        for axis, wanted in enumerate((normal.points.real, normal.points.imag)):
+            parts.append(root * (out[axis] - wanted))
+            jacobians.append(root[:, None] * np.column_stack([jacobian[:10, axis].T, np.zeros(n)]))
+            # a rotation of the crank is a change of its phase
+            rates.append(root * jacobian[8, axis])
+    if normal.angle is not None:
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        link_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
+        which = 1 if normal.of_rocker else 0
+        turned = 0.0 if normal.of_rocker else q[7]
+        left = out[which] + turned + q[10] - normal.angle
+        own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
+        own[:, 7] += 0.0 if normal.of_rocker else 1.0
+        factor = normal.leverage * root
+        parts.append(factor * wrapped(left))
+        jacobians.append(factor[:, None] * own)
+        rates.append(factor * jacobian[8, which])
+    return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)
+
+
+def sum_of_squares(normal: Normal, start: Start) -> float:
+    """Return the sum of weighted squared errors of a start with a fixed pivot; infinite where the links cannot be joined."""
+    rotation = normal.rotation if start.rotation is None else start.rotation
+    assert rotation is not None
+    residual = residuals(normal, start.branch, start.q, rotation)[0]
+    value = float(residual @ residual)
+    return value if np.isfinite(value) else inf
+
+
+def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
+    """Fit by SciPy's trust region reflective method within bounds, with the exact Jacobian of the compiled kernels."""
+    free = np.nonzero(limits.high > limits.low)[0]
+    timed, n = normal.timed, normal.n
+    base = inside(start.q, limits.low, limits.high)
+    low, high = limits.low[free], limits.high[free]
+    x0 = base[free]
+    # strictly inside, as the method asks
+    x0 = np.clip(x0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+    rotation0 = normal.rotation if timed else start.rotation
+    if rotation0 is None:
+        raise InputError("the start of an untimed task needs the crank rotations of its stations")
+    if not timed:
+        x0 = np.append(x0, rotation0)
+        low, high = np.append(low, np.full(n, -inf)), np.append(high, np.full(n, inf))
+    size = len(free)
+    blocks = (normal.points is not None) * 2 + (normal.angle is not None)
+
+    def unpacked(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        q = base.copy()
+        q[free] = x[:size]
+        return q, rotation0 if timed else x[size:]
+
+    def value(x: FloatArray) -> FloatArray:
+        residual = residuals(normal, start.branch, *unpacked(x))[0]
+        # beyond the limit of assembly: farther than anything, so that the step is shortened
+        return residual if np.isfinite(residual).all() else np.full(len(residual), 1e3)
+
+    def derivative(x: FloatArray) -> FloatArray:
+        _, jacobian, rate = residuals(normal, start.branch, *unpacked(x))
+        columns = jacobian[:, free]
+        if timed:
+            return columns
+        own = np.zeros((blocks * n, n))
+        for block in range(blocks):
+            own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
+        return np.hstack([columns, own])
+
+    if not np.isfinite(residuals(normal, start.branch, *unpacked(x0))[0]).all():
+        return Answer.unjoined(start)
+    result = least_squares(
+        value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
+    )
+    q, rotation = unpacked(result.x)
+    ordered = timed or bool(np.all(np.sign(np.diff(rotation)) == np.sign(rotation[-1] - rotation[0])))
+    ordered = ordered and abs(rotation[-1] - rotation[0]) <= 2.0 * pi + 1e-9
+    ended = replace(start, q=q, rotation=None if timed else rotation)
+    quality = sum_of_squares(normal, ended)
+    return Answer(
+        start=replace(ended, quality=quality),
+        feasible=bool(np.isfinite(quality)) and ordered,
+        converged=bool(result.success),
+        violation=0.0 if ordered else inf,
+        worst="" if ordered else "order of the stations",
+        excess="",
+        status=str(result.message),
+        iterations=int(result.nfev),
+    )

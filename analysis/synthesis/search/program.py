@@ -1,0 +1,347 @@
+"""The nonlinear program of a synthesis, evaluated and solved: exact derivatives by CasADi, IPOPT.
+
+`statement` says what is asked; here are its functions, the way from a start to unknowns and parameters, solving, and judging
+what came of it: whether the constraints are kept, of a moved pivot at the extremes of its motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import product
+from math import cos, inf, isfinite, pi
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ...numerics import symbolic
+from ..linkage.linkage import BY_SHORTEST
+from ..task.constraint import UNKNOWNS, half_planes
+from ..task.formula import find_peaks, physical
+from .start import Answer, Start, inside, outside, pivot_size
+from .statement import FURTHER, GRID, SOUGHT, Statement
+
+FloatArray = NDArray[np.float64]
+#: How IPOPT follows its barrier: freely from a start that is only near, with care from one that a first solution gave.
+FOLLOWING: dict[str, dict[str, Any]] = {
+    "squares": {"mu_strategy": "adaptive"},
+    "transmission": {"mu_strategy": "adaptive"},
+    "least": {"mu_strategy": "adaptive"},
+    "worst": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
+}
+#: Iterations of IPOPT: most optima are reached in a hundred, or in many.
+ITERATIONS = 250
+#: How far a constraint may be exceeded and yet be kept: units, rad, or a share of the bound.
+KEPT = 1e-7
+#: Share of the bounds of the pivot's motion that is left free at its extremes, and how often these are looked for again.
+HELD, ROUNDS = 2e-7, 6
+
+
+class Program(Statement):
+    """A synthesis as a nonlinear program that can be solved; its arguments are those of `Statement`."""
+
+    @cached_property
+    def _value(self) -> Any:
+        """Return objective and constraints as a function; it shows whether a start can be evaluated at all."""
+        return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
+
+    @cached_property
+    def _begin(self) -> Any:
+        """Return the starting values of the unknowns that stand for a greatest value or a middle."""
+        casadi = self._casadi
+        return casadi.Function(
+            "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
+        )
+
+    @cached_property
+    def _curvature(self) -> Any:
+        """Return the first two derivatives, by the crank's rotation, of the pivot's bounded motions at the places held."""
+        function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._bent)
+        return lambda z, parameters: function.call([z, parameters])
+
+    @cached_property
+    def _slopes(self) -> Any:
+        """Return the gradient of the objective and Jacobian of the constraints, dense, as a function."""
+        casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
+        both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
+        return casadi.Function("slopes", [x, p], both)
+
+    def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
+        """Return the objective at unknowns and parameters of `at`, and the constraints, kept between `g_low` and `g_high`."""
+        objective, constraints = self._value(z, parameters)
+        return float(objective), np.asarray(constraints).ravel()
+
+    def slopes_at(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the gradient of the objective, shape (k,), and the Jacobian of the constraints, shape (m, k)."""
+        gradient, jacobian = (np.asarray(value) for value in self._slopes(z, parameters))
+        return gradient.ravel(), jacobian
+
+    def stations(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
+        """Return the crank rotations of the stations at unknowns and parameters."""
+        return np.asarray(self._stations(z, parameters)).ravel()
+
+    @cached_property
+    def _stations(self) -> Any:
+        x, p = self._nlp["x"], self._nlp["p"]
+        return self._casadi.Function("stations", [x, p], [self._casadi.SX(self._phi)])
+
+    @cached_property
+    def trace(self) -> Any:
+        """Return the coupler point, shape (2, 1), at a share of the way of a path, and its derivatives, as a function."""
+        casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
+        share = casadi.SX.sym("share")
+        first, last = self._ends
+        place = casadi.vertcat(*self._point_at(first + share * (last - first)))
+        return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
+
+    def _solver(self, iterations: int, near: bool) -> Any:
+        """Return IPOPT with this many iterations at most, for a start that is near or not."""
+        if (iterations, near) in self._solvers:
+            return self._solvers[iterations, near]
+        self._solvers[iterations, near] = symbolic.ipopt(
+            "synthesis",
+            self._nlp,
+            max_iter=iterations,
+            tol=1e-9,
+            constr_viol_tol=1e-9,
+            acceptable_tol=1e-7,
+            acceptable_iter=8,
+            bound_relax_factor=0.0,
+            **FOLLOWING["worst" if near else self.objective],
+        )
+        return self._solvers[iterations, near]
+
+    def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
+        """Order the triangles of each region by how far the pivot is outside of them."""
+        order = []
+        for name, triangles in self.limits.regions:
+            x, y = float(q[0]), float(q[1])
+            if name == "D":
+                x, y = x + float(q[2] * np.cos(q[7])), y + float(q[2] * np.sin(q[7]))
+            outside = [float((half_planes(t) @ [x, y, 1.0]).max()) for t in triangles]
+            order.append([int(k) for k in np.argsort(outside, kind="stable")])
+        return order
+
+    def value(self, start: Start) -> float:
+        """Return the objective of a start; infinite where the links cannot be joined."""
+        f = self.stated(*self.at(start))[0]
+        return f if isfinite(f) else inf
+
+    @property
+    def own(self) -> int:
+        """Place of the unknown that stands for the greatest value of what is made small in the place of an error."""
+        return len(self.low) - len(self._initial)
+
+    def greatest(self, start: Start) -> float:
+        """Return the greatest value of the minimised function at a start, where it takes the place of an error."""
+        return float(np.asarray(self._begin(*self.at(start))).ravel()[0])
+
+    def at(
+        self,
+        start: Start,
+        *,
+        size: float = 1.0,
+        pieces: Sequence[int] | None = None,
+        places: Sequence[FloatArray] | None = None,
+        share: float | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the unknowns and parameters of a start; see `solve`."""
+        count = pivot_size(self.pivot)
+        pivot = np.zeros(count) if len(start.pivot) == 0 else start.pivot
+        if len(pivot) != count:
+            raise InputError(f"a start with {len(pivot)} unknowns of the pivot: there must be {count}")
+        known = [inside(start.q, self.low[: len(UNKNOWNS)], self.high[: len(UNKNOWNS)]), pivot]
+        direction = 1.0
+        if not self.normal.timed:
+            if start.rotation is None:
+                raise InputError("the start of an untimed task needs the crank rotations of its stations")
+            known.append(start.rotation[self.knots])
+            direction = float(np.sign(start.rotation[-1] - start.rotation[0]) or 1.0)
+        z = np.concatenate([*known, np.zeros(len(self._initial))])
+        harmonics = 0 if self.pivot is None else self.pivot.harmonics
+        count = len(self._peaks)
+        along = [np.zeros(further.shape) for _, further in self._along] if places is None else places[count:]
+        if share is None:
+            share = cos(pi * harmonics / max(GRID, 16 * harmonics)) if places is None else 1.0 - HELD
+        held = [np.zeros(self._held)] * count if places is None else places[:count]
+        chosen = [nearest[0] for nearest in self.nearest_pieces(z)] if pieces is None else pieces
+        parameters = np.concatenate(
+            [
+                [float(start.branch), direction, size, share],
+                *(part for own in held for part in (own, np.zeros(self._held))),
+                *(own.ravel(order="F") for own in along),
+                _grashof_rows(self.limits.grashof, z[2:6]).ravel(order="F"),
+                *(half_planes(triangles[k]).ravel(order="F") for (_, triangles), k in zip(self.limits.regions, chosen)),
+            ]
+        )
+        z = np.clip(z, self.low, self.high)
+        if self._initial and (places is not None or self.objective != "squares"):
+            # least squares come from farther away, and find their own middles
+            z[-len(self._initial) :] = np.asarray(self._begin(z, parameters)).ravel()
+        if self._peaks and places is not None:
+            for number, derivatives in enumerate(self._curvature(z, parameters)):
+                slope, bend = np.asarray(derivatives).reshape(-1, 2).T
+                true = (np.abs(slope) < 1e-6) & (np.abs(bend) > 1e-3)
+                begin = 4 + (2 * number + 1) * 2 * harmonics
+                parameters[begin : begin + 2 * harmonics] = np.where(true, -0.5 / np.where(true, bend, 1.0), 0.0)
+        return np.clip(z, self.low, self.high), parameters
+
+    def solve(
+        self,
+        start: Start,
+        *,
+        size: float = 1.0,
+        iterations: int = ITERATIONS,
+        pieces: Sequence[int] | None = None,
+        places: Sequence[FloatArray] | None = None,
+    ) -> Answer:
+        """Solve from a start.
+
+        Parameters
+        ----------
+        start : Start
+        size : float
+            Magnitude of the greatest error (units), where that is made small.
+        iterations : int
+            At most.
+        pieces : sequence of int, optional
+            Which triangle of each region; the nearest by default.
+        places : sequence of ndarray, optional
+            Where the extremes of the bounded motions of the pivot are, of `extremes`; without, the bounds are held with what
+            makes sure of them everywhere.
+        """
+        z0, parameters = self.at(start, size=size, pieces=pieces, places=places)
+        if not all(np.isfinite(value).all() for value in self.stated(z0, parameters)):
+            return Answer.unjoined(start)
+        solver = self._solver(iterations, places is not None)
+        result = solver(x0=z0, lbx=self.low, ubx=self.high, lbg=self.g_low, ubg=self.g_high, p=parameters)
+        stats = solver.stats()
+        answer = self.judged(np.asarray(result["x"]).ravel(), parameters, start)
+        return replace(
+            answer,
+            converged=bool(stats["success"]),
+            status=str(stats["return_status"]),
+            iterations=int(stats["iter_count"]),
+        )
+
+    def judged(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
+        """Evaluate unknowns as an answer: anew, since CasADi returns zeros where IPOPT ends at no number."""
+        f, g = self.stated(z, parameters)
+        over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
+        violation = float(over.max(initial=0.0))
+        worst = self.labels[int(np.argmax(over))] if len(over) else None
+        ended = self.start_at(z, start, f * (float(parameters[2]) if self.objective in ("worst", *SOUGHT) else 1.0))
+        return Answer(
+            start=ended,
+            feasible=violation <= KEPT and bool(np.isfinite(z).all()) and isfinite(ended.quality),
+            converged=True,
+            violation=violation,
+            worst=worst.name if worst else "",
+            excess=worst.measured(violation, z) if worst else "",
+            status="",
+            iterations=0,
+        )
+
+    def start_at(self, z: FloatArray, start: Start, quality: float) -> Start:
+        """Return unknowns as a start; rotations of stations that are not unknown stay as they were."""
+        end = len(UNKNOWNS) + pivot_size(self.pivot)
+        rotation = None if self.normal.timed else start.rotation
+        if not self.normal.timed and len(self.knots) == self.normal.n:
+            rotation = z[end : end + self.normal.n]
+        return Start(
+            q=z[: len(UNKNOWNS)],
+            branch=start.branch,
+            pivot=z[len(UNKNOWNS) : end],
+            rotation=rotation,
+            quality=quality,
+            linkage=start.linkage,
+        )
+
+    def kept(self, start: Start) -> Answer:
+        """Judge a start as it is: whether it keeps every constraint and bound, and how far it is from that."""
+        places = self.extremes(start)
+        ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
+        best: Answer | None = None
+        for way in ways:
+            z, parameters = self.at(start, pieces=way, places=places, share=1.0)
+            answer = self.judged(z, parameters, start)
+            if best is None or answer.violation < best.violation:
+                best = answer
+        assert best is not None
+        pivot = float(np.abs(best.start.pivot - start.pivot).max(initial=0.0))
+        within = max(outside(self.normal, self.low, self.high, start), pivot) <= KEPT
+        return replace(best, feasible=best.feasible and within)
+
+    def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
+        """Solve again and again with the bounds of the pivot's motion held at its extremes, until these stay where they are."""
+        if not (self._peaks or self._along):
+            return answer
+        first = self.kept(answer.start) if self._along else answer
+        least = first if self.objective in SOUGHT else answer
+
+        def better(found: Answer) -> Answer:
+            return found if not first.feasible or found.start.quality <= least.start.quality else answer
+
+        now = answer
+        for _ in range(ROUNDS):
+            following = solve(now.start, self.extremes(now.start))
+            if not following.feasible:
+                return replace(answer, feasible=first.feasible)
+            now, before = following, now
+            kept = self.kept(now.start)
+            if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max(initial=0.0) <= KEPT:
+                return better(now)
+        return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
+
+    def extremes(self, start: Start) -> list[FloatArray]:
+        """Find the extremes of the pivot's motion or of its derivatives: the angles of the roots of the next derivative.
+
+        Then where what holds along the crank's rotation has its greatest values.
+        """
+        if not self._peaks:
+            return self._greatest(start)
+        harmonics = np.arange(1, self.pivot.harmonics + 1) if self.pivot else np.empty(0)
+        waves = 0.5 * (start.pivot[2::2] - 1j * start.pivot[3::2])
+        found = []
+        for order, *_ in self._peaks:
+            half = (1j * harmonics) ** (order + 1) * waves
+            roots = np.roots(np.concatenate([half[::-1], [0.0], half.conj()]))
+            places = np.zeros(2 * len(harmonics))
+            places[: len(roots)] = np.angle(roots)
+            found.append(places)
+        return found + self._greatest(start)
+
+    def _greatest(self, start: Start) -> list[FloatArray]:
+        """Find the rotations at which each function along the rotation has its greatest values; see `find_peaks`."""
+        values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
+        p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
+        return [find_peaks(along, p, FURTHER) for along, _ in self._along]
+
+
+def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
+    """Return rows r with r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4); zero rows ask nothing.
+
+    Of a triple-rocker, whose links are not convex in their lengths, the shortest and the longest stay what they are.
+    """
+    rows = np.zeros((6, 4))
+    if type_ is None:
+        return rows
+    if type_ not in BY_SHORTEST:
+        order = np.argsort(links)
+        s, a, b, longest = (int(k) for k in order)
+        rows[0, [a, b]], rows[0, [s, longest]] = 1.0, -1.0
+        for k, other in enumerate((a, b)):
+            rows[1 + k, s], rows[1 + k, other] = 1.0, -1.0
+            rows[3 + k, other], rows[3 + k, longest] = 1.0, -1.0
+        return rows
+    shortest = BY_SHORTEST.index(type_)
+    others = [k for k in range(4) if k != shortest]
+    for k, other in enumerate(others):
+        rows[k, shortest], rows[k, other] = 1.0, -1.0
+        rows[3 + k] = [-1.0 if j != shortest and j != other else 1.0 for j in range(4)]
+    return rows

@@ -1,0 +1,424 @@
+"""The last step of a path whose timing is free: the measure between the whole curves itself is made small.
+
+Stations that are fitted in their order cannot cut a corner, and their squares are no area. Here the curve is the polygon by
+which it is judged, and the measure that of `areas`: the area of the symmetric difference, the strip along an open path, or the
+Hausdorff distance. The first two have a continuous gradient, which follows from the polygons and the exact derivatives of the
+coupler point; the last is the least bound of many distances. SciPy's SLSQP goes down from an optimum of the squares, in
+coordinates of which each moves the curve by as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import copysign, inf, pi
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression, minimize
+
+from ..linkage.kernels import nearest, symmetric_difference
+from ..result.solution import CURVE
+from ..task.constraint import UNKNOWNS
+from ..task.target import TargetPath, hausdorff, ring
+from .program import Program
+from .start import Answer, Start
+
+FloatArray = NDArray[np.float64]
+Made = TypeVar("Made")
+#: Iterations of SLSQP, and the change of the measure, as a share of what it was at first, at which it ends.
+ITERATIONS, CHANGE = 100, 1e-7
+#: Share of the greatest mean square displacement of the curve by a unit of a direction; stiffer ones are not stretched further.
+STIFF = 1e-6
+#: Pieces of the target, at least, along which distances are taken.
+PIECES = 360
+#: Of the greatest distance: every so many of all are held first, then those that are at least this share of it.
+STRIDE, GREAT = 3, 0.5
+#: Way of the first station from where it was, and rotation by which successive stations are kept apart (rad).
+WINDOW, APART = 0.6, 1e-10
+#: Share of the bound of the greatest distance by which it may be exceeded: its places on the curve change from step to step.
+WITHIN = 1e-5
+#: Where the crank begins to turn says nothing of a closed curve.
+PHASE = UNKNOWNS.index("crank_phase")
+
+
+class Near(NamedTuple):
+    """Distances between points of curve and target, and what the curve's own points do to them.
+
+    Attributes
+    ----------
+    distance : ndarray, shape (k,)
+    before, after : ndarray of int, shape (k,)
+        Of the curve's points that it depends on.
+    early, late : ndarray, shape (2, k)
+        Its derivatives with respect to their coordinates.
+    """
+
+    distance: FloatArray
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+    early: FloatArray
+    late: FloatArray
+
+
+class Refinement:
+    """The measure of a path, and the way down on it, of a program with the objective "curve"."""
+
+    def __init__(self, program: Program) -> None:
+        self.program, normal = program, program.normal
+        self.normal = normal
+        assert normal.outline is not None
+        #: Bound of the greatest distance, where what the program makes small is something else.
+        self.limit = program.least.error if program.objective == "least curve" else None
+        self._target = TargetPath(points=_rows(normal.outline).T, closed=normal.closed)
+        self._shares = np.linspace(0.0, 1.0, CURVE, endpoint=not normal.closed)
+        self._trace = program.trace.map(CURVE)
+        weights = normal.outline_weights
+        even = bool((weights == weights[0]).all())
+        self._scale = float(weights[0]) if even else 1.0
+        self._by_area = normal.closed and even
+        self._outline = _rows(normal.outline)
+        self._line, self._weights = divided(normal.outline, weights / self._scale, normal.closed)
+        self.free = np.nonzero(program.high > program.low)[0]
+        if normal.closed and program.pivot is None:
+            self.free = self.free[self.free != PHASE]
+        if self.limit is not None:
+            self.free = self.free[self.free != program.own]
+
+    # The measure
+
+    def traced(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the curve's points, shape (2, n), and their derivatives with respect to the unknowns, shape (2, n, k)."""
+        place, slopes = self._trace(z, parameters, self._shares)
+        return np.ascontiguousarray(place), np.asarray(slopes).reshape(2, CURVE, len(z))
+
+    def measure(self, curve: FloatArray) -> float:
+        """Return the area (units squared) or the Hausdorff distance (units) between curve and target."""
+        if not np.isfinite(curve).all():
+            return inf
+        if self.normal.quality == "worst":
+            return float(max(near.distance.max() for near in self.apart(curve)))
+        return self.area(curve)[0]
+
+    def area(self, curve: FloatArray) -> tuple[float, FloatArray]:
+        """Return the area between curve and target (units squared), and its gradient with respect to the curve's points."""
+        gradient = np.zeros_like(curve)
+        if self._by_area:
+            area = symmetric_difference(curve, self._outline, gradient)
+            return self._scale * area, self._scale * gradient
+        closed = self.normal.closed
+        steps = np.diff(ring(curve.T, closed), axis=0).T
+        lengths = np.maximum(np.hypot(*steps), 1e-300)
+        missed, away = self.apart(curve)
+        w = self._weights * np.hypot(*np.diff(ring(self._line.T, closed), axis=0).T)
+        v = self._weights[_nearest(_middles(curve, closed), self._line, closed)[1]]
+        for near, weight in ((missed, w), (away, v * lengths)):
+            np.add.at(gradient.T, near.before, (weight * near.early).T)
+            np.add.at(gradient.T, near.after, (weight * near.late).T)
+        # a longer piece counts for more
+        pull = (v * away.distance * steps / lengths).T
+        np.add.at(gradient.T, away.after, pull)
+        np.add.at(gradient.T, away.before, -pull)
+        total = float(w @ missed.distance + (v * lengths) @ away.distance)
+        return 0.5 * self._scale * total, 0.5 * self._scale * gradient
+
+    def apart(self, curve: FloatArray) -> tuple[Near, Near]:
+        """Compute the distances of the target's pieces from the curve, and of the curve's from the target, at their middles."""
+        closed, n = self.normal.closed, curve.shape[1]
+        middles = _middles(self._line, closed)
+        if self.normal.quality == "worst":
+            # the corners are farthest off
+            middles = np.hstack([self._outline, middles])
+        distance, before, share, foot = _nearest(middles, curve, closed)
+        along = (foot - middles) / np.maximum(distance, 1e-300)
+        missed = Near(distance, before, (before + 1) % n, (1.0 - share) * along, share * along)
+        middles = _middles(curve, closed)
+        distance, _, _, foot = _nearest(middles, self._line, closed)
+        half = 0.5 * (middles - foot) / np.maximum(distance, 1e-300)
+        before = np.arange(len(distance))
+        return missed, Near(distance, before, (before + 1) % n, half, half)
+
+    # The way down
+
+    def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
+        """Return the objective: the measure, or within its bound the program's own objective."""
+        if self.limit is None:
+            return self.measure(curve)
+        return self.program.stated(z, parameters)[0] if self.over(curve) <= WITHIN * self.limit else inf
+
+    def over(self, curve: FloatArray) -> float:
+        """Return how far the greatest distance, by which a path is judged, exceeds its bound (units)."""
+        if self.limit is None or not np.isfinite(curve).all():
+            return inf
+        return hausdorff(curve.T, self._target, closed=self.normal.closed) - self.limit
+
+    def refined(
+        self,
+        answer: Answer,
+        *,
+        iterations: int = ITERATIONS,
+        places: Sequence[FloatArray] | None = None,
+        size: float = 1.0,
+    ) -> Answer:
+        """Minimise the measure near an answer; return the answer itself where nothing better keeps the constraints."""
+        program = self.program
+        z0, parameters = program.at(answer.start, places=places, size=size)
+        curve, slopes = self.traced(z0, parameters)
+        first = self.value(z0, parameters, curve)
+        if not (np.isfinite(self.measure(curve)) and np.isfinite(slopes).all()):
+            return replace(answer, feasible=False)
+        as_it_is = program.judged(z0, parameters, answer.start)
+        best = [(first if as_it_is.feasible else inf, z0)]
+
+        def seen(z: FloatArray) -> None:
+            value = self.value(z, parameters, down.curve(z)[0])
+            if value < best[0][0] and program.judged(z, parameters, answer.start).feasible:
+                best[0] = (value, z)
+
+        for some in self._rounds():
+            z = best[0][1]
+            curve, slopes = self.traced(z, parameters)
+            scale = max(self.measure(curve), 1e-9)
+            if self.limit is not None:
+                # a path is judged at other places of the curves
+                scale *= self.limit / (self.limit + self.over(curve))
+            down = _Descent(self, z, parameters, self._stretched(curve, slopes), scale, some(curve))
+            found = minimize(
+                down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
+                callback=lambda y, down=down: seen(down.unknowns(y)),
+                options={"maxiter": iterations, "ftol": CHANGE},
+            )  # fmt: skip
+            seen(down.unknowns(found.x))
+        value, z = best[0]
+        if not np.isfinite(value):
+            more = {} if self.limit is None or not as_it_is.feasible else program.excess(self.over(curve))
+            return replace(as_it_is, feasible=False, start=replace(answer.start, quality=first), **more)
+        ended = program.judged(z, parameters, answer.start)
+        quality = value if self.limit is None else ended.start.quality
+        start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=quality)
+        return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
+
+    def _rounds(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
+        """Choose the distances that are held within the greatest: a few all along, then all that are nearly as great."""
+        if self.normal.quality != "worst":
+            return (lambda _: (),)
+
+        def great(curve: FloatArray) -> Sequence[Any]:
+            both = self.apart(curve)
+            most = max(float(near.distance.max()) for near in both)
+            return [np.nonzero(near.distance >= GREAT * most)[0] for near in both]
+
+        def few(curve: FloatArray) -> Sequence[Any]:
+            corners = self._outline.shape[1]
+            missed, away = (np.arange(len(near.distance)) for near in self.apart(curve))
+            return np.concatenate([missed[:corners], missed[corners::STRIDE]]), away[::STRIDE]
+
+        return few, great, great
+
+    def _stretched(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return directions of the unknowns that each move the curve by one, root mean square across it; shape (k, free)."""
+        tangent = np.roll(curve, -1, axis=1) - np.roll(curve, 1, axis=1)
+        normal = np.array([-tangent[1], tangent[0]]) / np.maximum(np.hypot(*tangent), 1e-300)
+        across = (slopes * normal[:, :, None]).sum(axis=0)[:, self.free]
+        size, directions = np.linalg.eigh(np.einsum("ni,nj->ij", across, across) / CURVE)
+        stretch = np.zeros((slopes.shape[2], len(self.free)))
+        # of a point that nothing moves, such as the crank pin, all directions are as good
+        stretch[self.free] = directions / np.sqrt(np.maximum(size, 0.0) + STIFF * (size.max() or 1.0))
+        return stretch
+
+    def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:
+        """Find the rotations at which the curve comes nearest to the stations in their order, by dynamic programming."""
+        normal, program = self.normal, self.program
+        assert normal.points is not None
+        assert start.rotation is not None
+        rotation, forward = program.stations(z, parameters), copysign(1.0, start.rotation[-1] - start.rotation[0])
+        if normal.straight is not None:
+            return rotation
+        curve = self.traced(z, parameters)[0].T @ np.array([1.0, 1j])
+        turn = self._shares * 2.0 * pi
+        if normal.closed:
+            # from where the first station is met, all the way round
+            off = np.abs(np.angle(np.exp(1j * (turn - start.rotation[0]))))
+            first = int(np.argmin(np.where(off <= WINDOW, np.abs(curve - normal.points[0]), inf)))
+            order = (first + int(forward) * np.arange(CURVE)) % CURVE
+            curve, at = curve[order], turn[first] + forward * turn
+        else:
+            at = rotation[0] + (rotation[-1] - rotation[0]) * self._shares
+        cost = np.abs(normal.points[:, None] - curve) ** 2
+        total, back = np.where(np.arange(CURVE) == 0, cost[0], inf), np.zeros(cost.shape, dtype=int)
+        for k in range(1, normal.n):
+            least = np.minimum.accumulate(total)
+            back[k] = np.maximum.accumulate(np.where(total == least, np.arange(CURVE), 0))
+            total = cost[k] + least
+        place = np.empty(normal.n, dtype=int)
+        place[-1] = int(total.argmin()) if normal.closed else CURVE - 1
+        for k in range(normal.n - 1, 0, -1):
+            place[k - 1] = back[k, place[k]]
+        # between the points of the curve: where the chord about each comes nearest
+        before, after = np.maximum(place - 1, 0), np.minimum(place + 1, CURVE - 1)
+        chord = curve[after] - curve[before]
+        share = ((normal.points - curve[before]) * chord.conj()).real / np.maximum(np.abs(chord) ** 2, 1e-300)
+        met = forward * (at[before] + np.clip(share, 0.0, 1.0) * (at[after] - at[before]))
+        met[[0, -1]] = forward * at[place[[0, -1]]]
+        inner = np.clip(isotonic_regression(met).x, met[0], met[-1])
+        ordered: FloatArray = forward * (inner + APART * np.arange(normal.n))
+        return ordered
+
+
+class _Descent:
+    """The measure as SLSQP takes it: over directions of the unknowns, in shares of what it was; of a bound of all distances
+    the bound besides.
+    """
+
+    def __init__(
+        self,
+        refinement: Refinement,
+        z0: FloatArray,
+        parameters: FloatArray,
+        stretch: FloatArray,
+        size: float,
+        some: Sequence[Any],
+    ) -> None:
+        self._of, self._program = refinement, refinement.program
+        self._z0, self._stretch, self._size = z0, size * stretch, size
+        if refinement.limit is not None:
+            # what is made small is a direction of its own
+            self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.own]])
+        self._some = some
+        self._held = refinement.normal.quality == "worst"
+        self._bound = self._held and refinement.limit is None
+        # each is asked for again with the same unknowns, by the measure and by the constraints
+        self.curve = _remembered(lambda z: refinement.traced(z, parameters))
+        self._stated = _remembered(lambda z: refinement.program.stated(z, parameters))
+        self._steep = _remembered(lambda z: refinement.program.slopes_at(z, parameters))
+
+    def begin(self) -> FloatArray:
+        y = np.zeros(self._stretch.shape[1] + self._bound)
+        y[self._stretch.shape[1] :] = 1.0
+        return y
+
+    def unknowns(self, y: FloatArray) -> FloatArray:
+        """Return the program's unknowns, within their bounds to the last digit."""
+        z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
+        return np.clip(z, self._program.low, self._program.high)
+
+    def value(self, y: FloatArray) -> tuple[float, FloatArray]:
+        """Return the measure and the program's own terms, with the gradient; far more where the links cannot be joined."""
+        if self._bound:
+            return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
+        z = self.unknowns(y)
+        curve, slopes = self.curve(z)
+        if not (np.isfinite(curve).all() and np.isfinite(slopes).all()):
+            return 1e3, np.zeros(len(y))
+        added, _ = self._stated(z)
+        if self._of.limit is not None:
+            return added, self._steep(z)[0] @ self._stretch
+        area, gradient = self._of.area(curve)
+        whole = np.einsum("an,ank->k", gradient, slopes) + self._steep(z)[0]
+        return (area + added) / self._size, whole @ self._stretch / self._size
+
+    def _near(self, z: FloatArray) -> list[tuple[Near, Any]]:
+        """Return the distances, and which of them are held within the bound."""
+        return list(zip(self._of.apart(self.curve(z)[0]), self._some))
+
+    def constraints(self) -> list[dict[str, Any]]:
+        """Return the constraints of the program, its bounds, and the bound of the distances."""
+        program = self._program
+        low, high = program.g_low, program.g_high
+        equal = low == high
+        above, below = np.isfinite(low) & ~equal, np.isfinite(high) & ~equal
+        free = self._of.free
+        lower, upper = free[np.isfinite(program.low[free])], free[np.isfinite(program.high[free])]
+        width = len(self.begin())
+
+        def padded(rows: FloatArray) -> FloatArray:
+            wide: FloatArray = np.pad(rows @ self._stretch, ((0, 0), (0, width - self._stretch.shape[1])))
+            return wide
+
+        def values(y: FloatArray) -> FloatArray:
+            z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
+            g = self._stated(z)[1]
+            parts = [(g - low)[above], (high - g)[below], (z - program.low)[lower], (program.high - z)[upper]]
+            if self._held:
+                # without a bound of its own among the unknowns the distances are within the size
+                bound = y[-1] if self._bound else 1.0
+                parts += [bound - near.distance[k] / self._size for near, k in self._near(z)]
+            kept: FloatArray = np.nan_to_num(np.concatenate(parts), nan=-1e3, neginf=-1e3)
+            return kept
+
+        def slopes(y: FloatArray) -> FloatArray:
+            z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
+            j = self._steep(z)[1]
+            eye = np.eye(len(z))
+            rows = padded(np.vstack([j[above], -j[below], eye[lower], -eye[upper]]))
+            if not self._held:
+                return rows
+            jacobian = self.curve(z)[1]
+            parts = []
+            for near, k in self._near(z):
+                grown = np.einsum("ak,akz->kz", near.early[:, k], jacobian[:, near.before[k]])
+                grown += np.einsum("ak,akz->kz", near.late[:, k], jacobian[:, near.after[k]])
+                part = padded(-grown / self._size)
+                part[:, -1] = 1.0 if self._bound else part[:, -1]
+                parts.append(part)
+            every: FloatArray = np.nan_to_num(np.vstack([rows, *parts]))
+            return every
+
+        found = [{"type": "ineq", "fun": values, "jac": slopes}]
+        if equal.any():
+            found.append(
+                {
+                    "type": "eq",
+                    "fun": lambda y: (self._stated(self.unknowns(y))[1] - low)[equal],
+                    "jac": lambda y: padded(self._steep(self.unknowns(y))[1][equal]),
+                }
+            )
+        return found
+
+
+def _remembered(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
+    """Keep the last value of a function for another call with the same unknowns."""
+    last: list[tuple[bytes, Made]] = []
+
+    def called(z: FloatArray) -> Made:
+        key = z.tobytes()
+        if not last or last[0][0] != key:
+            last[:] = [(key, function(z))]
+        return last[0][1]
+
+    return called
+
+
+def _rows(points: NDArray[np.complex128]) -> FloatArray:
+    return np.ascontiguousarray([points.real, points.imag])
+
+
+def _middles(line: FloatArray, closed: bool) -> FloatArray:
+    """Return the middles of the pieces of a polyline, rows x, y."""
+    both = 0.5 * (line + np.roll(line, -1, axis=1))
+    return np.ascontiguousarray(both if closed else both[:, :-1])
+
+
+def _nearest(
+    points: FloatArray, line: FloatArray, closed: bool
+) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
+    """Return the distance of each point from a polyline, the nearest piece, the share of it, and the place."""
+    count = points.shape[1]
+    distance, piece, share = np.empty(count), np.empty(count, dtype=np.int64), np.empty(count)
+    nearest(points, line, closed, distance, piece, share)
+    foot = (1.0 - share) * line[:, piece] + share * line[:, (piece + 1) % line.shape[1]]
+    return distance, piece, share, foot
+
+
+def divided(outline: NDArray[np.complex128], weights: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Cut the pieces of an outline into short ones, rows x, y; return the weight of each too."""
+    points = np.append(outline, outline[0]) if closed else outline
+    around = np.append(weights, weights[0]) if closed else weights
+    lengths = np.abs(np.diff(points))
+    counts = np.maximum(1, np.ceil(PIECES * lengths / lengths.sum())).astype(int)
+    begin = np.concatenate([k + np.arange(count) / count for k, count in enumerate(counts)])
+    where = np.arange(len(points))
+    middles = begin + 0.5 / np.repeat(counts, counts)
+    ends = begin if closed else np.append(begin, len(lengths))
+    return _rows(np.interp(ends, where, points)), np.interp(middles, where, around)

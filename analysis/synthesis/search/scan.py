@@ -1,0 +1,616 @@
+"""The global scan: many thousand linkages, each placed as well as it can be in closed form.
+
+Variable projection: with the shape of the linkage (its links as shares of the ground link, of a slider-crank of the coupler, of
+a geared five-bar the second crank and its phase as well) and the crank's phase given, the
+coupler point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: place, size and direction, and the
+coupler point. What is left is searched by a Sobol sequence, which a seed scrambles.
+
+- Timed tasks: shape and phase are searched.
+- Few untimed stations: their crank rotations as well, in order.
+- Untimed paths: shape and coupler point are searched; each coupler curve is laid over the target by the best similarity, at
+  even arc length, over all starting points (by a fast Fourier transform of their correlation), or all pieces of it for an open
+  path.
+- Rocker functions: shape and phase; the mounting angle is the mean of what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import cos, degrees, inf, log, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from ...run import shown
+from ..linkage.kernels import many_directions, match_windows
+from ..linkage.kind import Kind
+from ..linkage.linkage import BY_SHORTEST, Linkage, SliderCrank
+from ..task.constraint import TURNING, InfeasibleError
+from ..task.limits import Limits
+from ..task.task import Normal
+from .start import Start, apart
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: Ranges of l2/l1, l3/l1, l4/l1 that are searched, evenly in the logarithm.
+SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
+#: Of a slider-crank of l1/l3 and l2/l3; of l5/l1, of a second crank; crank rotations at which a five-bar is looked at.
+GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
+#: Candidates in one piece of work.
+CHUNK = 4096
+#: One of so many coupler curves is that of the crank pin.
+PINNED = 64
+#: Of a chunk of coupler curves, how many are placed over the target: the most alike.
+PLACED = 160
+#: Steps of a coupler curve and points of it at even arc length.
+CURVE, EVEN = 128, 64
+#: Pieces of a coupler curve that an open target is laid over: points at even arc length, first steps, lengths in steps.
+PIECE = 24
+STARTS = np.arange(0, CURVE, 8)
+SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])
+#: Starts that differ by less than this in the logarithms of their shape and in phase count as one.
+APART = 0.08
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidates:
+    """Rows of candidates: quality (m,), finite where placed, eleven unknowns (m, 11), rotations (m, n) or None, their branch.
+
+    With a second crank its length and phase, ``pivot`` (m, 2).
+    """
+
+    quality: FloatArray
+    q: FloatArray
+    rotation: FloatArray | None
+    branch: int
+    pivot: FloatArray | None = None
+
+
+class _FourBarShapes:
+    """The shapes of four-bars: which ratios of links are drawn, and which of them a constraint allows.
+
+    ``base`` is the unknown that the ``others`` are ratios to, within ``ranges``.
+    """
+
+    base, others, ranges = 2, slice(3, 6), SHAPES
+
+    @staticmethod
+    def links(shapes: FloatArray, limits: Limits) -> FloatArray:
+        """Return rows (l1, l2, l3, l4, l5)."""
+        return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.zeros(len(shapes))])
+
+    @staticmethod
+    def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+        """Return which shapes keep the transmission angle over a turn."""
+        l1, l2, l3, l4, _ = links.T
+        ends = (l1 - l2) ** 2, (l1 + l2) ** 2
+        excess = limits.linkage.transmission_excess(l3, l4, *ends, cos(max(least, TURNING)))
+        kept: NDArray[np.bool_] = np.all([one <= 0.0 for one in excess], axis=0)
+        return kept
+
+    @staticmethod
+    def shares(start: Start) -> FloatArray:
+        """Return the ratios by which starts are told apart."""
+        ratios: FloatArray = start.q[3:6] / start.q[2]
+        return ratios
+
+
+class _SliderCrankShapes(_FourBarShapes):
+    """The shapes of slider-cranks: offset and crank as shares of the coupler."""
+
+    base, others, ranges = 4, slice(2, 5), (*GUIDED, (1.0, 1.0))
+
+    @staticmethod
+    def links(shapes: FloatArray, limits: Limits) -> FloatArray:
+        one, none = np.ones(len(shapes)), np.zeros(len(shapes))
+        offset = shapes[:, 0] if limits.high[2] > 0.0 else none
+        return np.column_stack([offset, shapes[:, 1], one, none, none])
+
+    @staticmethod
+    def shares(start: Start) -> FloatArray:
+        return np.array([start.q[3] / start.q[4], 1.0 + start.q[2] / start.q[4]])
+
+
+class _FiveBarShapes(_FourBarShapes):
+    """The shapes of geared five-bars: those of a four-bar, and the second crank's length and phase."""
+
+    @staticmethod
+    def links(shapes: FloatArray, limits: Limits) -> FloatArray:
+        low, high = np.log(SECOND)
+        return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.exp(low + (high - low) * shapes[:, 6])])
+
+    @staticmethod
+    def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+        return _turning(shapes, links, limits, least)
+
+
+_SHAPES: Mapping[Kind, type[_FourBarShapes]] = {
+    "four-bar": _FourBarShapes,
+    "slider-crank": _SliderCrankShapes,
+    "geared-five-bar": _FiveBarShapes,
+}
+
+
+def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
+    """Find the best starts of both assemblies, none near another, best first.
+
+    Parameters
+    ----------
+    candidates : int
+        Shapes that are tried, those that are not allowed left out.
+    starts : int
+        How many are kept.
+
+    Raises
+    ------
+    InfeasibleError
+        If no shape at all is allowed.
+    """
+    found: list[Candidates] = []
+    placed = 0
+    with shown(False, float(candidates), f"trying {candidates:,} shapes") as show:
+        for number, branch in enumerate(limits.branches):
+            chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
+            if normal.outline is not None:
+                chunks = _filled(chunks)
+            for chunk, shapes in enumerate(chunks):
+                show(float(placed))
+                found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
+                placed += len(shapes)
+    if not found:
+        raise InfeasibleError(f"no shape of {limits.linkage.kind} {_why(limits, seed)}")
+    return _apart(found, starts, limits)
+
+
+def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
+    """Yield allowed shapes with the other searched numbers in [0, 1), in chunks.
+
+    Rows of (l2/l1, l3/l1, l4/l1), of a slider-crank (l1/l3, l2/l3, 1), and six numbers.
+    """
+    sequence = qmc.Sobol(9, seed=seed)
+    kept, tried = 0, 0
+    while kept < count and tried < 64 * count:
+        unit = sequence.random(CHUNK)
+        tried += CHUNK
+        shapes = _stretched(unit, limits)
+        shapes = shapes[_allowed(shapes, limits)][: count - kept]
+        kept += len(shapes)
+        if len(shapes):
+            yield shapes
+
+
+def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
+    """Yield the same rows, about `CHUNK` at a time: of each chunk only the best are placed."""
+    rows: list[FloatArray] = []
+    for chunk in chunks:
+        rows.append(chunk)
+        if sum(map(len, rows)) >= CHUNK:
+            yield np.vstack(rows)
+            rows = []
+    if rows:
+        yield np.vstack(rows)
+
+
+def _why(limits: Limits, seed: int) -> str:
+    """Say which of the limits leaves no shape, by itself or only with the others."""
+    free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
+    alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
+    if limits.turn is not None:
+        angle = f"has a transmission angle of {degrees(limits.turn):g} deg over a full turn"
+        alone[angle if limits.turn else "has a crank that turns fully"] = replace(free, grashof=None)
+    if limits.grashof is not None:
+        alone[f"is a {limits.grashof}"] = replace(free, turn=None)
+    unit = qmc.Sobol(9, seed=seed).random(CHUNK)
+    for words, one in alone.items():
+        if not _allowed(_stretched(unit, one), one).any():
+            return words
+    return " and ".join(alone)
+
+
+def _stretched(unit: FloatArray, limits: Limits) -> FloatArray:
+    """Return the rows of `_shapes`, from numbers in [0, 1)."""
+    low, high = np.log(_ratios(limits)).T
+    return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
+
+
+def _ratios(limits: Limits) -> FloatArray:
+    """Return the least and greatest ratios of `_shapes`, shape (3, 2), within the bounds of the links."""
+    own = _SHAPES[limits.linkage.kind]
+    base, of = own.base, own.others
+    given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
+    ranges = np.array(own.ranges)
+    both = np.column_stack([np.maximum(given[:, 0], ranges[:, 0]), np.minimum(given[:, 1], ranges[:, 1])])
+    # an offset may be none
+    return np.maximum(np.where(both[:, :1] <= both[:, 1:], both, given), 1e-12)
+
+
+def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
+    """Return the rows (l1, l2, l3, l4, l5) of shapes, l4 = 0 without a rocker, l5 = 0 without a second crank."""
+    return _SHAPES[limits.linkage.kind].links(shapes, limits)
+
+
+def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
+    """Return which shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
+    sized = _links(shapes, limits)
+    links = sized[:, :4]
+    allowed = np.ones(len(shapes), dtype=bool)
+    if limits.turn is not None:
+        allowed = _SHAPES[limits.linkage.kind].turning(shapes, sized, limits, limits.turn)
+    if limits.grashof is not None:
+        order = np.sort(links, axis=1)
+        excess = order[:, 0] + order[:, 3] - order[:, 1] - order[:, 2]
+        if limits.grashof == "triple-rocker":
+            allowed &= excess > 0.0
+        else:
+            shortest = BY_SHORTEST.index(limits.grashof)
+            allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
+    least, most = _sizes(sized, limits)
+    # links that are fixed leave one size but for rounding
+    return allowed & (least <= most * (1.0 + 1e-9))
+
+
+def _turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+    """Return which geared five-bars keep the transmission angle at `AROUND` rotations; few come to the last ones."""
+    turned = limits.gears
+    allowed = np.ones(len(shapes), dtype=bool)
+    for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
+        rows = np.flatnonzero(allowed)
+        l1, l2, l3, l4, l5 = links[rows].T
+        phi = 2.0 * pi * np.arange(begin, AROUND, step)[:, None] / AROUND
+        second = np.exp(1j * _second(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
+        off = l1 + second - l2 * np.exp(1j * turned[0] * phi)
+        d2 = off.real**2 + off.imag**2
+        for excess in Linkage.transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
+            allowed[rows] &= excess <= 0.0
+    return allowed
+
+
+def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
+    """Return the phase of the second crank, such that the curve does not depend on the first one's."""
+    turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
+    return turned
+
+
+def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest factors of links with which every one keeps its bounds."""
+    second = limits.second or (0.0, inf)
+    there = links > 0.0
+    low, high = (
+        np.append(ends[2:6], end) / np.where(there, links, 1.0) for ends, end in zip((limits.low, limits.high), second)
+    )
+    return np.where(there, low, 0.0).max(axis=1), np.where(there, high, inf).min(axis=1)
+
+
+def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator) -> Candidates:
+    if normal.of_rocker:
+        found = _functions(normal, limits, shapes, branch)
+    elif normal.of_slider:
+        found = _slides(normal, limits, shapes, branch)
+    elif normal.timed or normal.angle is not None or normal.exact:
+        found = _timed(normal, limits, shapes, branch, None if normal.timed else random)
+    else:
+        found = _paths(normal, limits, shapes, branch)
+    if limits.second is None:
+        return found
+    links = _links(shapes, limits)
+    second = links[:, 4] * found.q[:, 4] / links[:, 2]
+    return replace(found, pivot=np.column_stack([second, _second(shapes, found.q[:, 8], limits)]))
+
+
+def _directions(
+    shapes: FloatArray,
+    phase: FloatArray,
+    rotation: FloatArray,
+    branch: int,
+    limits: Limits,
+    turned: FloatArray | float = 0.0,
+) -> tuple[ComplexArray, ComplexArray]:
+    """Compute the directions of coupler and rocker of shapes at crank rotations, after a rotation of each shape's own."""
+    first, second = limits.gears
+    links = _links(shapes, limits)
+    phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
+    rows = np.column_stack([links[:, :4], *phases])
+    coupler = np.empty((len(shapes), len(rotation)), dtype=complex)
+    rocker = np.empty_like(coupler)
+    waves = [wave(turns * rotation) for turns in (first, second) for wave in (np.cos, np.sin)]
+    many_directions(*waves, np.ascontiguousarray(rows), float(branch), coupler, rocker)
+    return coupler, rocker
+
+
+def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+    """Place rocker functions: the phase is searched, the mounting angle follows."""
+    assert normal.rotation is not None
+    assert normal.angle is not None
+    phase = 2.0 * pi * shapes[:, 3]
+    _, rocker = _directions(shapes, phase, normal.rotation, branch, limits)
+    left: ComplexArray = np.exp(1j * normal.angle) * rocker.conj()
+    offset = np.zeros(len(shapes))
+    if normal.mounting:
+        offset = np.angle((normal.weights * left).sum(axis=1))
+        left *= np.exp(-1j * offset)[:, None]
+    quality = (normal.weights * np.angle(left) ** 2).sum(axis=1)
+    links = _links(shapes, limits)
+    least, most = _sizes(links, limits)
+    size = np.sqrt(np.maximum(least, 1e-12) * most)
+    q = np.zeros((len(shapes), 11))
+    q[:, 2:6] = size[:, None] * links[:, :4]
+    q[:, 8], q[:, 10] = phase, offset
+    return Candidates(quality=quality, q=q, rotation=None, branch=branch)
+
+
+def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+    """Place slider functions: shape and phase are searched; size and place of the shaft follow."""
+    assert normal.rotation is not None
+    assert normal.points is not None
+    phase = 2.0 * pi * shapes[:, 3]
+    links, w, x = _links(shapes, limits), normal.weights, normal.points.real
+    coupler, _ = _directions(shapes, phase, normal.rotation, branch, limits)
+    travelled = links[:, 1:2] * np.sin(phase[:, None] + normal.rotation) + coupler.imag
+    mean, wanted = travelled @ w / w.sum(), float(x @ w / w.sum())
+    off = travelled - mean[:, None]
+    factor = off @ (w * (x - wanted)) / (off**2 @ w)
+    least, most = _sizes(links, limits)
+    size = np.clip(np.abs(factor), least, most)
+    # seen from the shaft the slider's position grows to the left
+    side = -np.sign(factor)
+    quality = (x - wanted + (side * size)[:, None] * off) ** 2 @ w
+    q = np.zeros((len(shapes), 11))
+    q[:, 0] = wanted + side * size * mean
+    q[:, 1] = -normal.origin.imag / normal.unit - side * size * links[:, 0]
+    q[:, 2:6] = size[:, None] * links[:, :4]
+    q[:, 6], q[:, 7], q[:, 8] = size * links[:, 2], 0.5 * pi * side, phase
+    return Candidates(quality=quality, q=q, rotation=None, branch=branch)
+
+
+def _timed(
+    normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator | None
+) -> Candidates:
+    """Place timed paths and motions by variable projection; without given rotations, over random ones in order."""
+    phase = 2.0 * pi * shapes[:, 3]
+    links = _links(shapes, limits)
+    n = normal.n
+    if random is None:
+        assert normal.rotation is not None
+        rotation = np.broadcast_to(normal.rotation, (len(shapes), n))
+        coupler, _ = _directions(shapes, phase, normal.rotation, branch, limits)
+    else:
+        gaps = random.dirichlet(np.ones(n + 1), len(shapes))[:, :n]
+        rotation = 2.0 * pi * np.cumsum(gaps, axis=1) * random.choice([1.0, -1.0], (len(shapes), 1))
+        coupler = np.empty((len(shapes), n), dtype=complex)
+        for k in range(n):
+            coupler[:, k] = _directions(shapes, phase, np.zeros(1), branch, limits, rotation[:, k])[0][:, 0]
+    assert normal.points is not None
+    crank = np.exp(1j * (phase[:, None] + limits.gears[0] * rotation))
+    basis = np.stack([np.ones_like(crank), crank, coupler], axis=1)
+    w, p = normal.weights, normal.points
+    z = _projected(basis, p, w)
+    # the size that the links' bounds allow; the rest follows once more
+    least, most = _sizes(links, limits)
+    size = np.abs(z[:, 1]) / links[:, 1]
+    bounded = np.clip(size, np.maximum(least, 1e-9), most)
+    outside = bounded != size
+    if outside.any():
+        z[outside, 1] *= (bounded / np.maximum(size, 1e-300))[outside]
+        rest = _projected(basis[outside][:, [0, 2]], p - z[outside, 1, None] * basis[outside, 1], w)
+        z[outside, 0], z[outside, 2] = rest[:, 0], rest[:, 1]
+    far = np.abs(z[:, 2]) > limits.high[6]
+    z[far, 2] *= limits.high[6] / np.abs(z[far, 2])
+    error = np.abs(np.einsum("mk,mkn->mn", z, basis) - p) ** 2
+    turn = np.angle(z[:, 1])
+    offset = np.zeros(len(shapes))
+    if normal.angle is not None:
+        left = np.exp(1j * (normal.angle - turn[:, None])) * coupler.conj()
+        offset = np.angle((w * left).sum(axis=1))
+        error = error + (normal.leverage * np.angle(left * np.exp(-1j * offset)[:, None])) ** 2
+    q = np.column_stack(
+        [
+            z[:, 0].real,
+            z[:, 0].imag,
+            bounded[:, None] * links[:, :4],
+            np.abs(z[:, 2]),
+            turn,
+            phase,
+            np.angle(z[:, 2]) - turn,
+            offset,
+        ]
+    )
+    return Candidates(
+        quality=(w * error).sum(axis=1), q=q, rotation=None if random is None else rotation, branch=branch
+    )
+
+
+def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
+    """Solve p = z . basis for every row by weighted least squares; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
+    weighted = basis.conj() * w
+    gram = weighted @ basis.transpose(0, 2, 1)
+    # transposed: gram[a, b] = sum of conj(basis_a) w basis_b
+    gram += 1e-12 * w.sum() * np.eye(basis.shape[1])
+    right = (weighted * (p if p.ndim == 1 else p[:, None, :])).sum(axis=2)
+    bad = ~np.isfinite(gram).all(axis=(1, 2))
+    gram[bad], right[bad] = np.eye(basis.shape[1]), np.nan
+    solved: ComplexArray = np.linalg.solve(gram, right[:, :, None])[:, :, 0].astype(complex)
+    return solved
+
+
+def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+    """Place untimed paths: coupler curves laid over the target by a similarity."""
+    links = _links(shapes, limits)
+    rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
+    coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
+    # the coupler point anywhere about the coupler, evenly in the logarithm of its distance; of some on the crank pin itself,
+    # whose circle no descent comes to: at no distance its direction has no meaning
+    longest = links.max(axis=1)
+    distance = longest * np.exp(np.log(0.1) + np.log(30.0) * shapes[:, 4])
+    distance[: len(shapes) // PINNED] = 0.0
+    point = distance * np.exp(2j * pi * shapes[:, 5])
+    curves = links[:, 1:2] * np.exp(1j * limits.gears[0] * rotation) + point[:, None] * coupler
+    return (_closed_paths if normal.closed else _open_paths)(normal, limits, links, curves, point, branch)
+
+
+def _closed_paths(
+    normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
+) -> Candidates:
+    assert normal.points is not None
+    # a crank that does not turn fully closes no curve
+    broken = np.logical_not(np.isfinite(curves).all(axis=1))
+    curves = np.where(broken.reshape(-1, 1), 1.0 + 0.0j + np.arange(CURVE), curves)
+    target, _ = _even(normal.points[None, :], EVEN)
+    goal = target[0] - target[0].mean()
+    even, turned = _even(curves, EVEN)
+    mean = even.mean(axis=1)
+    even = even - mean[:, None]
+    energy = (np.abs(even) ** 2).sum(axis=1)
+    best = np.full(len(curves), -inf)
+    shift = np.zeros(len(curves), dtype=int)
+    way = np.ones(len(curves))
+    product = np.zeros(len(curves), dtype=complex)
+    spectrum = np.fft.fft(goal)
+    for direction in (1.0, -1.0):
+        run = even if direction > 0.0 else np.roll(even[:, ::-1], 1, axis=1)
+        # sum over k of goal[k] conj(run[k + s]) for every s
+        correlation = np.fft.ifft(np.fft.fft(run).conj() * spectrum)
+        at = np.abs(correlation).argmax(axis=1)
+        value = correlation[np.arange(len(at)), at]
+        better = np.abs(value) > best
+        best = np.where(better, np.abs(value), best)
+        # goal[k] lies over run[k - at]
+        shift = np.where(better, at, shift)
+        way = np.where(better, direction, way)
+        product = np.where(better, value, product)
+    scale = product / energy
+    bounded, scale = _bounded(scale, links, point, limits)
+    misfit = (np.abs(goal) ** 2).sum() - 2.0 * (scale.conj() * product).real + np.abs(scale) ** 2 * energy
+    misfit[broken] = inf
+    place = target[0].mean() - scale * mean
+    # crank rotation of each station: its share of the target's length, from where the target starts on the curve
+    stations = normal.shares * EVEN
+    rotations = np.empty((len(curves), normal.n))
+    chosen = np.argsort(misfit)[:PLACED]
+    chosen = chosen[np.isfinite(misfit[chosen])]
+    for i in chosen:
+        index = way[i] * (stations - shift[i])
+        table = np.append(turned[i], turned[i, 0] + 2.0 * pi)
+        rotations[i] = 2.0 * pi * np.floor(index / EVEN) + np.interp(index % EVEN, np.arange(EVEN + 1), table)
+        rotations[i] -= 2.0 * pi * np.floor(rotations[i, 0] / (2.0 * pi))
+    quality = np.full(len(curves), inf)
+    quality[chosen] = misfit[chosen] * normal.weights.sum() / EVEN
+    q = _vectors(links, bounded, scale, place, point)
+    return Candidates(quality=quality, q=q, rotation=rotations, branch=branch)
+
+
+def _open_paths(
+    normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
+) -> Candidates:
+    assert normal.points is not None
+    k = PIECE
+    shares = normal.shares
+    even = np.interp(np.linspace(0.0, 1.0, k), shares, normal.points.real) + 1j * np.interp(
+        np.linspace(0.0, 1.0, k), shares, normal.points.imag
+    )
+    goal = even - even.mean()
+    best = np.empty((len(curves), 4))
+    # where the links cannot be joined all round, a curve begins after the gap: pieces end before the next
+    gaps = ~np.isfinite(curves)
+    first = np.where(gaps.any(axis=1), CURVE - np.argmax(gaps[:, ::-1], axis=1), 0)
+    curves = np.take_along_axis(curves, (np.arange(CURVE) + first[:, None]) % CURVE, axis=1)
+    match_windows(np.ascontiguousarray(curves), goal, STARTS, SPANS, best)
+    chosen = np.argsort(best[:, 0])[:PLACED]
+    chosen = chosen[np.isfinite(best[chosen, 0])]
+    quality = np.full(len(curves), inf)
+    q = np.zeros((len(curves), 11))
+    rotations = np.zeros((len(curves), normal.n))
+    for i in chosen:
+        start, span, way = int(best[i, 1]), int(best[i, 2]), best[i, 3]
+        part = curves[i, np.arange(start, start + span + 1) % CURVE]
+        length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(part)))]) / np.abs(np.diff(part)).sum()
+        angles = 2.0 * pi * np.arange(start + first[i], start + first[i] + span + 1) / CURVE
+        at = shares if way > 0.0 else 1.0 - shares
+        rotations[i] = np.interp(at, length, angles)
+        piece = np.interp(at, length, part.real) + 1j * np.interp(at, length, part.imag)
+        basis = np.stack([np.ones_like(piece), piece])[None]
+        place, scale = _projected(basis, normal.points, normal.weights)[0]
+        bounded, scales = _bounded(np.array([scale]), links[i : i + 1], point[i : i + 1], limits)
+        if scales[0] != scale:
+            place = (normal.weights * (normal.points - scales[0] * piece)).sum() / normal.weights.sum()
+        quality[i] = (normal.weights * np.abs(place + scales[0] * piece - normal.points) ** 2).sum()
+        q[i] = _vectors(links[i : i + 1], bounded, scales, np.array([place]), point[i : i + 1])[0]
+    return Candidates(quality=quality, q=q, rotation=rotations, branch=branch)
+
+
+def _bounded(
+    scale: ComplexArray, links: FloatArray, point: ComplexArray, limits: Limits
+) -> tuple[FloatArray, ComplexArray]:
+    """Return the sizes and scales within the bounds of links and coupler point."""
+    least, most = _sizes(links, limits)
+    most = np.minimum(most, limits.high[6] / np.maximum(np.abs(point), 1e-300))
+    size = np.abs(scale)
+    bounded = np.clip(size, np.maximum(least, 1e-9), np.maximum(most, np.maximum(least, 1e-9)))
+    return bounded, scale * bounded / np.maximum(size, 1e-300)
+
+
+def _vectors(
+    links: FloatArray, size: FloatArray, scale: ComplexArray, place: ComplexArray, point: ComplexArray
+) -> FloatArray:
+    turn = np.angle(scale)
+    zero = np.zeros(len(links))
+    columns = [
+        place.real,
+        place.imag,
+        size[:, None] * links[:, :4],
+        size * np.abs(point),
+        turn,
+        zero,
+        np.angle(point),
+        zero,
+    ]
+    return np.column_stack(columns)
+
+
+def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
+    """Resample closed curves at even arc length, shape (m, k); return the crank rotation at each of these points too."""
+    m, n = curves.shape
+    ring = np.hstack([curves, curves[:, :1]])
+    length = np.hstack([np.zeros((m, 1)), np.cumsum(np.abs(np.diff(ring, axis=1)), axis=1)])
+    place = length[:, -1:] * np.arange(k) / k
+    # the segment that each place is on: one sorted search for all rows
+    rows = np.arange(m)[:, None]
+    offset = 2.0 * rows
+    shares = length / length[:, -1:]
+    index = np.searchsorted((shares + offset).ravel(), (place / length[:, -1:] + offset).ravel(), side="right") - 1
+    index = np.clip(index.reshape(m, k) - rows * (n + 1), 0, n - 1)
+    step = np.maximum(length[rows, index + 1] - length[rows, index], 1e-300)
+    share = (place - length[rows, index]) / step
+    points = (1.0 - share) * ring[rows, index] + share * ring[rows, index + 1]
+    return points, 2.0 * pi * (index + share) / n
+
+
+def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
+    """Return the best candidates of all, none within `APART` of a better one."""
+    best = [
+        Start(
+            q=c.q[i],
+            branch=c.branch,
+            quality=float(c.quality[i]),
+            linkage=SliderCrank if limits.linkage is SliderCrank else Linkage,
+            rotation=None if c.rotation is None else c.rotation[i],
+            pivot=np.empty(0) if c.pivot is None else c.pivot[i],
+        )
+        for c in found
+        for i in np.argsort(c.quality)[: 20 * starts]
+        if np.isfinite(c.quality[i]) and np.isfinite(c.q[i]).all()
+    ]
+
+    def mark(start: Start) -> FloatArray:
+        begin = start.q[8] if start.rotation is None else start.rotation[0]
+        links = _SHAPES[limits.linkage.kind].shares(start)
+        if start.q[6] == 0.0:
+            # on the crank pin any other links trace the same circle
+            links = np.ones(len(links))
+        second = (
+            [log(start.pivot[0] / start.q[2]), cos(start.pivot[1]), sin(start.pivot[1])] if len(start.pivot) else []
+        )
+        return np.array([*np.log(links), cos(begin), sin(begin), 5.0 * start.branch, *second])
+
+    return apart(sorted(best, key=lambda start: start.quality), mark, APART, starts)

@@ -1,0 +1,595 @@
+"""`synthesize`: from a task to ranked linkages, and the trade-off of its error against size or transmission angle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees, isfinite
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, Interrupted
+
+from ...display import Shown, format_count
+from ...files import write_csv
+from ...units import Amount, in_si
+from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
+from ..linkage.kind import Kind
+from ..linkage.linkage import UNITS, Linkage
+from ..linkage.pivot import PivotUnknown
+from ..result.report import solution_columns
+from ..result.solution import Solution, nearest_rotations, ranked
+from ..task.constraint import (
+    USUAL,
+    Constraint,
+    Demand,
+    InfeasibleError,
+    LargestLink,
+    LeastTransmission,
+    MaxPinForce,
+    Stroke,
+)
+from ..task.limits import GEARS, Limits, as_asked, limits_by_kind, make_limits, usual_kinds
+from ..task.task import Normal, Task, UntimedPath, normal_form, reweighted
+from .polish import Polished, distinct, polish
+from .scan import scan
+from .start import QUICK_SEARCH, USUAL_SEARCH, Answer, Search, Start, make_linkage, make_start, random_pivot
+
+#: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
+STATIONS = 144
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Synthesis(Shown):
+    """Ranked solutions of a task.
+
+    Attributes
+    ----------
+    task : Task
+        With the weights it was solved with.
+    solutions : tuple of Solution
+        Sound ones first, then by error; different linkages.
+    method : str
+    seed : int
+    starts : int
+        Searches that were run.
+    seconds : float
+        It took (s).
+    complete : bool
+        False if it was stopped.
+    """
+
+    task: Task
+    solutions: tuple[Solution, ...]
+    method: str
+    seed: int
+    starts: int
+    seconds: float
+    complete: bool = True
+
+    def __repr__(self) -> str:
+        count, stopped = format_count(len(self.solutions), "solution"), "" if self.complete else ", stopped early"
+        best = f"; the best: {self.best.describe()}" if self.solutions else ""
+        return (
+            f"<Synthesis: {count} of a {type(self.task).__name__} by {self.method}, {format_count(self.starts, 'start')}, "
+            f"{self.seconds:.3g} s{stopped}{best}>"
+        )
+
+    @property
+    def best(self) -> Solution:
+        """Return the first solution."""
+        return self.solutions[0]
+
+    def columns(self) -> dict[str, list[float]]:
+        """Return rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
+        return solution_columns(self.solutions)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write `columns` to a CSV file."""
+        return write_csv(path, self.columns())
+
+
+class SynthesisInterrupted(Interrupted):
+    """A synthesis was stopped from the keyboard; ``synthesis`` holds the best so far, or is None if there is none."""
+
+    def __init__(self, synthesis: Synthesis | None, done: int, starts: int) -> None:
+        self.synthesis = synthesis
+        super().__init__(f"stopped after {done} of {starts} searches")
+
+
+@in_si(bounds=UNITS)
+def synthesize(
+    task: Task,
+    bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
+    constraints: Sequence[Constraint | Stroke] = USUAL,
+    weights: ArrayLike | None = None,
+    *,
+    pivot: PivotUnknown | None = None,
+    guesses: Sequence[Solution] = (),
+    search: Search = USUAL_SEARCH,
+    kinds: Sequence[Kind] | None = None,
+    gears: Sequence[float] = GEARS,
+) -> Synthesis:
+    """Find linkages that do a task.
+
+    A scan over many thousand linkages of each kind, each placed in closed form, gives the starts; each is polished to an
+    optimum with exact derivatives. What cannot be done exactly is answered with the best there is, its error stated.
+
+    Parameters
+    ----------
+    task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, QuickSwing, Motion or PrecisionPoints
+    bounds : mapping, optional
+        (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
+        ``second_crank_length``; equal ones fix a dimension, kinds that do not have it leave it out. Without, links up to five
+        times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
+    constraints : sequence
+        See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
+    weights : array_like, optional
+        One per target, in the place of the task's own.
+    pivot : SliderUnknown or CrankUnknown, optional
+        Move the rocker pivot, its motion sought together with the links.
+    guesses : sequence of Solution
+        Searched from as well.
+    search : Search
+        Method, starts, seed, cores.
+    kinds : sequence of "four-bar", "slider-crank", "geared-five-bar", optional
+        Mechanisms that are tried, all ranked together, the best of each among the solutions; by default four-bars, for a
+        function of a slider slider-cranks.
+    gears : sequence of float
+        Ratios of the gears of five-bars: turns of the second crank for one of the first.
+
+    Raises
+    ------
+    InputError
+        If the task, the weights or a number here is not usable, or one of the kinds cannot do the task or keep a constraint.
+    InfeasibleError
+        If no linkage keeps all bounds and constraints; it names the one that the nearest linkage violates most.
+    SynthesisInterrupted
+        On Ctrl-C, with the best so far.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis import synthesize
+    >>> from analysis.synthesis import Search, TimedPath, turn
+    >>> phi = turn(24)
+    >>> ellipse = np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
+    >>> found = synthesize(TimedPath(points=ellipse), {"rocker_length": ("5 cm", "50 cm")}, search=Search(starts=2))
+    >>> found.best.verdicts.sound
+    True
+    """
+    if search.starts < 1:
+        raise InputError(f"{search.starts} starts: there must be at least one")
+    begun = perf_counter()
+    task = reweighted(task, weights)
+    kinds = usual_kinds(task) if kinds is None else kinds
+    if isinstance(task, QuickReturn | QuickSwing):
+        return _in_closed_form(task, bounds, constraints, kinds, search, begun)
+    task = _searched_task(task, constraints, pivot, search)
+    normal = search_form(task, pivot)
+    every = limits_by_kind(task, normal, bounds, constraints, kinds, gears)
+    if tuple(kinds) != ("four-bar",) and pivot is not None:
+        raise InputError("only a four-bar's pivot can be moved: leave the other kinds out")
+    for number, guess in enumerate(guesses):
+        if not any(limits.admits(guess.linkage) for limits in every):
+            raise InputError(
+                f"guess {number} is a {guess.verdicts.grashof}: it must be of the kinds that are asked for"
+            )
+    found: list[tuple[Solution, ...]] = []
+    done, refused, total = Polished.of((), (), False), None, 0
+    for limits in every:
+        own = pivot or limits.second_crank(normal.unit)
+        given = [guess for guess in guesses if limits.admits(guess.linkage)]
+        # the ratios of gears share the starts and the candidates of a kind
+        share = 1 if limits.second is None else len(gears)
+        how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
+        total += len(given) + how.starts
+        try:
+            part = _searched(normal, limits, given, own, how)
+        except InfeasibleError as error:
+            refused = refused or error
+            continue
+        except KeyboardInterrupt:
+            done = replace(done, interrupted=True)
+            break
+        done = done.joined(part)
+        found.append(make_solutions(task, normal, limits, part, own, search.solutions))
+        if done.interrupted:
+            break
+    if refused is not None and not found:
+        raise refused
+    together = found[0] if len(found) == 1 else _together(found, search.solutions)
+    return _result(task, together, done, total, search, begun)
+
+
+def _in_closed_form(
+    task: QuickReturn | QuickSwing,
+    bounds: Any,
+    constraints: Sequence[Any],
+    kinds: Sequence[Kind],
+    search: Search,
+    begun: float,
+) -> Synthesis:
+    if tuple(kinds) != usual_kinds(task):
+        of = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
+        raise InputError(f"a {type(task).__name__} is of the {of}: kinds must be {usual_kinds(task)}")
+    found = quick_returns(task, bounds, constraints)[: search.solutions]
+    seconds = perf_counter() - begun
+    return Synthesis(
+        task=task, solutions=found, method="closed form", seed=search.seed, starts=len(found), seconds=seconds
+    )
+
+
+def _searched(
+    normal: Normal, limits: Limits, guesses: Sequence[Solution], pivot: PivotUnknown | None, search: Search
+) -> Polished:
+    """Search for one kind of linkage, from the starts of a scan and from guesses."""
+    begin = [_start(guess, normal, pivot) for guess in guesses]
+    random = np.random.default_rng(search.seed)
+    scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
+    if pivot is not None and limits.second is None:
+        scanned = [replace(s, pivot=random_pivot(pivot, s.q[2], normal.unit, random)) for s in scanned]
+    begin += scanned
+    return polish(normal, limits, begin, pivot=pivot, search=search)
+
+
+def _together(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
+    """Return the best of all solutions, at most so many, with the best of each kind among them."""
+    every = ranked([s for part in found for s in part])
+    first = {s.linkage.kind: s for s in reversed(every)}.values()
+    rest = [s for s in every if not any(s is best for best in first)]
+    return ranked([*ranked(list(first))[:count], *rest[: max(0, count - len(first))]])
+
+
+@in_si(bounds=UNITS)
+def improve(
+    task: Task,
+    linkage: Linkage | Solution,
+    pivot: PivotUnknown,
+    *,
+    bounds: Mapping[str, tuple[float, float]],
+    constraints: Sequence[Constraint],
+    guesses: Sequence[Linkage | Solution] = (),
+    kept: Collection[str] = (),
+    search: Search = USUAL_SEARCH,
+) -> Synthesis:
+    """Search from a linkage whose rocker pivot is moved, its motion at random as often as ``search.starts``, and from guesses.
+
+    Parameters
+    ----------
+    task, bounds, constraints, guesses, search
+        As for `synthesize`; there is no scan.
+    linkage : Linkage or Solution
+        For an open path a solution, which brings the crank rotations of the stations; likewise each guess.
+    pivot : SliderUnknown or CrankUnknown
+    kept : collection of str
+        Dimensions that are fixed, returned as they are to the last digit.
+
+    Raises
+    ------
+    InputError, InfeasibleError, SynthesisInterrupted
+        As `synthesize`.
+    """
+    if search.starts < 1 and not guesses:
+        raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
+    begun = perf_counter()
+    task = _searched_task(task, constraints, pivot, search)
+    normal = search_form(task, pivot)
+    limits = make_limits(task, normal, bounds, constraints)
+    base, *begin = (_start(of, normal, pivot) for of in (linkage, *guesses))
+    random = np.random.default_rng(search.seed)
+    begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
+    done = polish(normal, limits, begin, pivot=pivot, search=search)
+    given = linkage.linkage if isinstance(linkage, Solution) else linkage
+    same: dict[str, Any] = {name: getattr(given, name) for name in kept}
+    found = tuple(
+        Solution.of(task, replace(s.linkage, **same), s.evaluation.rotation)
+        for s in make_solutions(task, normal, limits, done, pivot, search.solutions)
+    )
+    return _result(task, found, done, len(begin), search, begun)
+
+
+def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
+    """Return the task as it is searched for: with the greatest error, where that is bounded and something else minimised.
+
+    Raises InputError if what is asked is about a four-bar, and the pivot moved, or the method can make nothing but errors
+    small.
+    """
+    demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
+    if demands and pivot is not None:
+        raise InputError(f"{type(demands[0]).__name__} is about a four-bar: its rocker pivot must be fixed")
+    if not any(c.seeks for c in demands):
+        return task
+    return replace(task, objective="worst")
+
+
+def _result(
+    task: Task, found: tuple[Solution, ...], done: Polished, total: int, search: Search, begun: float
+) -> Synthesis:
+    """Return the result of a search of so many starts that began at a time of `perf_counter`; or raise why there is none."""
+    result = Synthesis(
+        task=task,
+        solutions=found,
+        method="scan",
+        seed=search.seed,
+        starts=done.done,
+        seconds=perf_counter() - begun,
+        complete=not done.interrupted,
+    )
+    if done.interrupted:
+        raise SynthesisInterrupted(result if found else None, done.done, total)
+    if not found:
+        raise infeasible(done)
+    return result
+
+
+def search_form(task: Task, pivot: PivotUnknown | None) -> Normal:
+    """Return the normal form of a task for a search; an untimed path has more stations where the pivot moves."""
+    if pivot is not None and isinstance(task, UntimedPath):
+        task = replace(task, samples=max(task.samples, STATIONS))
+    return normal_form(task)
+
+
+def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+    """Make a start of a linkage, its untimed stations at the solution's rotations, or where it comes nearest to them.
+
+    Raises InputError if rotations are needed and cannot be found so, because the path is open.
+    """
+    linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
+    if normal.timed:
+        rotation = None
+    elif rotation is None or len(rotation) != normal.n:
+        if normal.points is not None and normal.closed:
+            rotation = nearest_rotations(linkage, normal.places)
+        elif rotation is None:
+            raise InputError("a start for an open path needs the crank rotations of its stations")
+        else:
+            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
+    return make_start(linkage, normal, pivot, rotation)
+
+
+def make_solutions(
+    task: Task, normal: Normal, limits: Limits, done: Polished, pivot: PivotUnknown | None, count: int
+) -> tuple[Solution, ...]:
+    """Evaluate answers as solutions, ranked, and at most so many."""
+
+    def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
+        found = (
+            Solution.of(
+                task,
+                as_asked(task, make_linkage(a.start, normal, pivot, limits)),
+                _stations(task, normal, a.start.rotation),
+            )
+            for a in answers
+        )
+        there = [s for s in found if isfinite(s.error)]
+        if limits.least is not None:
+            # in the order of what is made small in the place of an error
+            return tuple(sorted(there, key=lambda s: not s.verdicts.sound))
+        return ranked(there)
+
+    solutions = made(distinct(done.kept, 4 * count, pivot))
+    if limits.least is not None:
+        return solutions[:count]
+    # what a search began with counts by itself where it is better than all that came of it
+    first = made(done.begun)[:1]
+    return (
+        ranked([*first, *solutions])[:count]
+        if first and ranked([*solutions[:1], *first])[0] is first[0]
+        else solutions[:count]
+    )
+
+
+def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    """Return the crank rotations of the task's own stations, from those of the stations it was fitted at."""
+    own = normal_form(task)
+    if rotation is None or len(rotation) == own.n:
+        return rotation
+    at, turned = normal.shares, rotation
+    if own.closed:
+        at = np.append(at, 1.0)
+        turned = np.append(rotation, rotation[0] + np.copysign(2.0 * np.pi, rotation[-1] - rotation[0]))
+    rotations: NDArray[np.float64] = np.interp(own.shares, at, turned)
+    return rotations
+
+
+def infeasible(done: Polished) -> InfeasibleError:
+    """Return the error for a search that found nothing that keeps the constraints."""
+    if not done.others:
+        return InfeasibleError("no linkage keeps all bounds and constraints")
+    nearest: Answer = min(done.others, key=lambda a: a.violation)
+    return InfeasibleError(
+        f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
+        f"the {nearest.worst or 'quality'}{f' by {nearest.excess}' if nearest.excess else ''} "
+        f"({nearest.status.replace('_', ' ').lower()})"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TradeOff:
+    """The least error over a limit that is tightened.
+
+    Attributes
+    ----------
+    over : str
+        What it is over, of `OVER`.
+    limit : ndarray, shape (n,)
+        Largest link (m), least transmission angle (rad), or greatest force on a pin (N).
+    solutions : tuple of Solution or None
+        The best at each; None where there is no linkage.
+    """
+
+    over: str
+    limit: NDArray[np.float64]
+    solutions: tuple[Solution | None, ...]
+
+    @property
+    def error(self) -> np.ma.MaskedArray:
+        """Return the quality function at each limit, masked where there is no linkage; shape (n,)."""
+        values = [np.nan if s is None else s.error for s in self.solutions]
+        return np.ma.masked_invalid(np.array(values))
+
+    def columns(self) -> dict[str, list[float]]:
+        """Return rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
+        there = [(float(limit), s) for limit, s in zip(self.limit, self.solutions) if s is not None]
+        over = OVER[self.over]
+        columns = solution_columns([s for _, s in there])
+        columns.pop("rank", None)
+        return {f"limit of {over.name} [{over.unit}]": [limit for limit, _ in there], **columns}
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write `columns` to a CSV file."""
+        return write_csv(path, self.columns())
+
+
+class Over(NamedTuple):
+    """What an error is traded for: what its limit is, SI unit, and whether a small limit is the tight one."""
+
+    name: str
+    unit: str
+    small: bool
+
+
+OVER: Mapping[str, Over] = {
+    "size": Over("largest link", "m", True),
+    "transmission": Over("least transmission angle", "rad", False),
+    "pin-force": Over("greatest pin force", "N", True),
+}
+
+
+class TradeOffInterrupted(Interrupted):
+    """A trade-off was stopped from the keyboard; ``trade_off`` has the best so far at each limit, None where there is none."""
+
+    def __init__(self, trade_off: TradeOff, done: int, problems: int) -> None:
+        self.trade_off = trade_off
+        super().__init__(f"stopped after {done} of {problems} problems of the trade-off")
+
+
+@in_si(bounds=UNITS)
+def trade_off(
+    task: Task,
+    over: Literal["size", "transmission", "pin-force"],
+    limits: ArrayLike,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint | Stroke] = USUAL,
+    weights: ArrayLike | None = None,
+    *,
+    pivot: PivotUnknown | None = None,
+    search: Search = QUICK_SEARCH,
+    kinds: Sequence[Kind] | None = None,
+    gears: Sequence[float] = GEARS,
+) -> TradeOff:
+    """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
+
+    From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a
+    second pass goes back, so that a solution found late serves the looser limits too, itself or polished anew: the error of
+    sound linkages can only grow as a limit is tightened.
+
+    Parameters
+    ----------
+    task : Task
+    over : "size", "transmission" or "pin-force"
+    limits : array_like, shape (n,)
+        Largest links (m), least transmission angles (rad), or greatest forces on the pins (N).
+    bounds, constraints, weights, pivot, kinds, gears
+        As for `synthesize`; the limit takes the place of a constraint of its own kind. Of pin forces a `MaxPinForce` among the
+        constraints says what is made and how it runs.
+    search : Search
+        As for `synthesize`, but for the candidates, at most 16384, and the solutions.
+
+    Raises
+    ------
+    InputError
+        If ``over`` or the limits are not usable.
+    TradeOffInterrupted
+        On Ctrl-C, with the best so far at each limit.
+    """
+    if over not in OVER:
+        raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
+    values = np.array(limits, dtype=float)
+    kind = {"size": LargestLink, "transmission": LeastTransmission, "pin-force": MaxPinForce}[over]
+    running = next((c for c in constraints if isinstance(c, MaxPinForce)), MaxPinForce(force=1.0))
+    if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
+        raise InputError("the limits of a trade-off must be finite numbers, at least two")
+    rest = tuple(c for c in constraints if not isinstance(c, kind))
+    first = replace(search, candidates=min(search.candidates, 1 << 14), solutions=3)
+    order = np.argsort(-values if OVER[over].small else values)
+
+    def limit(k: int) -> Constraint:
+        if over == "pin-force":
+            return replace(running, force=values[k])
+        return LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
+
+    def best(k: int, guesses: Sequence[Solution], back: bool) -> tuple[Solution, ...]:
+        how = replace(first, starts=1, candidates=1 << 8) if back else first
+        which: dict[str, Any] = {"pivot": pivot, "kinds": kinds, "gears": gears}
+        return synthesize(task, bounds, (*rest, limit(k)), weights, guesses=guesses, search=how, **which).solutions
+
+    found, done = solve_both_ways(order.tolist(), best)
+    result = TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))
+    if done is not None:
+        raise TradeOffInterrupted(result, done, 2 * len(values))
+    return result
+
+
+def solve_both_ways(
+    order: Sequence[int],
+    search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
+    begin: Sequence[Solution] = (),
+) -> tuple[dict[int, Solution], int | None]:
+    """Solve a row of problems, each started from the ones before it, from the loosest to the tightest and back.
+
+    Parameters
+    ----------
+    order : sequence of int
+        The problems, the loosest first.
+    search : callable
+        Solutions of a problem by its number, from guesses, on the way back or not; it may raise `InfeasibleError`.
+    begin : sequence of Solution
+        Guesses for the first problem.
+
+    Returns
+    -------
+    found : dict
+        The best solution of each problem that has one. On the way back what keeps the tighter limit keeps the looser one too:
+        errors can only grow as the limit is tightened.
+    done : int or None
+        If it was stopped from the keyboard, how many of twice the problems were done.
+    """
+    found: dict[int, Solution] = {}
+    for back in (False, True):
+        previous = [] if back else list(begin)
+        for number, k in enumerate(order[::-1] if back else order):
+            own = [found[k]] if k in found else []
+            guesses = [*previous, *own]
+            if back and not guesses:
+                continue
+            kept = guesses if back else own
+            done: int | None = None
+            try:
+                result = search(k, guesses, back)
+            except InfeasibleError:
+                result = ()
+            except (SynthesisInterrupted, KeyboardInterrupt) as error:
+                last = error.synthesis if isinstance(error, SynthesisInterrupted) else None
+                result, done = last.solutions if last else (), back * len(order) + number
+            if result or kept:
+                found[k] = ranked([*kept, *result])[0]
+                previous = [found[k]] if back else list(result)
+            if done is not None:
+                return found, done
+    return found, None
+
+
+#: Factor and unit in which a limit of a trade-off is written, by its SI unit.
+SHOWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "N": (1.0, "N")}
+
+
+def format_limit(over: str, limit: float) -> str:
+    """Format a limit of a trade-off with its unit."""
+    factor, unit = SHOWN[OVER[over].unit]
+    return f"{factor * limit:.6g} {unit}"

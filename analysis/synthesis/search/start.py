@@ -1,0 +1,280 @@
+"""How a search is done, and how its parts are spread over cores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, pi
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ...numerics.fourier import FourierSeries
+from ...numerics.workers import check_jobs, cores_of, interruptible, over_workers
+from ...run import shown
+from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
+from ..task.constraint import UNKNOWNS
+from ..task.limits import Limits
+from ..task.task import Normal
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """How a search is done.
+
+    Attributes
+    ----------
+    starts : int
+        Searches that are run: of a scan, candidates that are polished.
+    solutions : int
+        At most that many different linkages are returned.
+    seed : int
+        The same seed gives the same solutions, on any number of cores.
+    candidates : int
+        Four-bars in the scan.
+    n_jobs : int, optional
+        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
+    progress : bool
+        Show a progress bar.
+    """
+
+    starts: int = 24
+    solutions: int = 6
+    seed: int = 0
+    candidates: int = 1 << 16
+    n_jobs: int | None = None
+    progress: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("candidates", "solutions"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{getattr(self, name)} {name}: there must be at least one")
+        check_jobs(self.n_jobs)
+        if self.seed < 0 or int(self.seed) != self.seed or int(self.solutions) != self.solutions:
+            raise InputError(
+                f"seed {self.seed} and {self.solutions} solutions: both must be whole numbers, the seed not below zero"
+            )
+
+    @property
+    def cores(self) -> int:
+        """Return the number of workers."""
+        return cores_of(self.n_jobs)
+
+
+USUAL_SEARCH = Search()
+#: Where one search follows another.
+QUICK_SEARCH = Search(starts=12)
+
+
+def over_cores(
+    work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
+) -> tuple[list[Made], bool]:
+    """Work on all items, in their order on any number of cores; on Ctrl-C return the results so far, and True."""
+    made: dict[int, Made] = {}
+    with interruptible() as interrupted, shown(search.progress, float(len(items)), what) as show:
+        for number, value in over_workers(work, items, interrupted, n_jobs=search.n_jobs):
+            made[number] = value
+            show(float(len(made)))
+            if interrupted:
+                break
+    return [made[number] for number in sorted(made)], bool(interrupted)
+
+
+FloatArray = NDArray[np.float64]
+#: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
+AMPLITUDE = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """Where a search starts, or ends, in normal form.
+
+    Attributes
+    ----------
+    q : ndarray, shape (11,)
+        Of `constraints.UNKNOWNS`.
+    branch : int
+    pivot : ndarray
+        Unknowns of the moved pivot: guide angle, mean, cosines and sines in turn; or length, phase, cosines and sines.
+    rotation : ndarray, shape (n,), or None
+        Crank rotations of the stations where they are unknown.
+    quality : float
+        In units squared; of a greatest error, in units.
+    given : bool
+        Whether it is a guess.
+    linkage : type
+        Type of the linkage: without a second crank, which is the pivot's.
+    """
+
+    q: FloatArray
+    branch: int
+    quality: float = inf
+    given: bool = False
+    pivot: FloatArray = field(default_factory=lambda: np.empty(0))
+    rotation: FloatArray | None = None
+    linkage: type[Linkage] = Linkage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """Where an optimiser ended, whether every constraint is satisfied there, which is violated most, and its status.
+
+    By how much it is, ``violation`` is in units, rad or shares of a bound, ``excess`` a text with its unit.
+    """
+
+    start: Start
+    feasible: bool
+    converged: bool
+    violation: float
+    worst: str
+    excess: str
+    status: str
+    iterations: int
+
+    @classmethod
+    def unjoined(cls, start: Start) -> Answer:
+        """Make the answer for a start whose links cannot be joined."""
+        return cls(
+            start=replace(start, quality=inf),
+            feasible=False,
+            converged=False,
+            violation=inf,
+            worst="loop closure",
+            excess="",
+            status="the links cannot be joined at the start",
+            iterations=0,
+        )
+
+
+def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
+    """Draw unknowns of a pivot at random: harmonics that fall off with their order, within the bounds of stroke and length.
+
+    Parameters
+    ----------
+    ground : float
+        Ground link (units).
+    unit : float
+        m.
+    """
+    orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
+    waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)
+    if isinstance(unknown, CrankUnknown):
+        length = random.uniform(*unknown.length) / unit
+        return np.array([length, random.uniform(-pi, pi), *(0.3 * waves)])
+    low, high = unknown.guide_angle
+    # a guide is the same one from its other end
+    angle = low + min(high - low, pi) * random.random()
+    size = min(AMPLITUDE * ground, 0.25 * unknown.stroke / unit)
+    return np.array([angle, size * random.standard_normal(), *(size * waves)])
+
+
+def pivot_size(pivot: PivotUnknown | None) -> int:
+    """Return the number of the pivot's unknowns."""
+    if pivot is None:
+        return 0
+    return 2 + 2 * pivot.harmonics
+
+
+def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, FloatArray]:
+    if pivot is None:
+        return np.empty(0), np.empty(0)
+    low, high = np.full(pivot_size(pivot), -inf), np.full(pivot_size(pivot), inf)
+    if isinstance(pivot, SliderUnknown):
+        low[0], high[0] = pivot.guide_angle
+    else:
+        low[0], high[0] = pivot.length[0] / unit, pivot.length[1] / unit
+    return low, high
+
+
+def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Move unknowns within their bounds, angles by whole turns where that is enough."""
+    q = q.copy()
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    middle = 0.5 * (low[angles] + high[angles])
+    nearest = middle + wrapped(q[angles] - middle)
+    outside = (q[angles] < low[angles]) | (q[angles] > high[angles])
+    q[angles] = np.where(outside, nearest, q[angles])
+    return np.clip(q, low, high)
+
+
+def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> float:
+    """Return how far a start is from its bounds (units, rad), in the dimensions that the task sees."""
+    q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
+    off = np.abs(wrapped(q - start.q))
+    off[:7] = np.abs(q - start.q)[:7]
+    idle: tuple[str, ...] = () if normal.angle is not None else ("output_angle",)
+    if normal.of_rocker:
+        idle = ("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle")
+    off[[UNKNOWNS.index(name) for name in idle]] = 0.0
+    return float(off.max())
+
+
+def make_linkage(
+    start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
+) -> Linkage:
+    """Make the linkage of a start, in SI; its angles within half a turn of zero, or else within their limits."""
+    q = start.q.copy()
+    q[:7] *= normal.unit
+    q[0] += normal.origin.real
+    q[1] += normal.origin.imag
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    near = wrapped(q[angles])
+    if limits is not None:
+        outside = (near < limits.low[angles]) | (near > limits.high[angles])
+        near = np.where(outside, q[angles], near)
+    q[angles] = near
+    v = start.pivot
+    moved: SliderMotion | SecondCrank | None = None
+    if isinstance(pivot, SliderUnknown) and len(v):
+        cosines, sines = np.append(v[1], v[2::2]), np.append(0.0, v[3::2])
+        moved = SliderMotion(FourierSeries(normal.unit * cosines, normal.unit * sines), float(v[0]))
+    elif isinstance(pivot, CrankUnknown) and len(v):
+        series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
+        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(wrapped(v[1])), series)
+    made: type[Linkage] = FiveBar if isinstance(moved, SecondCrank) else start.linkage
+    return made.from_vector(q, start.branch, pivot=moved)
+
+
+def make_start(
+    linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
+) -> Start:
+    """Make a start of a linkage; the pivot's motion is cut off after, or filled up to, the harmonics sought."""
+    q = np.append(linkage.vector, linkage.output_angle)
+    q[0] -= normal.origin.real
+    q[1] -= normal.origin.imag
+    q[:7] /= normal.unit
+    v = np.zeros(pivot_size(pivot))
+    if isinstance(pivot, SliderUnknown) and isinstance(linkage.pivot, SliderMotion):
+        series = linkage.pivot.series.to_order(pivot.harmonics)
+        v[0], v[1] = linkage.pivot.guide_angle, series.mean / normal.unit
+        v[2::2], v[3::2] = series.cos[1:] / normal.unit, series.sin[1:] / normal.unit
+    elif isinstance(pivot, CrankUnknown):
+        v[0] = pivot.length[0] / normal.unit
+        if isinstance(linkage.pivot, SecondCrank):
+            series = linkage.pivot.series.to_order(pivot.harmonics)
+            v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
+            v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
+    kind = SliderCrank if isinstance(linkage, SliderCrank) else Linkage
+    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
+
+
+def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
+    """Return the first items, at most so many, whose marks differ by the distance from those of all before."""
+    chosen: list[Item] = []
+    marks: list[FloatArray] = []
+    for item in items:
+        own = mark(item)
+        if any(np.abs(own - other).max() < distance for other in marks):
+            continue
+        marks.append(own)
+        chosen.append(item)
+        if len(chosen) == count:
+            break
+    return chosen

@@ -1,0 +1,492 @@
+"""The statement of a synthesis as a nonlinear program, in CasADi's symbols: what is asked. `program` evaluates and solves it.
+
+Loop closure is that of the plant, traced (`analysis.numerics.symbolic`). The program is stated in normal form (`tasks.Normal`,
+`constraints.Limits`); what a start decides - assembly, direction of travel, which triangle of a region, which link is the
+shortest - comes as parameters, so that one program serves all starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import acos, cos, degrees, hypot, inf, isfinite, pi
+from types import SimpleNamespace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...numerics import symbolic
+from ..linkage.linkage import Linkage
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
+from ..task.constraint import TURNING, UNKNOWNS, Along, Least, Require
+from ..task.formula import physical, traced
+from ..task.limits import Limits
+from ..task.task import Normal, turn
+from .start import pivot_bounds
+
+FloatArray = NDArray[np.float64]
+Objective = Literal["squares", "worst", "transmission", "curve", "least", "least curve"]
+#: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
+#: to the least transmission angle for what is between them (rad).
+GRID, BETWEEN = 96, 2.5e-3
+#: Margin of a Grashof type, as a share of the links' sum: at zero a four-bar is a change-point.
+MARGIN = 1e-4
+#: Least rotation of the crank from one untimed station to the next, as a share of an even one.
+ADVANCE = 1e-3
+#: Least rotation over which an open path is traced (rad).
+LEAST_WAY = 1e-3
+#: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
+GAP = 8.0
+#: Objectives in the place of an error.
+SOUGHT = ("least", "least curve")
+#: What the bound of the greatest error is called; share of it by which an error of zero has a slope.
+ERROR, SMOOTH = "bound of the greatest error", 1e-3
+#: Rotations beside the given ones at which what holds all along is held: its greatest values in the solution before.
+FURTHER = 8
+
+
+class Label(NamedTuple):
+    """Name of a constraint, and the factor and the unit in which it is written by how much it is violated."""
+
+    name: str
+    factor: float
+    unit: str
+    linkage: type[Linkage] = Linkage
+
+    def measured(self, violation: float, q: FloatArray) -> str:
+        """Format a violation with its unit; of a transmission angle by its effect on the angle at the limit."""
+        if self.unit == "transmission":
+            least = self.factor
+            cosine = cos(least) + violation / float(self.linkage.excess_slope(q[4], q[5], cos(least)))
+            return f"{degrees(least - acos(min(1.0, cosine))):.3g} deg"
+        return f"{self.factor * violation:.3g} {self.unit}".strip()
+
+
+class Statement:
+    """A synthesis stated as a nonlinear program: unknowns, objective and constraints, symbols all of them.
+
+    Parameters
+    ----------
+    normal : Normal
+    limits : Limits
+    pivot : PivotUnknown, optional
+        Lengths in m, as the task; None of a fixed pivot.
+    objective : "squares", "worst", "transmission", "curve", "least" or "least curve"
+        Weighted squared errors; the greatest weighted error, as the least bound of all; the least transmission angle, greatest,
+        with the stations met exactly; or nothing but the constraints of a path, for `analysis.synthesis.refine`, whose measure
+        needs no stations: of their rotations only the ends of an open path and of its straight part are unknown. The
+        last two are what the limits make small in the place of an error, with stations and without.
+    exact : bool
+        Whether bounds of the pivot's motion can be held at its extremes, see `exact`; without, a first search is quicker.
+    """
+
+    def __init__(
+        self,
+        normal: Normal,
+        limits: Limits,
+        pivot: PivotUnknown | None = None,
+        objective: Objective = "squares",
+        *,
+        exact: bool = True,
+    ) -> None:
+        self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
+        #: Turns of the crank, and of a second one, while the rotation searched makes one.
+        self._turns = geared(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
+        casadi = self._casadi = symbolic.library()
+        SX = casadi.SX
+        self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
+        self._initial: list[Any] = []
+        #: Order of a derivative of the pivot's motion that is bounded, where its extremes are, and how they are curved; its
+        #: own first two derivatives there.
+        self._peaks: list[tuple[int, Any, Any]] = []
+        self._held = 2 * pivot.harmonics if pivot is not None and exact else 0
+        self._bent: list[Any] = []
+        #: What holds all along the crank's rotation, and the further rotations at which it is held.
+        self._along: list[tuple[Along, Any]] = []
+        self._constraints: list[tuple[Any, float, float, Label]] = []
+        self.knots: list[int] = list(range(normal.n))
+        self._solvers: dict[tuple[int, bool], Any] = {}
+        self._share = SX.sym("share")
+        # parameters: branch, direction, magnitude of the errors, rows of Grashof's type, half-planes of the regions
+        branch, direction, size = (SX.sym(name) for name in ("branch", "direction", "size"))
+        grashof = SX.sym("grashof", 6, 4)
+        planes = [SX.sym(f"plane{k}", 3, 3) for k in range(len(limits.regions))]
+        # unknowns: dimensions, motion of the pivot, crank rotations
+        q = self._unknown("q", limits.low, limits.high)
+        v = self._unknown("v", *pivot_bounds(pivot, normal.unit))
+        phi: Any = casadi.DM(normal.rotation) if normal.timed else None
+        knots: Any = None
+        self._whole = objective in ("curve", "least curve")
+        if not normal.timed and not self._whole:
+            phi = self._unknown("phi", np.full(normal.n, -inf), np.full(normal.n, inf))
+            self._ordered(phi, direction)
+        elif not normal.timed:
+            phi, knots = self._way_of_path(direction)
+        p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)}, branch=branch)
+        self._phi = phi
+        self._point_at: Callable[[Any], Any] = lambda at: self._closed(p, v, at, branch)[1]
+        self._ends = (0.0, 2.0 * pi) if normal.closed or knots is None else (knots[0], knots[-1])
+        quality = self._quality(p, v, phi, branch, size)
+        tilt: Any = None
+        if objective == "transmission":
+            # the largest |cos mu| of all, which is made small
+            tilt = self._extra("tilt", 0.0, 0.0, cos(TURNING))
+            quality = tilt + 1e-3 * casadi.sumsqr(q[2:6])
+        self._assembled(p, v, phi, tilt)
+        self._shaped(p, grashof, planes)
+        for require in limits.requires:
+            value = self._traced(require, p) / require.scale
+            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name, require.unit, require.scale)
+        if isinstance(pivot, SliderUnknown):
+            quality = quality + self._slider(pivot, p.ground_length, v)
+        if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
+            self._bounded(
+                lambda x: _series(casadi, v[2:], x, mean=False, order=1) / pivot.speed, 1, "speed of the second crank"
+            )
+        self._close(quality, [branch, direction, size, self._share], [grashof, *planes])
+
+    def _close(self, quality: Any, numbers: Sequence[Any], tables: Sequence[Any]) -> None:
+        """Put all together: the program, its bounds and the names of its constraints."""
+        casadi = self._casadi
+        peaks = [
+            *(symbol for _, *both in self._peaks for symbol in both),
+            *(casadi.vec(further) for _, further in self._along),
+        ]
+        parameters = casadi.vertcat(*numbers, *peaks, *map(casadi.vec, tables))
+        z, lows, highs = zip(*self._unknowns)
+        self.low, self.high = np.concatenate(lows), np.concatenate(highs)
+        self.g_low = np.concatenate([np.empty(0), *(np.full(e.numel(), a) for e, a, _, _ in self._constraints)])
+        self.g_high = np.concatenate([np.empty(0), *(np.full(e.numel(), b) for e, _, b, _ in self._constraints)])
+        self.labels = [name for e, _, _, name in self._constraints for _ in range(e.numel())]
+        g = casadi.vertcat(casadi.SX(0, 1), *(casadi.vec(e) for e, _, _, _ in self._constraints))
+        self._nlp = {"x": casadi.vertcat(*z), "f": quality, "g": g, "p": parameters}
+
+    def _unknown(self, name: str, low: FloatArray, high: FloatArray) -> Any:
+        """Add a column of unknowns between bounds."""
+        symbol = self._casadi.SX.sym(name, len(low))
+        self._unknowns.append((symbol, low, high))
+        return symbol
+
+    def _extra(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
+        """Add an unknown that stands for a greatest value or the middle of a range, with its starting value."""
+        self._initial.append(initial)
+        return self._unknown(name, np.array([low]), np.array([high]))
+
+    @property
+    def least(self) -> Least:
+        """Return the function that is minimised in the place of an error."""
+        assert self.limits.least is not None
+        return self.limits.least
+
+    def _traced(self, require: Require, p: Any) -> Any:
+        """Trace a required function; one along the crank's rotation also at the rotations given by parameters."""
+        casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
+        if not isinstance(require, Along):
+            return traced(require, values)
+        held = traced(require, values, casadi.DM(require.rotation))
+        if require.ends is None:
+            return casadi.vec(held)
+        places = casadi.SX.sym(f"places{len(self._along)}", FURTHER)
+        further = traced(require, values, places)
+        bends = casadi.SX.sym(f"bends{len(self._along)}", *further.shape)
+        self._along.append((require, casadi.horzcat(places, bends)))
+        # to second order the height of the peak next to each place, wherever it moves
+        ones = casadi.DM.ones(FURTHER)
+        slope = casadi.horzcat(*(casadi.jtimes(column, places, ones) for column in casadi.horzsplit(further)))
+        return casadi.vertcat(casadi.vec(held), casadi.vec(further + bends * slope**2))
+
+    # Objective
+
+    def _closed(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
+        """Close the loop: directions of the links and the coupler point (x, y) at rotations, by the plant's equations."""
+        casadi = self._casadi
+        th2 = self._turns[0] * phi + p.crank_phase
+        c2, s2 = casadi.cos(th2), casadi.sin(th2)
+        dx, dy = self._displacement(v, phi)
+        g = self.limits.linkage.closure()(
+            c2,
+            s2,
+            p.ground_length + dx - p.crank_length * c2,
+            dy - p.crank_length * s2,
+            p.coupler_length,
+            p.rocker_length,
+            branch,
+        )
+        ca, sa = casadi.cos(p.ground_angle), casadi.sin(p.ground_angle)
+        px = p.point_distance * casadi.cos(p.ground_angle + p.point_angle)
+        py = p.point_distance * casadi.sin(p.ground_angle + p.point_angle)
+        x = p.pivot_x + p.crank_length * (ca * c2 - sa * s2) + px * g.c3 - py * g.s3
+        y = p.pivot_y + p.crank_length * (sa * c2 + ca * s2) + py * g.c3 + px * g.s3
+        return g, (x, y)
+
+    def _displacement(self, v: Any, phi: Any) -> tuple[Any, Any]:
+        casadi = self._casadi
+        if self.pivot is None:
+            return 0.0, 0.0
+        if isinstance(self.pivot, SliderUnknown):
+            u = _series(casadi, v[1:], phi)
+            return u * casadi.cos(v[0]), u * casadi.sin(v[0])
+        psi = self._turns[1] * phi + v[1] + _series(casadi, v[2:], phi, mean=False)
+        return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
+
+    def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
+        """State the quality function, and the constraints that belong to it."""
+        casadi, normal = self._casadi, self.normal
+        g, point = self._closed(p, v, phi, branch)
+        ex: Any = None
+        ey: Any = None
+        if normal.points is not None:
+            ex, ey = point[0] - casadi.DM(normal.points.real), point[1] - casadi.DM(normal.points.imag)
+        turned: Any = None
+        if normal.angle is not None:
+            c, s = (g.c4, g.s4) if normal.of_rocker else (g.c3, g.s3)
+            wanted = casadi.DM(normal.angle) - p.output_angle - (0.0 if normal.of_rocker else p.ground_angle)
+            ct, st = casadi.cos(wanted), casadi.sin(wanted)
+            # the difference of the angles, without a jump at half a turn
+            turned = casadi.atan2(s * ct - c * st, c * ct + s * st)
+        quality: Any = 0.0
+        if self.objective == "transmission":
+            for value, unit in ((ex, "mm"), (ey, "mm"), (turned, "deg")):
+                if value is not None:
+                    self._within(value, 0.0, 0.0, "the stations", unit)
+            return quality
+        if not self._whole:
+            squares: Any = 0.0 if ex is None else ex**2 + ey**2
+            if turned is not None:
+                squares = squares + (normal.leverage * turned) ** 2
+            squares = casadi.DM(normal.weights) * squares
+            quality = casadi.sum1(squares)
+        if self.objective == "worst":
+            greatest = self._extra("greatest", casadi.sqrt(casadi.mmax(squares)) / size, 0.0)
+            self._at_most(squares / size**2 - greatest**2, "greatest error", "")
+            return greatest
+        if self.objective in SOUGHT:
+            if not self._whole:
+                most = self.least.error
+                smooth = casadi.sqrt(squares + (SMOOTH * most) ** 2) - most * hypot(1.0, SMOOTH)
+                self._at_most(smooth / most, ERROR, "deg" if normal.of_rocker else "mm", self._in_words(most))
+            values = self._traced(self.least.along, p)
+            greatest = self._extra("greatest", casadi.mmax(values) / size, 0.0)
+            self._at_most(values / size - greatest, self.least.along.name, "")
+            return greatest + (self._straight_part(p, v, phi, branch, ex, ey) if self._whole else 0.0)
+        return quality + self._straight_part(p, v, phi, branch, ex, ey)
+
+    def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
+        """Constrain a straight part; return what is added to the quality where its flatness is only favoured."""
+        casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
+        if straight is None or points is None:
+            return 0.0
+        part = slice(straight.start, straight.end + 1)
+        line = points[straight.end] - points[straight.start]
+        line /= abs(line)
+        spent = phi[straight.end] - phi[straight.start]
+        self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part", "deg")
+        if self._whole:
+            # its ends lie across from where the target's are
+            for k in (straight.start, straight.end):
+                self._within(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
+        if straight.flatness is None:
+            off = (ey * line.real - ex * line.imag)[part]
+            return (straight.weight - 1.0) * casadi.sumsqr(off)
+        # along the straight line through the part's ends, at the stations and in between
+        x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
+        begin = points[straight.start]
+        away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
+        level = self._extra("level", 0.5 * (casadi.mmin(away) + casadi.mmax(away)))
+        half = 0.5 * straight.flatness
+        self._within(away - level, -half, half, "flatness of the straight part")
+        return 0.0
+
+    # Constraints
+
+    def _in_words(self, share: float) -> float:
+        """Return the factor to mm or degrees of an error given as a share of something in units."""
+        return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
+
+    def excess(self, violation: float) -> dict[str, Any]:
+        """Return the fields of an `Answer` whose greatest error is too large by that (units)."""
+        label = Label(ERROR, self._in_words(1.0), "deg" if self.normal.of_rocker else "mm")
+        return {"violation": violation, "worst": ERROR, "excess": label.measured(violation, np.empty(0))}
+
+    def _within(
+        self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
+    ) -> None:
+        """Keep a value between bounds; ``factor`` makes its unit of it, by default from units of length or rad."""
+        usual = {"mm": 1e3 * self.normal.unit, "deg": degrees(1.0)}
+        label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit, self.limits.linkage)
+        self._constraints.append((value, low, high, label))
+
+    def _at_most(self, value: Any, name: str, unit: str = "mm", factor: float | None = None) -> None:
+        self._within(value, -inf, 0.0, name, unit, factor)
+
+    def _ordered(self, phi: Any, direction: Any) -> None:
+        """Keep the stations in order, within a turn."""
+        n = self.normal.n
+        least = ADVANCE * 2.0 * pi / n
+        steps = direction * (phi[1:] - phi[:-1])
+        most = GAP * 2.0 * pi / n
+        self._within(steps, least, most, "order of the stations", "deg")
+        total = direction * (phi[n - 1] - phi[0])
+        closing = (2.0 * pi - most, 2.0 * pi - least) if self.normal.closed else (-inf, 2.0 * pi)
+        self._within(total, *closing, "stations within a turn", "deg")
+
+    def _way_of_path(self, direction: Any) -> tuple[Any, Any]:
+        """Place the stations of a path on even steps between the few with unknown rotations; return these rotations too."""
+        casadi, normal = self._casadi, self.normal
+        ends = set() if normal.closed else {0, normal.n - 1}
+        part = () if normal.straight is None else (normal.straight.start, normal.straight.end)
+        fixed = self.knots = sorted(ends.union(part))
+        if not fixed:
+            return casadi.DM(turn(normal.n)), None
+        knots = self._unknown("knots", np.full(len(fixed), -inf), np.full(len(fixed), inf))
+        steps = direction * (knots[1:] - knots[:-1])
+        self._within(steps, LEAST_WAY, 2.0 * pi, "order of the stations", "deg")
+        most = 2.0 * pi - (LEAST_WAY if normal.closed else 0.0)
+        self._within(direction * (knots[-1] - knots[0]), LEAST_WAY, most, "stations within a turn", "deg")
+        # hat functions, and a turn after the first knot the first one again
+        at = [*fixed, fixed[0] + normal.n] if normal.closed else fixed
+        where = np.arange(fixed[0], fixed[0] + normal.n)
+        hats = np.array([np.interp(where, at, row) for row in np.eye(len(at))])
+        hats = np.roll(hats, fixed[0], axis=1)
+        lap = np.roll(where // normal.n, fixed[0])
+        phi = casadi.mtimes(casadi.DM(hats[: len(fixed)].T), knots)
+        if normal.closed:
+            again = casadi.DM(hats[-1])
+            phi = phi + again * (knots[0] + 2.0 * pi * direction) - 2.0 * pi * direction * casadi.DM(lap)
+        return phi, knots
+
+    def _shaped(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
+        """Keep the links' Grashof type, and the fixed pivots in their regions."""
+        casadi, limits = self._casadi, self.limits
+        if limits.grashof:
+            links = casadi.vertcat(p.ground_length, p.crank_length, p.coupler_length, p.rocker_length)
+            margin = MARGIN * casadi.sum1(links) * casadi.sum2(casadi.fabs(grashof)) / 4.0
+            self._at_most(casadi.mtimes(grashof, links) + margin, f"Grashof type {limits.grashof}")
+        for (name, _), plane in zip(limits.regions, planes):
+            x, y = p.pivot_x, p.pivot_y
+            if name == "D":
+                x = x + p.ground_length * casadi.cos(p.ground_angle)
+                y = y + p.ground_length * casadi.sin(p.ground_angle)
+            self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
+
+    def _assembled(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
+        """Keep the transmission angle over the turn, over the way of the task, or both."""
+        casadi, limits = self._casadi, self.limits
+        l1, l2 = p.ground_length, p.crank_length
+        if limits.turn is not None and self.pivot is None:
+            # with a fixed pivot its extremes are where the crank lies along the ground link
+            self._transmitting(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
+        elif limits.turn is not None:
+            # of gears closer, since the cranks turn as often
+            d2 = self._reach(p, v, casadi.DM(turn(GRID * max(1, max(map(abs, self._turns)) // 2))))
+            self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
+        if limits.way is not None or (tilt is not None and limits.turn is None):
+            x, step = self._way(phi)
+            d2 = self._reach(p, v, x)
+            # an extreme between two of these rotations is where the crank lies along the ground link: no more than this off
+            slack = limits.linkage.slack(l1, l2, casadi.cos(0.5 * step))
+            self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
+
+    def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
+        """Keep |cos mu| below cos(least), and below the tilt, from squares of the distance BD and without division."""
+        for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
+            links = p.coupler_length, p.rocker_length
+            for excess in self.limits.linkage.transmission_excess(*links, nearest, farthest, cosine):
+                self._at_most(
+                    excess, "transmission angle", "transmission", acos(cosine) if isinstance(cosine, float) else 0.0
+                )
+
+    def _reach(self, p: Any, v: Any, x: Any) -> Any:
+        """Return the square of the distance from crank pin to rocker pivot, or to the guide, at rotations."""
+        casadi = self._casadi
+        dx, dy = self._displacement(v, x)
+        th2 = self._turns[0] * x + p.crank_phase
+        bx = p.ground_length + dx - p.crank_length * casadi.cos(th2)
+        by = dy - p.crank_length * casadi.sin(th2)
+        return self.limits.linkage.square(bx, by)
+
+    def _way(self, phi: Any) -> tuple[Any, Any]:
+        """Return the stations' rotations and some in between, and the distance from each to the next."""
+        steps = 0.25 * (phi[1:] - phi[:-1])
+        between = [phi[:-1] + k * steps for k in (1, 2, 3)]
+        casadi = self._casadi
+        return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], steps, steps, steps)
+
+    def _slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
+        """Bound the slider's motion; return what its smoothness adds to the quality."""
+        casadi, unit = self._casadi, self.normal.unit
+
+        def position(x: Any) -> Any:
+            return _series(casadi, v[1:], x)
+
+        if pivot.position is None:
+            u = position(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))))
+            self._at_most(u - ground, "slider position")
+            self._at_most(-u - ground, "slider position")
+        else:
+            low, high = (end / unit for end in pivot.position)
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            self._bounded(lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half, half)
+        if isfinite(pivot.stroke):
+            centre = self._extra("middle", 0.0)
+            reach = 0.5 * pivot.stroke / unit
+            # of both ends: the stroke is off by twice as much
+            self._bounded(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke, reach)
+            u = position(casadi.vertcat(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))), self._peaks[-1][1]))
+            self._initial[-1] = 0.5 * (casadi.mmin(u) + casadi.mmax(u))
+        self._rate(v, 1, pivot.speed, "slider speed", "mm/rad")
+        self._rate(v, 2, pivot.acceleration, "slider acceleration", "mm/rad2")
+        if not pivot.smoothness:
+            return 0.0
+        x = casadi.DM(turn(max(GRID, 16 * pivot.harmonics)))
+        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
+
+    def _rate(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
+        """Keep a derivative of the slider's position within a bound (m)."""
+        if isfinite(bound):
+            scale = self.normal.unit / bound
+            self._bounded(
+                lambda x: scale * _series(self._casadi, v[1:], x, order=order),
+                order,
+                name,
+                unit,
+                1e3 * bound,
+                1.0 / scale,
+            )
+
+    def _bounded(
+        self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0
+    ) -> None:
+        """Keep a trigonometric polynomial of the crank's rotation within -1 and 1; IPOPT sees ``size`` times that.
+
+        It is held at places all round and where the parameters say, less a share: of a first solution that which makes sure of
+        what is between the places, a trigonometric polynomial being nowhere larger than at these but for the cosine (Ehlich and
+        Zeller 1964); then none, the extremes of the solution before being among the places (`exact`).
+        """
+        casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
+        number = len(self._peaks)
+        places, bends = (casadi.SX.sym(f"{what}{number}", self._held) for what in ("places", "bends"))
+        self._peaks.append((order, places, bends))
+        grid = value(casadi.DM(turn(max(GRID, 16 * harmonics))))
+        if not self._held:
+            self._within(size * grid / self._share, -size, size, name, unit, factor / size)
+            return
+        held, ones = value(places), casadi.DM.ones(self._held)
+        slope = casadi.jtimes(held, places, ones)
+        self._bent.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
+        # to second order the height of the peak next to each place, wherever it moves
+        every = casadi.vertcat(grid, held + bends * slope**2)
+        self._within(size * every / self._share, -size, size, name, unit, factor / size)
+
+
+def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:
+    """Evaluate a Fourier series or a derivative: mean (where there is one), then cosine and sine of each harmonic."""
+    value = (coefficients[0] if order == 0 else 0.0) + 0.0 * x if mean else 0.0 * x
+    first = 1 if mean else 0
+    for k in range((coefficients.numel() - first) // 2):
+        harmonic = k + 1
+        a, b = coefficients[first + 2 * k], coefficients[first + 2 * k + 1]
+        for _ in range(order):
+            a, b = harmonic * b, -harmonic * a
+        value = value + a * casadi.cos(harmonic * x) + b * casadi.sin(harmonic * x)
+    return value

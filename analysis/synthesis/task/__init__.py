@@ -1,0 +1,10 @@
+"""What a linkage is asked to do and to keep: targets and tasks, constraints and bounds, all of them in normal form.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,498 @@
+"""What a linkage must satisfy besides tracing its target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf, isfinite, pi, radians
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, LinkworkError, ParameterError
+
+from ...numerics import symbolic
+from ...units import Amount, in_si, quantity
+from ..linkage.kernels import PLACES
+from ..linkage.linkage import Linkage
+from ..linkage.machine import PINS, USUAL_MAKE, Make, pin_functions
+from .task import Normal
+
+FloatArray = NDArray[np.float64]
+GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"]
+#: The unknowns of every linkage, in their order: `kernels.PLACES` and the output angle.
+UNKNOWNS = (*PLACES, "output_angle")
+#: What only a geared five-bar has, besides.
+SECOND_LENGTH = "second_crank_length"
+#: Least transmission angle at which a crank still counts as turning fully (rad).
+TURNING = 0.002
+
+
+class InfeasibleError(LinkworkError):
+    """Bounds and constraints leave no linkage."""
+
+
+#: Least transmission angle by default (rad).
+_LEAST_TRANSMISSION = radians(40.0)
+
+
+@in_si(angle="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeastTransmission:
+    """The angle between coupler and rocker stays at least this far from 0 and pi.
+
+    Attributes
+    ----------
+    angle : float
+        rad.
+    over : "turn" or "task"
+        Over a full turn, which makes the crank able to turn fully, or at the task's stations only.
+    """
+
+    angle: Amount = _LEAST_TRANSMISSION
+    over: Literal["turn", "task"] = "turn"
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.angle < 0.5 * pi:
+            raise ParameterError("least transmission angle", self.angle, "be at least 0 and below pi/2 rad")
+        if self.over not in ("turn", "task"):
+            raise ParameterError("over", self.over, "be 'turn' or 'task'")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FullTurn:
+    """The crank can turn fully, however near the links come to being collinear."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grashof:
+    """The four-bar is of this type; see `Linkage.grashof`."""
+
+    type: GrashofType
+
+    def __post_init__(self) -> None:
+        if self.type not in get_args(GrashofType):
+            raise ParameterError("Grashof type", self.type, f"be one of {', '.join(get_args(GrashofType))}")
+
+
+@in_si(length="m")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LargestLink:
+    """No link, nor the distance of the coupler point, is longer than this (m)."""
+
+    length: Amount
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.length) and self.length > 0.0):
+            raise ParameterError("largest link", self.length, "be a finite number greater than zero (m)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assembly:
+    """C lies to the left (+1) or to the right (-1) of B -> D."""
+
+    branch: int
+
+    def __post_init__(self) -> None:
+        if self.branch not in (1, -1):
+            raise ParameterError("branch", self.branch, "be +1 or -1")
+
+
+@in_si(polygon="m")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PivotRegion:
+    """A pivot lies within a polygon, convex or not.
+
+    Attributes
+    ----------
+    pivot : "A" or "D"
+        The crank shaft, or the end of the ground link.
+    polygon : array_like, shape (n, 2)
+        Corners in order (m).
+    """
+
+    pivot: Literal["A", "D"]
+    polygon: ArrayLike
+
+    def __post_init__(self) -> None:
+        if self.pivot not in ("A", "D"):
+            raise ParameterError("pivot", self.pivot, "be 'A' or 'D'")
+        corners = np.array(self.polygon, dtype=float)
+        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
+            raise InputError(f"the region of pivot {self.pivot} must be at least 3 finite corners, shape (n, 2)")
+        from shapely import Polygon
+
+        shape = Polygon(corners)
+        if not shape.is_valid or not shape.area > 0.0:
+            raise InputError(f"the region of pivot {self.pivot} crosses itself or has no area: {corners.tolist()} m")
+        object.__setattr__(self, "polygon", corners)
+
+    def pieces(self) -> list[FloatArray]:
+        """Cut the region into triangles, counter-clockwise, each shape (3, 2)."""
+        from shapely import Polygon, constrained_delaunay_triangles
+        from shapely.geometry.polygon import orient
+
+        triangles = constrained_delaunay_triangles(Polygon(self.polygon))
+        return [np.array(orient(t).exterior.coords)[:3] for t in triangles.geoms]
+
+
+def half_planes(triangle: FloatArray) -> FloatArray:
+    """Return rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
+    rows = np.zeros((3, 3))
+    for k in range(3):
+        (x0, y0), (x1, y1) = triangle[k], triangle[(k + 1) % 3]
+        length = float(np.hypot(x1 - x0, y1 - y0))
+        rows[k] = (y1 - y0) / length, (x0 - x1) / length, (y0 * x1 - x0 * y1) / length
+    return rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Require:
+    """Any function of the dimensions is below zero, or zero.
+
+    Attributes
+    ----------
+    function : callable
+        Of a namespace with the dimensions of `Linkage` by name (SI), in arithmetic and the elementary functions of `math` or
+        NumPy, without branches; it is traced, so that its derivatives are exact.
+    equal : bool
+        Whether it is to be zero, instead of at most zero.
+    name : str
+        For messages.
+    scale : float
+        Magnitude of its values.
+    unit : str
+        Theirs, for messages.
+    symbolic : bool
+        Whether it takes CasADi's symbols and numbers as it stands, and may have several values.
+    """
+
+    function: Callable[..., Any]
+    equal: bool = False
+    name: str = "required function"
+    scale: float = 1.0
+    unit: str = ""
+    symbolic: bool = False
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise ParameterError(self.name, self.function, "be a function of the dimensions")
+        if not (isfinite(self.scale) and self.scale > 0.0):
+            raise ParameterError(f"scale of {self.name}", self.scale, "be a finite number greater than zero")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Along(Require):
+    """A function of the dimensions and of the crank's rotation is below zero at rotations, or all the way between two.
+
+    Attributes
+    ----------
+    rotation : ndarray, shape (n,)
+        Where it is held from the beginning (rad); ``function(d, rotation)`` has rows of n values each.
+    ends : (float, float) or None
+        Between which its greatest values are looked for, and held too; None where the rotations are all.
+    """
+
+    rotation: FloatArray
+    ends: tuple[float, float] | None = None
+
+
+class Way(NamedTuple):
+    """Over what a constraint holds that is about the crank's rotation.
+
+    Attributes
+    ----------
+    turn : bool
+        Whether the crank turns fully.
+    rotation : ndarray or None
+        The task's crank rotations, where it gives any.
+    straight : bool
+        Whether the bounds hold the coupler point on the line of B and C.
+    linkage : type
+        Whether it is about a slider-crank.
+    """
+
+    turn: bool
+    rotation: FloatArray | None
+    straight: bool = False
+    linkage: type[Linkage] = Linkage
+
+    def ends(self, what: str) -> tuple[float, float]:
+        """Return the first and last crank angle of a turn, or crank rotation of the task.
+
+        Raises InputError if neither is known.
+        """
+        if self.turn:
+            return 0.0, 2.0 * pi
+        rotation = self.timed(f"{what}, where the crank need not turn fully,")
+        return float(rotation.min()), float(rotation.max())
+
+    def timed(self, what: str) -> FloatArray:
+        """Return the task's crank rotations; raises InputError if it gives none."""
+        if self.rotation is None:
+            raise InputError(f"{what} needs crank rotations, and the task gives none")
+        return self.rotation
+
+
+class Least(NamedTuple):
+    """What is made small in the place of an error: the greatest value of a function, the greatest error bounded (units)."""
+
+    along: Along
+    error: float
+
+
+class Demand:
+    """A constraint that is functions of the dimensions kept below zero; `limit_positions` and `forces` have such."""
+
+    __slots__ = ()
+    #: Type of four-bar that it is about.
+    grashof: ClassVar[GrashofType | None] = None
+    #: Whether the crank then cannot turn fully.
+    stops: ClassVar[bool] = False
+    #: Whether something is made small in the place of an error.
+    seeks: ClassVar[bool] = False
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions."""
+        raise NotImplementedError
+
+    def sought(self, way: Way, normal: Normal) -> Least | None:
+        """Return the function that is minimised in the place of an error; None where there is none."""
+        return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeRatio(Demand):
+    """The four-bar is a crank-rocker whose slow swing takes this many times as long as its quick one.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds; 1 at least.
+    """
+
+    grashof: ClassVar[GrashofType | None] = "crank-rocker"
+
+    least: float = 1.0
+    greatest: float = inf
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.least <= self.greatest:
+            raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions."""
+
+        def differs(d: Any) -> Any:
+            # directions of C from A with crank and coupler in line, by the law of cosines
+            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+            stretched, folded = ((l1**2 + r**2 - l4**2) / (2.0 * l1 * r) for r in (l3 + l2, l3 - l2))
+            angles = [np.arctan2(np.sqrt(np.maximum(1.0 - c**2, 1e-12)), c) for c in (stretched, folded)]
+            return angles[1] - angles[0]
+
+        def advance(ratio: float) -> float:
+            return pi * (ratio - 1.0) / (ratio + 1.0)
+
+        found = []
+        if self.least > 1.0:
+            low = advance(self.least)
+            found.append(Require(function=lambda d: low**2 - differs(d) ** 2, name="least time ratio"))
+        if isfinite(self.greatest):
+            high = advance(self.greatest)
+            found.append(Require(function=lambda d: differs(d) ** 2 - high**2, name="greatest time ratio"))
+        return tuple(found)
+
+
+Constraint = Demand | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
+#: A least transmission angle of 40 degrees over a full turn.
+USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
+
+
+def _kinds() -> list[str]:
+    """Return the names of the constraints."""
+    found, below = [kind.__name__ for kind in get_args(Constraint)[1:]], [Demand]
+    while below:
+        below = [kind for one in below for kind in one.__subclasses__()]
+        found += [kind.__name__ for kind in below if not kind.__name__.startswith("_")]
+    return list(dict.fromkeys(found))
+
+
+@in_si(least="m", greatest="m")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stroke:
+    """The slider of a slider-crank, whose crank turns fully, travels this far from end to end.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds (m).
+    """
+
+    least: Amount = 0.0
+    greatest: Amount = inf
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.least <= self.greatest and self.greatest > 0.0 and isfinite(self.least)):
+            raise ParameterError("stroke", (self.least, self.greatest), "be two lengths in order (m)")
+
+    def requires(self) -> tuple[Require, ...]:
+        """Return the required functions."""
+        found = []
+        if self.least > 0.0:
+            low = self.least
+            found.append(Require(function=lambda d: low - stroke(d), name="least stroke", scale=low))
+        if isfinite(self.greatest):
+            high = self.greatest
+            found.append(Require(function=lambda d: stroke(d) - high, name="greatest stroke", scale=high))
+        return tuple(found)
+
+
+def stroke(d: Any) -> Any:
+    """Return the travel of the slider of a slider-crank (m), of numbers and symbols."""
+    l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
+    ends = [np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)) for side in (1.0, -1.0)]
+    return ends[0] - ends[1]
+
+
+def advance(d: Any) -> Any:
+    """Return the crank's rotation between the dead centres of a slider-crank less half a turn (rad), of symbols too."""
+    l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
+    angles = [np.arctan2(np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)), l1) for side in (1.0, -1.0)]
+    return angles[0] - angles[1]
+
+
+def _time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
+    """Return the time ratio of a slider-crank as required functions: (pi + advance)/(pi - advance)."""
+    low, high = (
+        pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi for ratio in (asked.least, asked.greatest)
+    )
+    found = [Require(function=lambda d: low - advance(d), name="least time ratio")] if asked.least > 1.0 else []
+    if isfinite(asked.greatest):
+        found.append(Require(function=lambda d: advance(d) - high, name="greatest time ratio"))
+    return tuple(found)
+
+
+def _check_pins(pins: str) -> None:
+    if not pins or not set(pins) <= set(PINS):
+        raise ParameterError("pins", pins, "be some of the letters ABCD")
+
+
+class _Forces(Demand):
+    """What the forces on the pins are about."""
+
+    __slots__ = ()
+    make: Make
+    pins: str
+
+    def along(self, way: Way) -> Along:
+        """Return the forces on the pins (N), a column each."""
+        ends, turn = way.ends("a force on the pins"), way.turn
+
+        def magnitudes(d: Any, rotation: Any) -> Any:
+            casadi = symbolic.library()
+            th2 = rotation if turn else rotation + d.crank_phase
+            found = pin_functions(d, self.make, th2, straight=way.straight, linkage=way.linkage)
+            # a force of zero has a slope, too
+            chosen = [found[pin] for pin in self.pins]
+            return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))
+
+        return Along(
+            function=magnitudes,
+            name="force on the pins",
+            unit="N",
+            rotation=even_rotations(ends),
+            ends=search_range(ends),
+            symbolic=True,
+        )
+
+
+@in_si(force="N")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MaxPinForce(_Forces):
+    """No pin carries more than this, over a turn of the crank or, where it need not turn fully, on the way of the task.
+
+    Attributes
+    ----------
+    force : float
+        N.
+    make : Make
+        Masses, gravity, load, and the constant speed of the crank.
+    pins : str
+        Which pins: letters of "ABCD".
+    """
+
+    force: Amount
+    make: Make = USUAL_MAKE
+    pins: str = PINS
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.force) and self.force > 0.0):
+            raise ParameterError("greatest pin force", self.force, "be a finite number greater than zero (N)")
+        _check_pins(self.pins)
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions."""
+        forces = self.along(way)
+
+        def excess(d: Any, rotation: Any) -> Any:
+            return forces.function(d, rotation) - self.force
+
+        return (replace(forces, function=excess, scale=self.force),)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LeastPinForce(_Forces):
+    """Of the linkages whose greatest error stays below a bound, that whose pins carry least is sought.
+
+    Attributes
+    ----------
+    error : float or str
+        Bound of the greatest error, as of the objective "worst" (m; of a rocker function rad).
+    make : Make
+        Masses, gravity, load, and the constant speed of the crank.
+    pins : str
+        Which pins: letters of "ABCD".
+    """
+
+    seeks: ClassVar[bool] = True
+
+    error: Amount
+    make: Make = USUAL_MAKE
+    pins: str = PINS
+
+    def __post_init__(self) -> None:
+        _check_pins(self.pins)
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions."""
+        return ()
+
+    def sought(self, way: Way, normal: Normal) -> Least:
+        """Return the function that is minimised in the place of an error; None where there is none."""
+        error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
+        if not (isfinite(error) and error > 0.0):
+            raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
+        return Least(self.along(way), error / normal.unit)
+
+
+#: The constraints that are about pin forces.
+FORCES = (MaxPinForce, LeastPinForce)
+#: Rotations at which what holds along the crank's rotation is held from the beginning.
+GRID = 48
+#: Rotation by which more than a turn is looked at (rad).
+BEYOND = 0.02
+
+
+# As constraints
+
+
+def even_rotations(ends: tuple[float, float]) -> FloatArray:
+    """Return evenly spaced rotations between two angles."""
+    return np.linspace(*ends, GRID, endpoint=ends[1] - ends[0] < 2.0 * pi)
+
+
+def search_range(ends: tuple[float, float]) -> tuple[float, float]:
+    """Return the range in which peaks are searched: a little more than a turn, so that one at its end is seen."""
+    over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
+    return ends[0] - over, ends[1] + over

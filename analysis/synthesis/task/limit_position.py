@@ -1,0 +1,431 @@
+"""Where a four-bar or a slider-crank stands still or cannot go on, and what its crank gains.
+
+In a dead centre crank and coupler lie in one line, and rocker or slider rest at the end of their travel; in a toggle coupler
+and rocker do, or the coupler is square to the guide, and the crank can go no farther. See R. L. Norton, Design of Machinery,
+6th ed., 2020, chapters 2, 3 and 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import acos, cos, inf, isfinite, pi
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from linkwork.errors import ParameterError
+
+from ...mechanisms import FIVE_BAR
+from ...numerics import symbolic
+from ...run import traced
+from ...units import Amount, in_si
+from ..linkage.kind import Kind
+from ..linkage.linkage import Linkage
+from .constraint import TURNING, Along, Demand, Require, Way, even_rotations, search_range
+
+FloatArray = NDArray[np.float64]
+#: Two links in one line: one beyond the other, or one over the other.
+InLine = Literal["stretched", "folded"]
+
+
+class _FourBarPositions:
+    """Conditions of the limit positions of a four-bar, of numbers and symbols; `POSITIONS` has those of each kind."""
+
+    @staticmethod
+    def dead_cosine(l1: float, reach: float, l4: float) -> float:
+        """Return the cosine of the direction of C from A with crank and coupler in line, C at a distance ``reach``."""
+        return (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * reach)
+
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        """Return what is zero in a dead centre: how far the triangle of A, C and D is from closing."""
+        l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
+        return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
+
+    @staticmethod
+    def toggle_cosines(l1: float, l2: float, l3: float, l4: float) -> list[float]:
+        """Return the cosines of the crank angle in the toggles."""
+        return [(l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (l3 + l4, l3 - l4)]
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        """Return what is zero in a toggle, at the cosine of the crank angle; side 1 is stretched, -1 folded."""
+        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+        reach = l3 + l4 if side > 0.0 else l3 - l4
+        return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
+
+    @staticmethod
+    def out_of_line(d: Any, c: Any) -> Any:
+        """Return what is below zero where coupler and rocker are out of line."""
+        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+        square = l1**2 + l2**2 - 2.0 * l1 * l2 * c
+        both = Linkage.transmission_excess(l3, l4, square, square, cos(TURNING))
+        return symbolic.library().horzcat(*both) / (2.0 * l3 * l4)
+
+    @staticmethod
+    def gained(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
+        """Return the numerator of the mechanical advantage, zero in a toggle."""
+        return linkage.rocker_length * (s3 * c4 - c3 * s4) / linkage.crank_length
+
+    @staticmethod
+    def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        """Return the speed of the driven link for one of the crank, from the closed loop."""
+        return traced(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
+
+
+class _SliderCrankPositions(_FourBarPositions):
+    """Conditions of the limit positions of a slider-crank: C on its guide, the coupler square to it in a toggle."""
+
+    @staticmethod
+    def dead_cosine(l1: float, reach: float, l4: float) -> float:
+        return l1 / reach
+
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        return (d.ground_length - reach * c) / d.coupler_length
+
+    @staticmethod
+    def toggle_cosines(l1: float, l2: float, l3: float, l4: float) -> list[float]:
+        return [(l1 - l3) / l2, (l1 + l3) / l2]
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        return (d.ground_length - d.crank_length * c) / d.coupler_length - side
+
+    @staticmethod
+    def out_of_line(d: Any, c: Any) -> Any:
+        apart = (d.ground_length - d.crank_length * c) / d.coupler_length
+        return apart * apart - cos(TURNING) ** 2
+
+    @staticmethod
+    def gained(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
+        return s3
+
+    @staticmethod
+    def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        return (g.s3 * c2 - g.c3 * s2) / g.s3
+
+
+#: Of a geared five-bar nothing rests.
+POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
+    "four-bar": _FourBarPositions,
+    "slider-crank": _SliderCrankPositions,
+}
+
+
+def dead_centres(linkage: Linkage) -> tuple[float, ...]:
+    """Return the crank rotations at which rocker or slider rest, within a turn from 0 (rad), increasing; none without rest.
+
+    Raises
+    ------
+    ParameterError
+        If the rocker pivot moves.
+    """
+    l1, l2, l3, l4 = _fixed_lengths(linkage)
+    found = []
+    # C from A with coupler and crank in line, stretched and folded
+    for reach in (l3 + l2, l3 - l2):
+        if reach == 0.0:
+            continue
+        # of the direction of the coupler, which points to the side of the assembly
+        cosine = POSITIONS[linkage.kind].dead_cosine(l1, reach, l4)
+        if abs(cosine) > 1.0:
+            continue
+        th3 = linkage.branch * acos(cosine)
+        found.append(th3 if reach == l3 + l2 else th3 + pi)
+    return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
+
+
+def toggles(linkage: Linkage) -> tuple[float, ...]:
+    """Return the crank rotations at which coupler and rocker are in line, within a turn from 0 (rad); none with a full turn.
+
+    Of a slider-crank where the coupler is square to the guide; where the rocker pivot moves, of the shaft that turns once
+    until all is as it was.
+    """
+    if linkage.pivot is not None:
+        return _toggles_by_roots(linkage)
+    l1, l2, l3, l4 = _fixed_lengths(linkage)
+    found = []
+    for cosine in POSITIONS[linkage.kind].toggle_cosines(l1, l2, l3, l4):
+        if abs(cosine) <= 1.0:
+            found += [acos(cosine), -acos(cosine)]
+    return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
+
+
+def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
+    """Find where the cosine of the angle between coupler and rocker passes -1 or 1."""
+
+    def beyond(phi: Any) -> Any:
+        return np.abs(linkage.cosine_at_c(linkage.reach(phi))) - 1.0
+
+    phi = np.linspace(0.0, 2.0 * pi, 1441)
+    off = beyond(phi)
+    passed = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
+    return tuple(float(brentq(beyond, phi[k], phi[k + 1], xtol=1e-13)) for k in passed)
+
+
+def time_ratio(linkage: Linkage) -> float | None:
+    """Return the time of the slow swing or stroke over that of the quick one, the crank turning evenly: 1 at least.
+
+    None where the crank cannot turn fully, or the rocker turns with it.
+
+    Raises
+    ------
+    ParameterError
+        If the rocker pivot moves.
+    """
+    rests = dead_centres(linkage)
+    if len(rests) != 2 or not linkage.turns_fully:
+        return None
+    way = rests[1] - rests[0]
+    return max(way, 2.0 * pi - way) / min(way, 2.0 * pi - way)
+
+
+def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
+    """Return the torque on the rocker for a torque on the crank, without friction and masses.
+
+    Of a slider-crank the force on the slider for a force on the crank pin across the crank: the pin's speed over the slider's.
+    Infinite in a dead centre, zero in a toggle; NaN where the links cannot be joined. Shape of the rotations.
+
+    Raises
+    ------
+    ParameterError
+        If the rocker pivot moves.
+    """
+    _fixed_lengths(linkage)
+    phi = np.atleast_1d(np.asarray(rotation, dtype=float))
+    c3, s3, c4, s4, _, _ = linkage.directions(phi)
+    th2 = phi + linkage.crank_phase
+    gained = POSITIONS[linkage.kind].gained(linkage, c3, s3, c4, s4)
+    given = s3 * np.cos(th2) - c3 * np.sin(th2)
+    with np.errstate(divide="ignore"):
+        ratio = np.where(given == 0.0, inf, gained / np.where(given == 0.0, 1.0, given))
+    return np.where(np.isfinite(gained), ratio, np.nan).reshape(np.shape(rotation))
+
+
+def _fixed_lengths(linkage: Linkage) -> tuple[float, float, float, float]:
+    """Return l1 ... l4 of a four-bar or a slider-crank; raises ParameterError if the rocker pivot moves."""
+    if linkage.pivot is not None:
+        raise ParameterError("pivot", linkage.pivot, "be fixed: where it moves, nothing rests in a dead centre")
+    return linkage.ground_length, linkage.crank_length, linkage.coupler_length, linkage.rocker_length
+
+
+def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
+    """Read a range of crank rotations (rad), shorter than the longest, from its two ends or from one value."""
+    try:
+        low, high = (float(end) for end in (value if isinstance(value, tuple | list) else (value, value)))
+    except (TypeError, ValueError):
+        raise ParameterError(name, value, "be a crank rotation, or the two ends of a range (rad)") from None
+    if not (isfinite(low) and isfinite(high) and low <= high < low + longest):
+        raise ParameterError(name, value, f"be crank rotations in order, less than {longest:.4g} rad apart")
+    return low, high
+
+
+@in_si(at="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MechanicalAdvantage(Demand):
+    """The rocker's torque for one of the crank's, or the slider's force for one at the crank pin, is within bounds.
+
+    Either way round; see `mechanical_advantage`.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds.
+    at : array_like, optional
+        Crank rotations where they are asked (rad). Without them they hold all the way: over the turn, or where the crank need
+        not turn fully from the first to the last of the task's rotations.
+    """
+
+    least: float = 0.0
+    greatest: float = inf
+    at: Any = None
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.least <= self.greatest and isfinite(self.least) and self.greatest > 0.0):
+            raise ParameterError(
+                "mechanical advantage", (self.least, self.greatest), "be two numbers in order, 0 or above"
+            )
+        if self.at is not None:
+            at = np.atleast_1d(np.asarray(self.at, dtype=float))
+            if at.ndim != 1 or not len(at) or not np.isfinite(at).all():
+                raise ParameterError("rotations of the mechanical advantage", self.at, "be finite numbers (rad)")
+            object.__setattr__(self, "at", at)
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions of the dimensions."""
+        all_the_way = self.at is None
+        ends = way.ends("mechanical advantage") if all_the_way else None
+        if ends is None:
+            way.timed("mechanical advantage at crank rotations")
+        rotation, turn = self.at if ends is None else even_rotations(ends), way.turn and all_the_way
+
+        def speed(d: Any, rotation: Any) -> Any:
+            casadi = symbolic.library()
+            th2 = rotation if turn else rotation + d.crank_phase
+            c2, s2 = casadi.cos(th2), casadi.sin(th2)
+            l2, l3, l4 = d.crank_length, d.coupler_length, d.rocker_length
+            g = way.linkage.closure()(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
+            return POSITIONS[way.linkage.kind].speed(g, c2, s2, l2, l3, l4)
+
+        def slow(d: Any, rotation: Any) -> Any:
+            both = self.least * speed(d, rotation)
+            return symbolic.library().horzcat(both - 1.0, -both - 1.0)
+
+        def fast(d: Any, rotation: Any) -> Any:
+            return 1.0 - (self.greatest * speed(d, rotation)) ** 2
+
+        asked = {"least": (slow, self.least > 0.0), "greatest": (fast, isfinite(self.greatest))}
+        return tuple(
+            Along(
+                function=f,
+                name=f"{which} mechanical advantage",
+                rotation=rotation,
+                ends=ends and search_range(ends),
+                symbolic=True,
+            )
+            for which, (f, wanted) in asked.items()
+            if wanted
+        )
+
+
+@in_si(at="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place(Demand):
+    """Two links come to lie in one line at a crank rotation, or somewhere within a range of rotations.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        From the start of the task's rotations (rad).
+    position : "stretched" or "folded"
+        One link beyond the other, or one over the other.
+    """
+
+    at: Amount
+    position: InLine = "stretched"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", _rotations(self.at, f"rotation of a {self._name()}", pi))
+        if self.position not in get_args(InLine):
+            raise ParameterError("position", self.position, f"be one of {', '.join(get_args(InLine))}")
+
+    @classmethod
+    def _name(cls) -> str:
+        raise NotImplementedError
+
+    def _require(self, function: Callable[[Any], Any], *, equal: bool = False) -> Require:
+        return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
+
+    def _between(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
+        """Require that a function which is zero in the place changes its sign within the range."""
+        way.timed(f"a {self._name()} at crank rotations")
+        low, high = self.at
+        if low == high:
+            return (self._require(lambda d: distance(d, low), equal=True),)
+        return (self._require(lambda d: distance(d, low) * distance(d, high)),)
+
+
+class DeadCentre(_Place):
+    """Crank and coupler come to lie in one line, rocker or slider at the end of their travel, at a rotation or in a range.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        From the start of the task's rotations (rad).
+    position : "stretched" or "folded"
+        The coupler beyond the crank, or over it.
+    """
+
+    __slots__ = ()
+
+    @classmethod
+    def _name(cls) -> str:
+        return "dead centre"
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions of the dimensions."""
+        stretched = self.position == "stretched"
+
+        def closes(d: Any, rotation: float) -> Any:
+            reach = d.coupler_length + d.crank_length if stretched else d.coupler_length - d.crank_length
+            # C from A is along the crank, or against it
+            c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
+            return POSITIONS[way.linkage.kind].dead_gap(d, reach, c)
+
+        def aside(d: Any, rotation: float) -> Any:
+            s = symbolic.library().sin(rotation + d.crank_phase)
+            return -d.branch * s if stretched else d.branch * s
+
+        sides = [self._require(partial(aside, rotation=end)) for end in dict.fromkeys(self.at)]
+        return (*self._between(way, closes), *sides)
+
+
+class Toggle(_Place):
+    """Coupler and rocker come to lie in one line, where the crank can go no farther, at a crank rotation or in a range.
+
+    Of a slider-crank the coupler comes to be square to its guide, pointing away from the ground link's start or back to it.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        From the start of the task's rotations (rad).
+    position : "stretched" or "folded"
+        The coupler beyond the rocker, or over it.
+    """
+
+    __slots__ = ()
+    stops: ClassVar[bool] = True
+
+    @classmethod
+    def _name(cls) -> str:
+        return "toggle"
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions of the dimensions."""
+
+        def closes(d: Any, rotation: float) -> Any:
+            c = symbolic.library().cos(rotation + d.crank_phase)
+            return POSITIONS[way.linkage.kind].toggle_gap(d, c, 1.0 if self.position == "stretched" else -1.0)
+
+        return self._between(way, closes)
+
+
+@in_si(between="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoToggle(Demand):
+    """The links stay joined, coupler and rocker out of line, from one crank rotation to another.
+
+    Attributes
+    ----------
+    between : (float, float)
+        From the start of the task's rotations (rad).
+    """
+
+    between: tuple[Amount, Amount]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "between", _rotations(self.between, "rotations without a toggle"))
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Return the required functions of the dimensions."""
+        way.timed("a range of crank rotations without a toggle")
+
+        def excess(d: Any, rotation: Any) -> Any:
+            return POSITIONS[way.linkage.kind].out_of_line(d, symbolic.library().cos(rotation + d.crank_phase))
+
+        ends = self.between
+        return (
+            Along(
+                function=excess,
+                name="range without a toggle",
+                rotation=even_rotations(ends),
+                ends=search_range(ends),
+                symbolic=True,
+            ),
+        )

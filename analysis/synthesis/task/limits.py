@@ -1,0 +1,446 @@
+"""What a linkage must satisfy besides tracing its target."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError
+
+from ...files import unknown_name
+from ..linkage.kind import Kind
+from ..linkage.linkage import ANGLES, LINKS, FiveBar, Linkage, SliderCrank
+from ..linkage.pivot import CrankUnknown, geared
+from .constraint import (
+    SECOND_LENGTH,
+    UNKNOWNS,
+    Along,
+    Assembly,
+    Constraint,
+    Demand,
+    FullTurn,
+    Grashof,
+    InfeasibleError,
+    LargestLink,
+    Least,
+    LeastTransmission,
+    PivotRegion,
+    Require,
+    Stroke,
+    TimeRatio,
+    Way,
+    _kinds,
+    _time_ratio,
+)
+from .task import Normal, RockerFunction, SliderFunction, Task
+
+FloatArray = NDArray[np.float64]
+#: Largest link by default, in sizes of the target; and, of a rocker function, in ground links.
+LARGEST = 5.0
+#: Ground link of a rocker function by default (m): its angles do not depend on the size.
+GROUND = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Limits:
+    """Bounds and constraints in normal form: lengths in units of the target's size, about its centre.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (11,)
+        Of `UNKNOWNS`.
+    turn, way : float or None
+        Least transmission angle (rad) over a turn and over the way of the task: 0 where the crank is only to turn fully, or
+        the links only to stay joined; None where nothing is asked.
+    grashof : str or None
+    branches : tuple of int
+        Assemblies to be tried.
+    regions : tuple
+        (pivot, triangles of complex corners), in units.
+    requires : tuple of Require
+    linkage : type
+        Type of the linkages.
+    second : (float, float), optional
+        Bounds of a second crank's length, in units, of a geared five-bar.
+    ratio : float
+        Of its gears.
+    least : Least, optional
+        What is made small in the place of an error.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    turn: float | None
+    way: float | None
+    grashof: str | None
+    branches: tuple[int, ...]
+    regions: tuple[tuple[str, tuple[FloatArray, ...]], ...]
+    requires: tuple[Require, ...]
+    linkage: type[Linkage] = Linkage
+    second: tuple[float, float] | None = None
+    ratio: float = 1.0
+    least: Least | None = None
+
+    @property
+    def gears(self) -> tuple[int, int]:
+        """Return the turns of the crank and of the second one for one of the shaft whose rotation is searched."""
+        return (1, 0) if self.second is None else geared(self.ratio)
+
+    def second_crank(self, unit: float) -> CrankUnknown | None:
+        """Return the second crank that a search varies; None but for a geared five-bar. The unit is in m."""
+        if self.second is None:
+            return None
+        low, high = self.second
+        return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
+
+    def admits(self, linkage: Linkage) -> bool:
+        """Return whether a linkage is of the kind that is searched for; a pivot moved otherwise counts as a four-bar's."""
+        if self.linkage is FiveBar:
+            return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio
+        return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)
+
+    @property
+    def along(self) -> bool:
+        """Return whether something holds along the crank's rotation."""
+        return any(isinstance(require, Along) for require in self.requires)
+
+    @property
+    def bounds_only(self) -> bool:
+        """Return whether nothing but bounds is asked, so that a least squares method can do it."""
+        return (
+            self.turn is None
+            and self.way is None
+            and self.grashof is None
+            and self.least is None
+            and not (self.regions or self.requires)
+        )
+
+
+def make_limits(
+    task: Task,
+    normal: Normal,
+    bounds: Mapping[str, tuple[float, float]] | None,
+    constraints: Sequence[Constraint],
+    *,
+    linkage: type[Linkage] = Linkage,
+) -> Limits:
+    """Return bounds and constraints of a task in normal form, of a four-bar or a slider-crank.
+
+    Raises ParameterError if a bound does not have the name of a dimension, or its ends are in the wrong order; InfeasibleError
+    if they contradict one another.
+    """
+    if not isinstance(bounds, Mapping | None):
+        raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
+    if not isinstance(constraints, Sequence):
+        raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
+    # kinds of linkages without a second crank leave it out
+    bounds = {name: ends for name, ends in (bounds or {}).items() if name != SECOND_LENGTH}
+    for name in bounds:
+        if name not in UNKNOWNS:
+            raise ParameterError(name, bounds[name], f"have the name of a dimension: {', '.join(sorted(UNKNOWNS))}")
+    for c in constraints:
+        if not isinstance(c, Constraint):
+            raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")
+    given = _ends(task, normal, bounds, constraints)
+    _check_links(given, constraints, linkage)
+    _check_reach(given, normal, constraints)
+    lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
+    shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
+    shift[:2] = normal.origin.real, normal.origin.imag
+    scale[:7] = normal.unit
+    turn, way, grashof = _turning(constraints)
+    straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
+    over = Way(turn is not None, normal.rotation, straight, linkage)
+    least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
+    if len(least) > 1:
+        raise InputError("more than one thing is to be made small: a search has one objective")
+    branches = {c.branch for c in constraints if isinstance(c, Assembly)}
+    if len(branches) > 1:
+        raise InfeasibleError("both assemblies are asked for at once")
+    return Limits(
+        low=(lows - shift) / scale,
+        high=(highs - shift) / scale,
+        turn=turn,
+        way=way,
+        grashof=grashof,
+        branches=tuple(branches) or (1, -1),
+        regions=tuple(
+            (c.pivot, tuple((piece - shift[:2]) / normal.unit for piece in c.pieces()))
+            for c in constraints
+            if isinstance(c, PivotRegion)
+        ),
+        requires=tuple(r for c in constraints for r in _required(c, over)),
+        linkage=linkage,
+        least=least[0] if least else None,
+    )
+
+
+def _ends(
+    task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]
+) -> dict[str, tuple[float, float]]:
+    """Return the least and greatest value of every unknown (m, rad): as asked, or the usual ones."""
+    caps = [c.length for c in constraints if isinstance(c, LargestLink)]
+    function = isinstance(task, RockerFunction)
+    cap = min(caps, default=LARGEST * (GROUND if function else normal.unit))
+    # where a function is required, what is returned is what that function saw
+    turns = 1.0 if any(isinstance(c, Require) for c in constraints) else 4.0
+    usual = dict.fromkeys(ANGLES, (-turns * pi, turns * pi)) | dict.fromkeys(LINKS, (1e-3 * cap, cap))
+    usual["point_distance"] = 0.0, cap
+    for name, middle in (("pivot_x", normal.origin.real), ("pivot_y", normal.origin.imag)):
+        usual[name] = middle - 4.0 * cap, middle + 4.0 * cap
+    if not normal.mounting:
+        usual["output_angle"] = 0.0, 0.0
+    if function:
+        usual |= dict.fromkeys(("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle"), (0.0, 0.0))
+        if not caps and not set(LINKS) & set(bounds):
+            usual["ground_length"] = GROUND, GROUND
+    ends = {name: _ordered(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS}
+    for name in (*LINKS, "point_distance"):
+        low, high = ends[name]
+        if name in LINKS and high <= 0.0:
+            raise ParameterError(f"bound of {name}", high, "be above zero (m): a link has a length")
+        if caps and low > cap:
+            raise InfeasibleError(
+                f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
+            )
+        low, high = max(low, 1e-6 * cap if name in LINKS else 0.0), min(high, cap) if caps else high
+        if low > high:
+            raise InfeasibleError(f"{name} is to be at most {high:g} m: it is a distance and cannot be below {low:g} m")
+        ends[name] = low, high
+    return ends
+
+
+def _required(constraint: Constraint, way: Way) -> tuple[Require, ...]:
+    if isinstance(constraint, Demand):
+        return constraint.requires(way)
+    return (constraint,) if isinstance(constraint, Require) else ()
+
+
+def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
+    """Return the least transmission angles over a turn and over the way of the task, and Grashof's type; see `Limits`."""
+    turn, way = (
+        max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
+        for over in ("turn", "task")
+    )
+    types: set[str] = {c.type for c in constraints if isinstance(c, Grashof)}
+    demands = [c for c in constraints if isinstance(c, Demand)]
+    types |= {c.grashof for c in demands if c.grashof is not None}
+    if len(types) > 1:
+        raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
+    type_ = types.pop() if types else None
+    if turn is None and (any(isinstance(c, FullTurn) for c in constraints) or type_ in ("crank-rocker", "drag-link")):
+        turn = 0.0
+    if type_ in ("double-rocker", "rocker-crank", "triple-rocker"):
+        if turn is not None:
+            raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
+        # on its way it must stay joined all the same
+        way = way or 0.0
+    if turn is not None and any(c.stops for c in demands):
+        raise InfeasibleError(
+            "a crank that is to come to a toggle cannot turn fully, which another constraint asks for"
+        )
+    return turn, way, type_
+
+
+def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]) -> tuple[float, float]:
+    """Return bounds as given, with the usual value for an end that is None or infinite."""
+    try:
+        low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
+    except (TypeError, ValueError):
+        raise ParameterError(f"bounds of {name}", ends, "be two numbers, the least and the greatest value") from None
+    if not np.isfinite([low, high]).all():
+        raise ParameterError(f"bounds of {name}", ends, "be numbers, or None for an open end")
+    if low > high:
+        unit = "rad" if name in ANGLES else "m"
+        raise InfeasibleError(f"{name} is to be at least {low:g} {unit} and at most {high:g} {unit}: no value is")
+    return low, high
+
+
+def _check_links(
+    given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], linkage: type[Linkage]
+) -> None:
+    """Make sure that bounds alone leave a linkage whose crank turns, where that is asked."""
+    if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
+        return
+    l1, l2, l3, l4 = (given[name] for name in LINKS)
+    # l1 + l2 <= l3 + l4 is needed for a full turn, of a slider-crank l1 + l2 <= l3
+    sliding = linkage is SliderCrank
+    least, most = l1[0] + l2[0], l3[1] + (0.0 if sliding else l4[1])
+    if least > most:
+        raise InfeasibleError(
+            f"the crank cannot turn fully: {'offset' if sliding else 'ground link'} and crank are at least "
+            f"{1e3 * least:.4g} mm together, {'the coupler' if sliding else 'coupler and rocker'} at most {1e3 * most:.4g} mm"
+        )
+
+
+def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, constraints: Sequence[Constraint]) -> None:
+    """Make sure that the coupler point, which stays within crank and point distance of the shaft, can span the target."""
+    from shapely import MultiPoint, Polygon, box
+
+    (left, right), (bottom, top) = given["pivot_x"], given["pivot_y"]
+    room = box(left, bottom, right, top)
+    for c in constraints:
+        if isinstance(c, PivotRegion) and c.pivot == "A":
+            room = room.intersection(Polygon(c.polygon))
+    if room.is_empty:
+        raise InfeasibleError(
+            "the regions of pivot A and the bounds of its place have no point in common: pivot_x is to be "
+            f"{1e3 * left:.4g} to {1e3 * right:.4g} mm, pivot_y {1e3 * bottom:.4g} to {1e3 * top:.4g} mm"
+        )
+    points = normal.points if normal.outline is None else normal.outline
+    if points is None:
+        return
+    across = normal.unit * float(max(np.ptp(points.real), np.ptp(points.imag)))
+    reach = given["crank_length"][1] + given["point_distance"][1]
+    ends = f"{1e3 * given['crank_length'][1]:.4g} mm and {1e3 * given['point_distance'][1]:.4g} mm"
+    if 2.0 * reach < across:
+        raise InfeasibleError(
+            f"the coupler point cannot span the target, {1e3 * across:.4g} mm across: crank and point distance, of at most "
+            f"{ends}, keep it within {2e3 * reach:.4g} mm"
+        )
+    places = normal.origin + normal.unit * points
+    away = room.distance(MultiPoint(np.column_stack([places.real, places.imag])))
+    if away > reach:
+        raise InfeasibleError(
+            f"the coupler point cannot come to the target: the crank shaft is to be {1e3 * away:.4g} mm from it at least, and "
+            f"crank and point distance, of at most {ends}, reach {1e3 * reach:.4g} mm"
+        )
+
+
+#: Ratios of the gears of a five-bar that are tried.
+GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
+#: Constraints that any linkage can keep, and those of a slider-crank.
+_ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
+_KEPT: Mapping[Kind, tuple[type, ...]] = {
+    "four-bar": get_args(Constraint),
+    "slider-crank": (*_ANY, Demand, Stroke),
+    "geared-five-bar": _ANY,
+}
+#: Why a five-bar can keep none of the demands.
+_NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant of the pin forces has no second crank"
+
+
+def usual_kinds(task: Task) -> tuple[Kind, ...]:
+    """Return the kinds that are tried where none are asked for."""
+    return ("slider-crank",) if isinstance(task, SliderFunction) else ("four-bar",)
+
+
+def limits_by_kind(
+    task: Task,
+    normal: Normal,
+    bounds: Mapping[str, tuple[float, float]] | None,
+    constraints: Sequence[Constraint | Stroke],
+    kinds: Sequence[Kind] | None = None,
+    gears: Sequence[float] = GEARS,
+) -> list[Limits]:
+    """Return bounds and constraints for each kind of linkage, of geared five-bars for each ratio; see `usual_kinds`.
+
+    Raises InputError if a kind is none, cannot do the task, or has no such constraint; ParameterError, InfeasibleError as
+    `make_limits`.
+    """
+    kinds = usual_kinds(task) if kinds is None else kinds
+    if isinstance(kinds, str) or not kinds:
+        raise InputError(
+            f"kinds are {kinds!r}: they must be a sequence of one or several of {', '.join(get_args(Kind))}"
+        )
+    found: list[Limits] = []
+    for kind in kinds:
+        if kind not in get_args(Kind):
+            raise unknown_name(kind, get_args(Kind), f"kind {kind!r}")
+        _check_task(kind, task)
+        if isinstance(constraints, Sequence):
+            _check_constraints(kind, constraints)
+        if kind == "four-bar":
+            own: Sequence[Any] = constraints
+            found.append(make_limits(task, normal, bounds, own))
+        elif kind == "slider-crank":
+            found.append(_slider_crank_limits(task, normal, bounds, constraints))
+        else:
+            if not gears:
+                raise InputError("no ratio of gears: geared five-bars need at least one")
+            found += _five_bar_limits(task, normal, bounds, constraints, gears)
+    return found
+
+
+def _check_task(kind: Kind, task: Task) -> None:
+    if isinstance(task, SliderFunction) and kind != "slider-crank":
+        raise InputError(f"a {type(task).__name__} is of a slider: a {kind} has none, kinds must be ('slider-crank',)")
+    if isinstance(task, RockerFunction) and kind == "slider-crank":
+        raise InputError(
+            "a RockerFunction is of a rocker: a slider-crank has none; ask for a SliderFunction of its slider"
+        )
+
+
+def _check_constraints(kind: Kind, constraints: Sequence[Any]) -> None:
+    for c in constraints:
+        known = isinstance(c, Constraint | Stroke)
+        if (known and not isinstance(c, _KEPT[kind])) or (kind == "slider-crank" and getattr(c, "pivot", None) == "D"):
+            name = "a region of pivot D" if isinstance(c, PivotRegion) else type(c).__name__
+            able = [other for other, kept in _KEPT.items() if isinstance(c, kept) and other != kind]
+            why = "" if kind == "slider-crank" or not isinstance(c, Demand) else f" ({_NO_DEMANDS})"
+            raise InputError(f"a {kind} cannot keep {name}{why}: leave it out, or ask for {' or '.join(able)} alone")
+
+
+def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any]) -> Limits:
+    own: list[Constraint] = []
+    for c in constraints:
+        if isinstance(c, Stroke):
+            own += c.requires()
+        elif isinstance(c, TimeRatio):
+            own += _time_ratio(c)
+        else:
+            own.append(c)
+    if any(isinstance(c, Stroke | TimeRatio) for c in constraints):
+        own.append(FullTurn())
+    if isinstance(task, SliderFunction):
+        own += (
+            # the guide is the x axis, from either side of it, and the coupler point the slider
+            Require(function=lambda d: np.cos(d.ground_angle), equal=True, name="direction of the guide"),
+            Require(
+                function=lambda d: d.point_distance - d.coupler_length, equal=True, name="slider", scale=normal.unit
+            ),
+        )
+        bounds = {"point_angle": (0.0, 0.0)} | dict(bounds or {})
+    given = {"ground_length": (0.0, None)} | {n: ends for n, ends in dict(bounds or {}).items() if n != "rocker_length"}
+    limits = make_limits(task, normal, given, own, linkage=SliderCrank)
+    low, high = limits.low.copy(), limits.high.copy()
+    low[UNKNOWNS.index("rocker_length")] = high[UNKNOWNS.index("rocker_length")] = 0.0
+    offset = UNKNOWNS.index("ground_length")
+    asked = given["ground_length"][0]
+    low[offset] = (asked or 0.0) / normal.unit
+    return replace(limits, low=low, high=high)
+
+
+def _five_bar_limits(
+    task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any], gears: Sequence[float]
+) -> list[Limits]:
+    limits = make_limits(task, normal, bounds, constraints)
+    links = slice(UNKNOWNS.index("ground_length"), UNKNOWNS.index("point_distance"))
+    longest = float(limits.high[links].max())
+    second = 1e-3 * longest, longest
+    if isinstance(bounds, Mapping) and SECOND_LENGTH in bounds:
+        low, high = bounds[SECOND_LENGTH]
+        unknown = CrankUnknown(ratio=1, length=(low, high))
+        second = unknown.length[0] / normal.unit, unknown.length[1] / normal.unit
+    # a ratio of gears is refused where it is made one
+    made = [CrankUnknown(ratio=ratio, length=(1.0, 1.0)).ratio for ratio in gears]
+    return [replace(limits, linkage=FiveBar, second=second, ratio=float(ratio)) for ratio in made]
+
+
+def as_asked(task: Task, linkage: Linkage) -> Linkage:
+    """Move a slider-crank's guide to the x axis and its coupler point to the slider, exactly, where the task asks for that."""
+    if not isinstance(task, SliderFunction):
+        return linkage
+    side = 1.0 if linkage.ground_angle > 0.0 else -1.0
+    return replace(
+        linkage,
+        pivot_y=-side * linkage.ground_length,
+        point_distance=linkage.coupler_length,
+        point_angle=0.0,
+        ground_angle=0.5 * pi * side,
+    )

@@ -1,0 +1,587 @@
+"""What is to be traced: plane curves as points in m, from arrays or files.
+
+A curve is a polyline: its points joined by straight segments, the last one to the first if it is closed. Length, centroid,
+size and areas are exact for the polyline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import atan2, cos, isfinite, pi, sin
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+from ...files import read_points
+
+FloatArray = NDArray[np.float64]
+#: Share of a curve's extent below which two points are the same one, and of its length squared below which it has no area.
+COINCIDENT = 1e-12
+#: Most points that the smoothing takes; a curve of more is first resampled to as many.
+MOST_SMOOTHED = 1000
+#: Weight of the degrees of freedom in the generalised cross-validation: 1 is the plain one, which smooths too little now
+#: and then; 1.4 is advised by Kim and Gu, J. R. Statist. Soc. B 66 (2004), p 337.
+FREEDOM_WEIGHT = 1.4
+
+
+def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
+    """Return points as an array of shape (n, 2) of finite numbers, a copy.
+
+    Raises InputError if the shape is another, a coordinate is not finite, or there are less than ``least`` points; ``what``
+    they are is named.
+    """
+    try:
+        array = np.array(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} is not an array of numbers: {error}") from error
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise InputError(f"{what} has shape {array.shape}: it must be (n, 2), a point a row")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{what} has {len(bad)} points that are not finite, the first at index {bad[0]}: {array[bad[0]]}"
+        )
+    if len(array) < least:
+        raise InputError(f"{what} has {len(array)} points: it needs at least {least}")
+    return array
+
+
+def ring(points: FloatArray, closed: bool) -> FloatArray:
+    """Return the polyline's vertices in order, the first one again at the end if it is closed."""
+    return np.vstack([points, points[:1]]) if closed else points
+
+
+def arc_lengths(vertices: FloatArray) -> FloatArray:
+    """Return the length along a polyline up to each vertex, from 0, shape (n,)."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
+
+
+def halves(lengths: FloatArray, closed: bool) -> FloatArray:
+    """Return half of both segments at each point of a polyline, from the lengths of its segments."""
+    before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
+    after = lengths if closed else np.append(lengths, 0.0)
+    both: FloatArray = 0.5 * (before + after)
+    return both
+
+
+def along(vertices: FloatArray, s: ArrayLike) -> FloatArray:
+    """Interpolate points of a polyline at arc lengths s, shape (len(s), 2)."""
+    lengths = arc_lengths(vertices)
+    return np.column_stack([np.interp(np.asarray(s, dtype=float), lengths, column) for column in vertices.T])
+
+
+def even_odd_area(*rings: FloatArray) -> float:
+    """Compute the area of the points that closed polylines go round an odd number of times in all (m2).
+
+    Of one polyline it is the enclosed area, by the even-odd rule where it crosses itself: both lobes of a figure-eight
+    count, an inner loop does not. Of two it is the area of the symmetric difference of what they enclose, because a
+    point is in that if it is inside one of them and not the other. The polylines are cut at their crossings, and the faces
+    between the pieces counted or not by a point in each.
+
+    Parameters
+    ----------
+    *rings : ndarray, shape (n, 2)
+        Closed polylines without the first point again at the end.
+    """
+    import shapely
+
+    vertices = [ring(points, True) for points in rings]
+    pieces = shapely.get_parts(shapely.unary_union([shapely.LineString(v) for v in vertices]))
+    faces = shapely.get_parts(shapely.polygonize(pieces))
+    x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
+    inside = [shapely.contains_xy(shapely.Polygon(v), x, y) for v in vertices]
+    return float(shapely.area(faces)[np.logical_xor.reduce(inside)].sum())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TargetPath:
+    """A plane curve to be traced, in the order of the points.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        m; a closed curve does not repeat its first point at the end.
+    closed : bool
+        Whether the last point is joined to the first.
+
+    Raises
+    ------
+    InputError
+        If there are less than 3 points (2 if open), one is not finite, two in succession or all are the same, the shape is
+        not (n, 2), or a closed curve encloses no area.
+    """
+
+    points: FloatArray
+    closed: bool
+
+    def __post_init__(self) -> None:
+        points = plane_points(self.points, "the target", 3 if self.closed else 2)
+        extent = float(np.ptp(points, axis=0).max())
+        nothing = COINCIDENT * max(extent, float(np.abs(points).max()))
+        if extent <= nothing:
+            raise InputError(
+                f"all {len(points)} points of the target are the same one: {points[0, 0]:.6g} m, {points[0, 1]:.6g} m"
+            )
+        # the magnitude too: far from the origin the digits of a coordinate are fewer
+        steps = np.hypot(*np.diff(ring(points, self.closed), axis=0).T)
+        same = np.flatnonzero(steps <= nothing)
+        if len(same):
+            first, second = int(same[0]), int(same[0] + 1) % len(points)
+            hint = ": the last point repeats the first, leave it out" if second == 0 else ""
+            raise InputError(
+                f"the target has {len(same)} pairs of successive points that are the same, the first at indices "
+                f"{first} and {second}{hint}"
+            )
+        points.setflags(write=False)
+        object.__setattr__(self, "points", points)
+        if self.closed and self.enclosed_area <= COINCIDENT * self.length**2:
+            raise InputError(
+                "the target is closed and encloses no area: a curve traced there and back is one that is not closed"
+            )
+
+    @classmethod
+    def from_file(
+        cls, path: str | Path, *, unit: str | None = None, name: str | None = None, closed: bool | None = None
+    ) -> TargetPath:
+        """Read the curve of a CSV or SVG file; see `analysis.files.read_points`. ``closed`` overrules the file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or its points are no target.
+        """
+        points, found = read_points(path, unit=unit, name=name)
+        return cls(points=points, closed=found if closed is None else closed)
+
+    @property
+    def length(self) -> float:
+        """Return the length of the polyline (m)."""
+        return float(arc_lengths(ring(self.points, self.closed))[-1])
+
+    def _segments(self) -> tuple[FloatArray, FloatArray]:
+        vertices = ring(self.points, self.closed)
+        return 0.5 * (vertices[:-1] + vertices[1:]), np.hypot(*np.diff(vertices, axis=0).T)
+
+    @property
+    def centroid(self) -> FloatArray:
+        """Return the centroid of the line itself, not of the area inside (m), shape (2,)."""
+        middles, lengths = self._segments()
+        centre: FloatArray = lengths @ middles / lengths.sum()
+        return centre
+
+    @property
+    def size(self) -> float:
+        """Return the radius of gyration: the root of the mean squared distance of the line from its centroid (m)."""
+        middles, lengths = self._segments()
+        # a segment has l^2/12 about its own middle
+        squares = ((middles - self.centroid) ** 2).sum(axis=1) + lengths**2 / 12.0
+        return float(np.sqrt(lengths @ squares / lengths.sum()))
+
+    @property
+    def signed_area(self) -> float:
+        """Return the integral of x dy round the closed curve (m2): positive counter-clockwise; lobes of a figure-eight cancel.
+
+        Raises
+        ------
+        InputError
+            If the curve is open.
+        """
+        self._must_be_closed()
+        x, y = (self.points - self.points[0]).T
+        return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+    @property
+    def enclosed_area(self) -> float:
+        """Return the area inside, by the even-odd rule where the curve crosses itself (m2); see `even_odd_area`.
+
+        Raises
+        ------
+        InputError
+            If the curve is open.
+        """
+        self._must_be_closed()
+        return even_odd_area(self.points)
+
+    def _must_be_closed(self) -> None:
+        if not self.closed:
+            raise InputError("the target is open: it encloses no area")
+
+    @property
+    def weights(self) -> FloatArray:
+        """Return the arc length that belongs to each point: half of both segments at it (m), shape (n,)."""
+        return halves(self._segments()[1], self.closed)
+
+    @property
+    def normals(self) -> FloatArray:
+        """Return the unit normals at the points, shape (n, 2): outwards of a closed curve, to the right along an open one.
+
+        The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), at an
+        open end that of the segment. Of a closed curve that crosses itself 'outwards' is that of the lobe with more area.
+        """
+        vertices = ring(self.points, self.closed)
+        steps = np.diff(vertices, axis=0)
+        lengths = np.hypot(*steps.T)[:, None]
+        units = steps / lengths
+        if self.closed:
+            before, after, h, k = np.roll(units, 1, axis=0), units, np.roll(lengths, 1, axis=0), lengths
+        else:
+            before, after = np.vstack([units[:1], units]), np.vstack([units, units[-1:]])
+            h, k = np.vstack([lengths[:1], lengths]), np.vstack([lengths, lengths[-1:]])
+        tangents = (k * before + h * after) / (h + k)
+        size = np.hypot(*tangents.T)[:, None]
+        # at the tip of a cusp the curve turns back on itself: the side on which it came
+        tangents = np.where(size > 1e-9, tangents / np.maximum(size, 1e-9), before)
+        side = -1.0 if self.closed and self.signed_area < 0.0 else 1.0
+        normals: FloatArray = side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
+        return normals
+
+    def reversed(self) -> TargetPath:
+        """Return the same curve the other way round; a closed one starts at the same point."""
+        points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
+        return TargetPath(points=points, closed=self.closed)
+
+    def resampled(self, n: int) -> TargetPath:
+        """Return n points at equal arc length along the polyline, from the first point on, with both ends of an open one.
+
+        Raises
+        ------
+        InputError
+            If n is less than 3 (2 if open), or the points fall on each other.
+        """
+        least = 3 if self.closed else 2
+        if n < least:
+            raise InputError(f"{n} points are asked for: there must be at least {least}")
+        s = np.linspace(0.0, self.length, n, endpoint=not self.closed)
+        return TargetPath(points=along(ring(self.points, self.closed), s), closed=self.closed)
+
+    def transformed(
+        self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
+    ) -> TargetPath:
+        """Return the curve scaled and turned (rad, counter-clockwise) about the origin, then shifted (m).
+
+        Raises
+        ------
+        InputError
+            If the scale is not greater than zero, or a number is not finite.
+        """
+        if not scale > 0.0:
+            raise InputError(f"the scale is {scale!r}: it must be greater than zero")
+        c, s = scale * cos(angle), scale * sin(angle)
+        return TargetPath(points=self.points @ np.array([[c, s], [-s, c]]) + shift, closed=self.closed)
+
+    def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
+        """Fit a cubic smoothing spline to a noisy curve; return n points of it at equal arc length.
+
+        The spline z(u) over the chord length u of the points z_k = x + i y minimises::
+
+            sum |z_k - z(u_k)|^2 + lambda * integral |z''|^2 du,
+
+        periodic for a closed curve, with natural ends for an open one (Green and Silverman, Nonparametric Regression and
+        Generalized Linear Models, 1994, chapter 2). Both coordinates share lambda, so that turning the curve turns the result.
+
+        Parameters
+        ----------
+        n : int
+        deviation : float, optional
+            Root of the mean squared distance of the points from the spline (m), if the noise is known; by default lambda is
+            chosen by generalised cross-validation, which takes what is not correlated from point to point as noise. For
+            a slow tremor of the hand give the deviation.
+
+        Raises
+        ------
+        InputError
+            If the curve has less than 6 points, or the deviation is not greater than zero and less than that of the
+            smoothest curve there is (a point if closed, a straight line if open).
+        """
+        from scipy.interpolate import CubicSpline
+        from scipy.optimize import brentq, minimize_scalar
+
+        if len(self.points) < 6:
+            raise InputError(f"the target has {len(self.points)} points: smoothing needs at least 6")
+        points = self.points if len(self.points) <= MOST_SMOOTHED else self.resampled(MOST_SMOOTHED).points
+        origin, unit = points.mean(axis=0), self.size
+        vertices = ring(points - origin, self.closed) / unit
+        u = arc_lengths(vertices)
+        z = vertices[: len(points)] @ np.array([1.0, 1j])
+        stiffness, modes = np.linalg.eigh(_bending(np.diff(u), self.closed))
+        free = 1 if self.closed else 2  # what bending leaves as it is: a point, or a straight line
+        stiffness[:free] = 0.0
+        c = modes.T @ z
+
+        def misfit(log: float) -> float:
+            """Return the mean squared distance of the points from the spline."""
+            held = 1.0 / (1.0 + np.exp(log) * stiffness)
+            return float((np.abs((1.0 - held) * c) ** 2).mean())
+
+        def validation(log: float) -> float:
+            freedom = (1.0 / (1.0 + np.exp(log) * stiffness)).mean()
+            left = 1.0 - FREEDOM_WEIGHT * freedom
+            return float(np.log(misfit(log) + 1e-30) - 2.0 * np.log(left)) if left > 0.0 else float("inf")
+
+        low, high = -np.log(stiffness[-1]) - 20.0, -np.log(stiffness[free]) + 20.0
+        if deviation is None:
+            grid = np.linspace(low, high, 200)
+            k = int(np.argmin([validation(g) for g in grid]))
+            log = minimize_scalar(
+                validation, bounds=(grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]), method="bounded"
+            ).x
+        else:
+            wanted, most = (deviation / unit) ** 2, misfit(high)
+            if not (deviation > 0.0 and wanted < most):
+                raise InputError(
+                    f"a deviation of {deviation!r} m: it must be greater than zero and less than {unit * most**0.5:.3g} m, "
+                    "where nothing is left of the curve"
+                )
+            log = low if misfit(low) >= wanted else brentq(lambda g: misfit(g) - wanted, low, high, xtol=1e-12)
+        fitted = modes @ (c / (1.0 + np.exp(log) * stiffness))
+        knots = ring(np.column_stack([fitted.real, fitted.imag]), self.closed)
+        spline = CubicSpline(u, knots, bc_type="periodic" if self.closed else "natural")
+        fine = spline(np.linspace(0.0, u[-1], max(20 * n, 10 * len(u)), endpoint=not self.closed))
+        return TargetPath(points=origin + unit * fine, closed=self.closed).resampled(n)
+
+
+def _bending(h: FloatArray, closed: bool) -> FloatArray:
+    """Return the matrix K of z' K z = integral of z''^2 over the cubic spline through z at knots h apart, K = Q R^-1 Q'.
+
+    Green and Silverman, section 2.1.2; periodic, or natural with z'' = 0 at both ends.
+    """
+    n = len(h) if closed else len(h) + 1
+    inner = np.arange(n) if closed else np.arange(1, n - 1)
+    before, after = h[inner - 1], h[inner % len(h)]
+    eye = np.eye(n)
+    # R z'' = Q' z at every knot (of an open curve: at the inner ones, z'' being zero at the ends)
+    r = (
+        eye[inner - 1] * (before / 6.0)[:, None]
+        + eye[inner] * ((before + after) / 3.0)[:, None]
+        + eye[(inner + 1) % n] * (after / 6.0)[:, None]
+    )[:, inner]
+    slopes = (eye[(inner + 1) % n] - eye[inner]) / after[:, None] - (eye[inner] - eye[inner - 1]) / before[:, None]
+    k: FloatArray = slopes.T @ np.linalg.solve(r, slopes)
+    return 0.5 * (k + k.T)
+
+
+#: Pieces of equal length into which a curve is cut to integrate a distance along it.
+PIECES = 2000
+
+
+def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
+    """Compute the distance of each point from a curve, exact to its segments (m), shape (m,).
+
+    Parameters
+    ----------
+    curve : array_like, shape (n, 2)
+        m.
+    points : array_like, shape (m, 2)
+        m.
+    closed : bool
+        Whether the curve's last point is joined to its first.
+
+    Raises
+    ------
+    InputError
+        If the curve has less than 2 points, or a coordinate is not finite.
+    """
+    import shapely
+
+    line = shapely.LineString(ring(plane_points(curve, "the curve", 2), closed))
+    distances: FloatArray = shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
+    return distances
+
+
+def _cut(vertices: FloatArray) -> tuple[FloatArray, float]:
+    """Return the middles of the `PIECES` of a polyline, and its length."""
+    length = float(arc_lengths(vertices)[-1])
+    return along(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
+
+
+def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
+    """Compute the area between a traced curve and its target (m2).
+
+    Both closed: the area of the symmetric difference of what they enclose, each by the even-odd rule where it crosses itself
+    (`even_odd_area`); exact for the polylines.
+
+    Else, with d(p, S) the distance of a point p from the nearest point of a curve S,
+
+        A = 1/2 (integral over the target of d(p, curve) ds + integral over the curve of d(p, target) ds),
+
+    which is symmetric and zero only for equal curves. For parallel curves it is the area of the strip between them, exactly
+    (Steiner's formula: their distance times the mean of their lengths). An open target that a closed curve traces on part of
+    its way is an exception, since the rest of the way is free:
+
+        A = integral over the target of d(p, curve) ds.
+
+    The integrals are sums over `PIECES` pieces of equal length by the midpoint rule: about 1e-6 of the value.
+
+    Parameters
+    ----------
+    curve : array_like, shape (n, 2)
+        m.
+    target : TargetPath
+    closed : bool
+        Whether the curve's last point is joined to its first.
+
+    Raises
+    ------
+    InputError
+        If the curve has less than 3 points (2 if open), or a coordinate is not finite.
+    """
+    points = plane_points(curve, "the curve", 3 if closed else 2)
+    if closed and target.closed:
+        return even_odd_area(target.points, points)
+    middles, length = _cut(ring(target.points, target.closed))
+    missed = length * float(distance_to(points, middles, closed=closed).mean())
+    if closed:
+        return missed
+    middles, length = _cut(points)
+    return 0.5 * (missed + length * float(distance_to(target.points, middles, closed=target.closed).mean()))
+
+
+def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
+    """Compute the Hausdorff distance of a traced curve from its target (m).
+
+    Of an open target and a closed curve only the target's points are taken, as in `area_between`. It is the largest over
+    the vertices and over `PIECES` points at equal arc length: short of the true one by at most half their spacing.
+
+    Parameters
+    ----------
+    curve, target, closed
+        As for `area_between`.
+
+    Raises
+    ------
+    InputError
+        As `area_between`.
+    """
+    points = plane_points(curve, "the curve", 3 if closed else 2)
+    seen = np.vstack([target.points, _cut(ring(target.points, target.closed))[0]])
+    largest = float(distance_to(points, seen, closed=closed).max())
+    if closed and not target.closed:
+        return largest
+    seen = np.vstack([points, _cut(ring(points, closed))[0]])
+    return max(largest, float(distance_to(target.points, seen, closed=target.closed).max()))
+
+
+# Straight parts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Straightness:
+    """How straight and how long a part of a curve is.
+
+    Attributes
+    ----------
+    travel : float
+        Distance from the part's first to its last point, along the line (m).
+    extent : float
+        Distance between the outermost points along the line (m): more than the travel where the part turns back.
+    flatness : float
+        Distance between the outermost points across the line (m).
+    direction : float
+        Of the line, from the first point to the last (rad, -pi to pi).
+    start : int
+        Index of the part's first point in the curve.
+    """
+
+    travel: float
+    extent: float
+    flatness: float
+    direction: float
+    start: int = 0
+
+
+def straightness(part: ArrayLike, *, direction: float | None = None) -> Straightness:
+    """Compute travel and flatness of a part of a curve.
+
+    Parameters
+    ----------
+    part : array_like, shape (n, 2)
+        Its points in order (m), for example those within a window of crank angles.
+    direction : float, optional
+        Of the line that is to be followed (rad). By default it is free: that of the narrowest strip that holds the points
+        (the minimum zone of ISO 1101; an edge of the convex hull lies along it).
+
+    Raises
+    ------
+    InputError
+        If there are less than 2 points, a number is not finite, or no direction is given and all points are the same.
+    """
+    points = plane_points(part, "the part", 2)
+    points = points - points[0]
+    if direction is None:
+        direction = _narrowest(points)
+    elif not isfinite(direction):
+        raise InputError(f"the direction is {direction!r}: it must be finite")
+    distance, across = (points @ np.array([[cos(direction), -sin(direction)], [sin(direction), cos(direction)]])).T
+    if distance[-1] < 0.0:
+        direction += pi
+    return Straightness(
+        travel=abs(float(distance[-1])),
+        extent=float(np.ptp(distance)),
+        flatness=float(np.ptp(across)),
+        direction=atan2(sin(direction), cos(direction)),
+    )
+
+
+def _narrowest(points: FloatArray) -> float:
+    """Return the direction of the narrowest strip that holds the points."""
+    import shapely
+
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(points)))
+    if len(hull) == 1:
+        raise InputError(f"all {len(points)} points of the part are the same one: it has no direction")
+    edges = np.diff(hull, axis=0)
+    edges /= np.hypot(*edges.T)[:, None]
+    widths = np.ptp(edges[:, :1] * hull[:, 1] - edges[:, 1:] * hull[:, 0], axis=1)
+    x, y = edges[int(np.argmin(widths))]
+    return atan2(y, x)
+
+
+def straightest_part(
+    curve: ArrayLike,
+    count: int,
+    *,
+    direction: float | None = None,
+    least_travel: float = 0.0,
+    closed: bool = True,
+) -> Straightness:
+    """Find the flattest part of ``count`` successive points of a curve, such as a window of crank angles.
+
+    Parameters
+    ----------
+    curve : array_like, shape (n, 2)
+        m.
+    count : int
+        Number of points: of a curve at 5 deg steps 25 for a window of 120 deg.
+    direction : float, optional
+        As for `straightness`.
+    least_travel : float
+        Travel below which a part is not taken (m).
+    closed : bool
+        Whether a part may run over the curve's last point to its first.
+
+    Raises
+    ------
+    InputError
+        If there are not as many points, or no part has the travel.
+    """
+    points = plane_points(curve, "the curve", 2)
+    if not 2 <= count <= len(points):
+        raise InputError(f"a part of {count} points of {len(points)}: it must be from 2 to all of them")
+    starts = len(points) if closed else len(points) - count + 1
+    # over the seam: the curve's beginning once more
+    laid = np.vstack([points, points[: count - 1]]) if closed else points
+    best: Straightness | None = None
+    longest = 0.0
+    for start in range(starts):
+        part = straightness(laid[start : start + count], direction=direction)
+        longest = max(longest, part.travel)
+        if part.travel >= least_travel and (best is None or part.flatness < best.flatness):
+            best = replace(part, start=start)
+    if best is None:
+        raise InputError(
+            f"no part of {count} points has a travel of {least_travel!r} m: the longest is {longest:.6g} m"
+        )
+    return best

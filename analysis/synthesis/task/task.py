@@ -1,0 +1,576 @@
+"""What a linkage is asked to do: tasks of synthesis, and their normal form.
+
+A task holds target values and weights. `Task.normal` puts it in the form that every method here works on: lengths in units
+of the target's size, about its centre, so that a watch and an excavator are the same problem.
+
+The quality functions are the thesis's (chapter VI): timed, the sum of weighted squared distances at the given crank
+rotations; of a rocker, the sum of weighted squared errors of angle; untimed, the area between the curves or the
+squared distance to the curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
+from math import hypot, isfinite, pi
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+from ...units import in_si
+from .target import TargetPath, halves
+
+FloatArray = NDArray[np.float64]
+#: Size of a body that only turns, where none is given (m).
+TURNED = 0.1
+Measure = Literal["area", "distance"]
+Objective = Literal["error", "worst"]
+Quality = Literal["squares", "area", "worst"]
+
+
+def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
+    points = np.array(values, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise InputError(f"{what} have the shape {points.shape}: they must be n points of two coordinates, (n, 2)")
+    _finite(points, what)
+    if len(points) < least:
+        raise InputError(f"{what}: {len(points)} are too few, there must be at least {least}")
+    return points
+
+
+def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None) -> None:
+    """Check that targets without crank rotations differ from the ones before: there is no time in which to dwell."""
+    same = (np.diff(points, axis=0) == 0.0).all(axis=1)
+    if angle is not None:
+        same &= np.diff(angle) == 0.0
+    if rotation is None and same.any():
+        k = int(np.argmax(same))
+        place = f"{points[k].tolist()} m" + ("" if angle is None else f" at {angle[k]:.6g} rad")
+        raise InputError(
+            f"{what}: numbers {k} and {k + 1} are the same, {place}; leave one out, or give crank rotations for a dwell"
+        )
+
+
+def _extended(points: FloatArray, what: str) -> None:
+    if not _extent(points) > 0.0:
+        raise InputError(f"all {what} are the same, {points[0].tolist()} m: a path has an extent")
+
+
+def _finite(values: FloatArray, what: str) -> None:
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        raise InputError(f"{what}: number {int(bad[0][0])} is {values[tuple(bad[0])]}: it must be finite")
+
+
+def _numbers(values: ArrayLike, what: str, n: int) -> FloatArray:
+    numbers = np.array(values, dtype=float)
+    if numbers.shape != (n,):
+        raise InputError(f"{what} have the shape {numbers.shape}: there must be one for each of the {n} targets")
+    _finite(numbers, what)
+    return numbers
+
+
+def _rotation(values: ArrayLike | None, n: int) -> FloatArray:
+    if values is None:
+        return turn(n)
+    rotation = _numbers(values, "crank rotations", n)
+    steps = np.diff(rotation)
+    if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        k = int(np.argmin(steps * np.sign(steps.sum() or 1.0)))
+        raise InputError(
+            f"crank rotations {k} and {k + 1} are {rotation[k]:.6g} and {rotation[k + 1]:.6g} rad: they must go one way"
+        )
+    if abs(rotation[-1] - rotation[0]) > 2.0 * pi * (1.0 + 1e-9):
+        raise InputError(
+            f"crank rotations span {abs(rotation[-1] - rotation[0]):.6g} rad: no more than a turn can be asked"
+        )
+    return rotation
+
+
+def _weights(values: ArrayLike | None, n: int) -> FloatArray:
+    if values is None:
+        return np.ones(n)
+    weights = _numbers(values, "weights", n)
+    if (weights < 0.0).any() or not weights.any():
+        k = int(np.argmin(weights))
+        raise InputError(f"weight {k} is {weights[k]:g}: none may be below zero, nor all be zero")
+    return weights
+
+
+def _check_objective(objective: str) -> None:
+    if objective not in get_args(Objective):
+        raise InputError(f"objective is {objective!r}: it must be 'error' or 'worst'")
+
+
+def _set(task: Any, **values: Any) -> None:
+    """Set fields of a frozen task as it is made."""
+    for name, value in values.items():
+        object.__setattr__(task, name, value)
+
+
+def turn(n: int) -> FloatArray:
+    """Return n equal steps over one turn of the crank (rad), without the end."""
+    return np.linspace(0.0, 2.0 * pi, n, endpoint=False)
+
+
+@in_si(points="m", rotation="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimedPath:
+    """The coupler point is to be at given points at given crank rotations.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        m, at least three; the same one over successive rotations is a dwell.
+    rotation : ndarray, shape (n,)
+        Crank rotation from the start (rad), within a turn; equal steps over one turn by default.
+    weights : ndarray, shape (n,)
+        Of the squared distances.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, times the root of its weight.
+    """
+
+    points: ArrayLike
+    rotation: ArrayLike | None = None
+    weights: ArrayLike | None = None
+    objective: Objective = "error"
+
+    def __post_init__(self) -> None:
+        _check_objective(self.objective)
+        # two are met exactly by any number of linkages
+        points = _points(self.points, "target points", 3)
+        _extended(points, "target points")
+        n = len(points)
+        _set(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
+
+
+@in_si(position="m", rotation="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SliderFunction(TimedPath):
+    """The slider of a slider-crank is to be at given positions at given crank rotations.
+
+    It is a path of the slider's pin C along the x axis: its points follow from the positions, and where the crank shaft lies is
+    found.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n,)
+        x of the slider (m).
+    rotation, weights, objective
+        As of `TimedPath`.
+    """
+
+    position: ArrayLike
+    points: ArrayLike = field(init=False)
+
+    def __post_init__(self) -> None:
+        position = np.array(self.position, dtype=float)
+        if position.ndim != 1:
+            raise InputError(f"target positions have the shape {position.shape}: they must be a list")
+        _set(self, position=position, points=np.column_stack([position, np.zeros(len(position))]))
+        TimedPath.__post_init__(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Straight:
+    """A part of an untimed path that must be straight, and quick.
+
+    Attributes
+    ----------
+    start, end : int
+        First and last of the path's points on the straight part, in the order of the points.
+    rotation : float
+        Crank rotation within which it must be run through (rad).
+    flatness : float, optional
+        Largest extent across the line over that part (m); without it flatness is only favoured, by ``weight``.
+    weight : float
+        Of the deviation across the line there.
+    """
+
+    start: int
+    end: int
+    rotation: float
+    flatness: float | None = None
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.end <= self.start or self.start < 0:
+            raise InputError(f"a straight part from point {self.start} to {self.end}: it must run forward")
+        if not 0.0 < self.rotation <= 2.0 * pi:
+            raise InputError(
+                f"crank rotation of the straight part is {self.rotation}: it must be above 0, at most 2 pi rad"
+            )
+        if self.flatness is not None and not self.flatness > 0.0:
+            raise InputError(f"flatness is {self.flatness}: it must be greater than zero (m)")
+        if not (isfinite(self.weight) and self.weight >= 1.0):
+            raise InputError(f"weight of the straight part is {self.weight}: it must be a finite number, 1 or greater")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UntimedPath:
+    """The coupler point is to trace a curve, whatever the crank's rotation on the way.
+
+    Attributes
+    ----------
+    path : TargetPath
+        Closed or open.
+    measure : "area" or "distance"
+        What ranks solutions: the area between the curves (m2), or the mean squared distance times the number of points (m2).
+    samples : int
+        Points at equal arc length at which the curve is fitted.
+    straight : Straight, optional
+        A straight part run through within a crank rotation; its points are those of ``path``.
+    weights : ndarray, shape (number of the path's points,), optional
+        Per point of ``path``; in between they are interpolated along it.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the Hausdorff distance between curve and path, in which weights do not
+        count.
+    """
+
+    path: TargetPath
+    measure: Measure = "area"
+    samples: int = 72
+    straight: Straight | None = None
+    weights: ArrayLike | None = None
+    objective: Objective = "error"
+
+    def __post_init__(self) -> None:
+        _check_objective(self.objective)
+        if self.measure not in ("area", "distance"):
+            raise InputError(f"measure is {self.measure!r}: it must be 'area' or 'distance'")
+        if self.samples < 8:
+            raise InputError(f"{self.samples} samples of a path: there must be at least 8")
+        if self.straight is not None and self.straight.end >= len(self.path.points):
+            raise InputError(
+                f"the straight part ends at point {self.straight.end}, the path has {len(self.path.points)}"
+            )
+        _set(self, weights=_weights(self.weights, len(self.path.points)))
+
+
+@in_si(angle="rad", rotation="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RockerFunction:
+    """The rocker is to be at given angles at given crank rotations.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (n,)
+        th4 from the ground link (rad).
+    rotation, weights : ndarray, shape (n,)
+        As in `TimedPath`; the weights are of the squared errors of angle.
+    mounting : bool
+        Whether the output may be mounted on the rocker at any angle.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, as in `TimedPath`.
+    """
+
+    angle: ArrayLike
+    rotation: ArrayLike | None = None
+    weights: ArrayLike | None = None
+    mounting: bool = False
+    objective: Objective = "error"
+
+    def __post_init__(self) -> None:
+        _check_objective(self.objective)
+        angle = np.array(self.angle, dtype=float)
+        if angle.ndim != 1 or len(angle) < 3:
+            raise InputError(f"target angles have the shape {angle.shape}: they must be a list of at least 3")
+        _finite(angle, "target angles")
+        if not np.ptp(angle) > 0.0:
+            raise InputError(
+                f"all target angles are the same, {angle[0]:.6g} rad: a rocker that stands still needs no linkage"
+            )
+        n = len(angle)
+        _set(self, angle=angle, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
+
+
+@in_si(points="m", angle="rad", rotation="rad", length="m")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """The coupler is to carry a body through given poses.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        Places of the coupler point (m); one place in several directions is a body that turns there, one pose over successive
+        crank rotations a dwell.
+    angle : ndarray, shape (n,)
+        Direction of the body at each (rad); how it is mounted on the coupler is free.
+    rotation : ndarray, shape (n,), optional
+        Crank rotations; without them only the order is asked.
+    length : float, optional
+        Length by which an error of angle counts as one of place (m/rad); half the target's extent by default, of a body that
+        only turns 50 mm.
+    weights : ndarray, shape (n,)
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, place and angle together.
+    """
+
+    points: ArrayLike
+    angle: ArrayLike
+    rotation: ArrayLike | None = None
+    length: float | None = None
+    weights: ArrayLike | None = None
+    objective: Objective = "error"
+
+    def __post_init__(self) -> None:
+        _check_objective(self.objective)
+        points = _points(self.points, "target points", 2)
+        n = len(points)
+        angle = _numbers(self.angle, "target angles", n)
+        _different(points, "target poses", self.rotation, angle)
+        _set(self, points=points, angle=angle, length=_leverage(self.length, points))
+        if self.rotation is not None:
+            _set(self, rotation=_rotation(self.rotation, n))
+        _set(self, weights=_weights(self.weights, n))
+
+
+@in_si(points="m", angle="rad", rotation="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PrecisionPoints:
+    """The coupler point is to pass exactly through a few points, in their order, at any crank rotations or at given ones.
+
+    A four-bar can do nine untimed points or five timed ones, and rarely with a good transmission angle; what
+    cannot be done exactly comes as close as it can. With an ``angle`` they are poses: five untimed.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        m.
+    angle, rotation : ndarray, shape (n,), optional
+        Directions of the carried body, crank rotations (rad).
+    length : float, optional
+        As in `Motion`.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, where the points cannot be met.
+    """
+
+    points: ArrayLike
+    angle: ArrayLike | None = None
+    rotation: ArrayLike | None = None
+    length: float | None = None
+    objective: Objective = "error"
+
+    def __post_init__(self) -> None:
+        _check_objective(self.objective)
+        points = _points(self.points, "precision points", 2)
+        angle = None if self.angle is None else _numbers(self.angle, "target angles", len(points))
+        _different(points, "precision points", self.rotation, angle)
+        _set(self, points=points)
+        if self.rotation is not None:
+            _set(self, rotation=_rotation(self.rotation, len(points)))
+        if angle is None:
+            _extended(points, "precision points")
+        else:
+            _set(self, angle=angle, length=_leverage(self.length, points))
+
+
+Task = TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints
+
+
+def _extent(points: FloatArray) -> float:
+    return float(hypot(*np.ptp(points, axis=0)))
+
+
+def _leverage(length: float | None, points: FloatArray) -> float:
+    """Return the length by which an error of angle counts as one of place: as given, or the usual one."""
+    if length is None:
+        return 0.5 * (_extent(points) or TURNED)
+    if not (isfinite(length) and length > 0.0):
+        raise InputError(f"length is {length}: it must be a finite number greater than zero (m/rad)")
+    return length
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Normal:
+    """A task in normal form: what is compared at n stations, in units of the target's size about its centre.
+
+    Attributes
+    ----------
+    origin : complex
+        Centre of the target (m).
+    unit : float
+        Its size (m): diagonal of its bounding box; of a rocker function, 1 m.
+    points : ndarray of complex, shape (n,), or None
+        Target of the coupler point.
+    angle : ndarray, shape (n,), or None
+        Target of the coupler's or the rocker's angle (rad).
+    of_rocker : bool
+        Whether the angle is the rocker's, from the ground link, or the coupler's, in the plane.
+    of_slider : bool
+        Whether the points are of the slider of a slider-crank.
+    mounting : bool
+        Whether the output angle is free.
+    leverage : float
+        Factor of an error of angle (units per rad); 1 of a rocker function.
+    weights : ndarray, shape (n,)
+        Of the squared errors.
+    rotation : ndarray, shape (n,), or None
+        Crank rotations, None where only their order is given.
+    closed : bool
+        Whether the stations close upon themselves.
+    arc : ndarray, shape (n,)
+        Length of the target that each station stands for.
+    outline : ndarray of complex, shape (m,), or None
+        The own points of a path whose timing is free.
+    outline_weights : ndarray, shape (m,)
+        Of the errors there.
+    straight : Straight or None
+        Its ends counted in stations, its flatness in units.
+    exact : bool
+        Whether the points are to be met exactly.
+    quality : "squares", "area" or "worst"
+        Sum of squared errors, area between the curves, or greatest error.
+    """
+
+    origin: complex
+    unit: float
+    points: NDArray[np.complex128] | None
+    angle: FloatArray | None
+    of_rocker: bool = False
+    of_slider: bool = False
+    mounting: bool = False
+    leverage: float = 1.0
+    weights: FloatArray
+    rotation: FloatArray | None
+    closed: bool = False
+    arc: FloatArray = field(default_factory=lambda: np.empty(0))
+    outline: NDArray[np.complex128] | None = None
+    outline_weights: FloatArray = field(default_factory=lambda: np.empty(0))
+    straight: Straight | None = None
+    exact: bool = False
+    quality: Quality = "squares"
+
+    @property
+    def n(self) -> int:
+        """Return the number of stations."""
+        return len(self.weights)
+
+    @property
+    def places(self) -> NDArray[np.complex128]:
+        """Return the targets of the coupler point in the plane (m), shape (n,)."""
+        assert self.points is not None
+        return self.origin + self.unit * self.points
+
+    @property
+    def timed(self) -> bool:
+        """Return whether the crank rotations are given."""
+        return self.rotation is not None
+
+    @property
+    def shares(self) -> FloatArray:
+        """Return the share of the length of the line through the stations' targets up to each of them, shape (n,)."""
+        assert self.points is not None
+        steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
+        length = np.concatenate([[0.0], np.cumsum(steps)])
+        shares: FloatArray = length[: self.n] / length[-1]
+        return shares
+
+
+def reweighted(task: Task, weights: ArrayLike | None) -> Task:
+    """Return the task with other weights, where any are given.
+
+    Raises InputError if they are not one per target, or the task has none.
+    """
+    if weights is None:
+        return task
+    if isinstance(task, PrecisionPoints):
+        raise InputError("precision points are met exactly: they have no weights")
+    if not next(f.init for f in fields(task) if f.name == "weights"):
+        raise InputError(f"a {type(task).__name__} is met exactly: it has no weights")
+    return replace(task, weights=weights)
+
+
+def normal_form(task: Task) -> Normal:
+    """Return the normal form of a task.
+
+    Raises
+    ------
+    InputError
+        If it is no task.
+    """
+    if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
+        raise InputError(f"{task!r} is no task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints")
+    quality: Quality = "worst" if task.objective == "worst" else "squares"
+    if isinstance(task, RockerFunction):
+        return Normal(
+            origin=0.0,
+            unit=1.0,
+            points=None,
+            angle=np.asarray(task.angle),
+            of_rocker=True,
+            mounting=task.mounting,
+            weights=np.asarray(task.weights),
+            rotation=np.asarray(task.rotation),
+            quality=quality,
+        )
+    if isinstance(task, UntimedPath):
+        return _path_normal(task)
+    points = np.asarray(task.points)
+    # of a body that only turns: what its angles count for
+    unit = _extent(points) or 2.0 * float(task.length)  # type: ignore[union-attr, arg-type]
+    low, high = points.min(axis=0), points.max(axis=0)
+    origin = complex(*(0.5 * (low + high)))
+    angle = None if isinstance(task, TimedPath) else task.angle
+    return Normal(
+        origin=origin,
+        unit=unit,
+        points=(points @ np.array([1.0, 1j]) - origin) / unit,
+        angle=None if angle is None else np.asarray(angle),
+        mounting=angle is not None,
+        leverage=1.0 if angle is None else float(task.length) / unit,  # type: ignore[union-attr, arg-type]
+        weights=np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights),
+        rotation=None if task.rotation is None else np.asarray(task.rotation),
+        exact=isinstance(task, PrecisionPoints),
+        of_slider=isinstance(task, SliderFunction),
+        quality=quality,
+    )
+
+
+def _path_normal(task: UntimedPath) -> Normal:
+    points = np.asarray(task.path.points) @ np.array([1.0, 1j])
+    closed = task.path.closed
+    weights = np.asarray(task.weights)
+    outline, outline_weights = points, weights
+    if closed:
+        points, weights = np.append(points, points[0]), np.append(weights, weights[0])
+    low, high = complex(points.real.min(), points.imag.min()), complex(points.real.max(), points.imag.max())
+    origin, unit = 0.5 * (low + high), abs(high - low)
+    length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points)))])
+    ends = [0.0, float(length[-1])]
+    straight = task.straight
+    if straight is not None:
+        ends = sorted({*ends, float(length[straight.start]), float(length[straight.end])})
+    # pieces of the path, each divided evenly, so that the ends of the straight part are stations
+    pieces = [
+        np.linspace(a, b, max(2, round(task.samples * (b - a) / length[-1])), endpoint=False) for a, b in pairwise(ends)
+    ]
+    if not closed:
+        pieces.append(np.array([length[-1]]))
+    s = np.concatenate(pieces)
+
+    edges = np.diff(np.append(s, length[-1])) if closed else np.diff(s)
+    if straight is not None:
+        first, last = (int(np.argmin(np.abs(s - length[k]))) for k in (straight.start, straight.end))
+        flatness = None if straight.flatness is None else straight.flatness / unit
+        straight = replace(straight, start=first, end=last, flatness=flatness)
+    station_weights = np.interp(s, length, weights)
+    if not station_weights.any():
+        raise InputError(f"the weights are zero at each of the {len(s)} stations: take more samples or wider weights")
+    return Normal(
+        origin=origin,
+        unit=unit,
+        points=(np.interp(s, length, points) - origin) / unit,
+        angle=None,
+        weights=station_weights,
+        rotation=None,
+        closed=closed,
+        arc=halves(edges, closed) / unit,
+        outline=(outline - origin) / unit,
+        outline_weights=outline_weights,
+        straight=straight,
+        quality="worst" if task.objective == "worst" else "area" if task.measure == "area" else "squares",
+    )

@@ -1,0 +1,481 @@
+"""`tune`: the least change of given parameters that clears a range of speeds, by IPOPT and an exchange of conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from linkwork.errors import LinkworkError
+
+from ..numerics import symbolic
+from ..periodic import Crossing, SpecialPoint
+from ..run import shown
+from .conditions import (
+    Across,
+    Below,
+    Beyond,
+    Condition,
+    FloatArray,
+    Inside,
+    Lost,
+    LostError,
+    PeakBeyond,
+    Place,
+    Spot,
+    known_spot,
+)
+from .result import JUMP, RESONANCE, STABLE, Tuned, Verification, readings, requirements
+from .survey import MARGINAL, SOUGHT, Region, Survey, charted, other_motions, survey
+from .wishes import Wish
+
+#: IPOPT's tolerance, iterations at most, and the violation of a condition that counts as none.
+_TOLERANCE, _ITERATIONS, VIOLATION = 1e-9, 60, 1e-8
+#: Points at which a place was not found, after which a program is given up.
+_PATIENCE = 4
+#: Weight of the squares of the other changes where one parameter is minimised, and of all changes where violations are: a
+#: parameter without effect keeps its value.
+_REST = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """Solution of a nonlinear program.
+
+    Attributes
+    ----------
+    x : ndarray, shape (k,)
+        The changes in their tolerances.
+    objective : float
+    violations : mapping
+        Greatest violation of the conditions of each requirement.
+    """
+
+    x: FloatArray
+    objective: float
+    violations: dict[str, float]
+
+    @property
+    def met(self) -> bool:
+        """Whether all conditions are kept."""
+        return self.total <= VIOLATION
+
+    @property
+    def total(self) -> float:
+        """Sum of the violations."""
+        return sum(self.violations.values())
+
+
+def objective(wish: Wish, x: Any) -> Any:
+    """Return the objective: squares of the changes, or a parameter in its tolerance; of numbers or symbols."""
+    squares = symbolic.library().sumsqr(x)
+    if not wish.least:
+        return squares
+    k = wish.names.index(wish.least)
+    return x[k] + _REST * (squares - x[k] ** 2)
+
+
+def nearest(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
+    """Find the least change that keeps the conditions; if there is none, the least sum of violations.
+
+    Raises LinkworkError if a place is not found even at the start.
+    """
+    answer = _solve(wish, conditions, x, elastic=False)
+    if not answer.met and isfinite(answer.total):
+        softer = _solve(wish, conditions, x, elastic=True)
+        if softer.met:
+            answer = _solve(wish, conditions, softer.x, elastic=False)
+        if not answer.met and softer.total < answer.total:
+            answer = softer
+    return answer
+
+
+def _solve(wish: Wish, conditions: Sequence[Condition], x: FloatArray, *, elastic: bool) -> Answer:
+    casadi = symbolic.library()
+    count, groups = len(x), list(dict.fromkeys(condition.group for condition in conditions))
+    low, high = wish.scaled(wish.low), wish.scaled(wish.high)
+    z = casadi.MX.sym("z", count + len(groups) * elastic)
+    f, lows, highs, start = objective(wish, z[:count]), low, high, np.clip(x, low, high)
+    values = _Values(conditions)
+    held = values.function(count)
+    g = held(z[:count])
+    if elastic:
+        share = np.zeros((len(conditions), len(groups)))
+        for row, condition in enumerate(conditions):
+            share[row, groups.index(condition.group)] = 1.0
+        over = z[count:]
+        f, g = casadi.sum1(over) + _REST * casadi.sumsqr(z[:count]), g + casadi.DM(share) @ over
+        first = np.array([max(-v for v, c in zip(values(start)[0], conditions) if c.group == name) for name in groups])
+        lows, highs = np.append(low, np.zeros(len(groups))), np.append(high, np.full(len(groups), np.inf))
+        start = np.append(start, np.maximum(first, 0.0) + 1e-3)
+    solver = symbolic.ipopt(
+        "tune",
+        {"x": z, "f": f, "g": g},
+        tol=_TOLERANCE,
+        constr_viol_tol=0.1 * VIOLATION,
+        max_iter=_ITERATIONS,
+        bound_relax_factor=0.0,
+        hessian_approximation="limited-memory",
+        # a start in the middle of its bounds is not moved
+        bound_push=1e-6,
+        bound_frac=1e-6,
+        mu_strategy="adaptive",
+    )
+    found = np.asarray(solver(x0=start, lbx=lows, ubx=highs, lbg=0.0, ubg=np.inf)["x"]).ravel()[:count]
+    found = np.clip(found, low, high)
+    reached = values(found)[0]
+    if not np.isfinite(reached).all():
+        found, reached = np.clip(x, low, high), values(np.clip(x, low, high))[0]
+    over_by = dict.fromkeys(groups, 0.0)
+    for value, condition in zip(reached, conditions):
+        over_by[condition.group] = max(over_by[condition.group], -value if np.isfinite(value) else np.inf)
+    return Answer(x=found, objective=float(objective(wish, casadi.DM(found))), violations=over_by)
+
+
+class _Values:
+    """Values and derivatives of the conditions at the changes, cached for the last point; NaN where a motion is lost."""
+
+    def __init__(self, conditions: Sequence[Condition]) -> None:
+        self.conditions = conditions
+        self._last: tuple[bytes, bool, FloatArray, FloatArray] | None = None
+        self._lost = 0
+
+    def __call__(self, x: FloatArray, slopes: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Return values (m,) and derivatives (m, k)."""
+        key = x.tobytes()
+        if self._last is not None and self._last[0] == key and self._last[1] >= slopes:
+            return self._last[2:]
+        values, rows = np.full(len(self.conditions), np.nan), np.full((len(self.conditions), len(x)), np.nan)
+        for row, condition in enumerate(self.conditions if self._lost < _PATIENCE else ()):
+            try:
+                values[row] = condition.value(x)
+                if slopes:
+                    rows[row] = condition.slopes(x)
+            except LinkworkError:
+                self._lost += 1
+                break
+        self._last = key, slopes, values, rows
+        return values, rows
+
+    def function(self, count: int) -> Callable[[Any], Any]:
+        """Return the values as a CasADi function."""
+        function: Callable[[Any], Any] = symbolic.external("conditions", count, len(self.conditions), self.__call__)
+        return function
+
+
+#: Rounds of the exchange at most, and ways that are tried.
+_ROUNDS, _WAYS = 12, 8
+#: Value of a condition that is far from being active.
+_FAR = 0.05
+#: Changes spread over their bounds that are tried where no way meets the wish, a power of two; and halvings of the way from the
+#: present values to one of them that meets it.
+_SPREAD, _BISECTIONS = 4, 6
+#: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
+_BELOW, _ABOVE, _REMOVED = -1, 1, 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Way:
+    """Choice for a region of a kind, or a resonance (kind None): below the range, above it, or removed."""
+
+    kind: Crossing | None
+    level: float
+    side: int
+
+
+@dataclass(slots=True, eq=False)
+class _Search:
+    """State of a tuning: motions beside the response, and the best changes so far."""
+
+    wish: Wish
+    rounds: int = 0
+    #: Places on branches that the response does not meet.
+    more: list[Spot] = field(default_factory=list)
+    #: The best so far: rank (requirements missed, excess, objective), survey, and levels with two stable motions.
+    best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
+
+    def look(self, x: FloatArray) -> Survey:
+        """Survey the range with some changes."""
+        own = []
+        for spot in self.more:
+            place = Place(self.wish, Across.level_plane(self.wish, spot, spot.level), spot)
+            try:
+                own.append(place.at(x).orbit)
+            except LostError:
+                continue  # its branch is gone there
+        return survey(self.wish, x, own)
+
+    def search_others(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
+        """Search motions beside a response: return whether there are new ones, and levels with two stable ones."""
+        new, several = other_motions(found)
+        self.more += [known_spot(self.wish, found.x, orbit) for orbit in new]
+        return bool(new), several
+
+    def excess(self, found: Survey, several: tuple[float, ...]) -> float:
+        """Return the sum of the excesses of all requirements."""
+        return sum(reading.excess for reading in readings(found, several).values())
+
+    def keep(self, found: Survey, several: tuple[float, ...]) -> None:
+        """Remember a survey if it is the best so far."""
+        excess = self.excess(found, several)
+        rank = excess > 0.0, excess, float(objective(self.wish, found.x))
+        if self.best is None or rank < self.best[0]:
+            self.best = rank, found, several
+
+    @property
+    def least(self) -> float:
+        """Least objective so far with all requirements met."""
+        return np.inf if self.best is None or self.best[0][0] else self.best[0][2]
+
+
+def tune(wish: Wish, *, progress: bool = False) -> Tuned:
+    """Find the least change of parameters that clears a range of speeds.
+
+    Conditions at motions of the response, with exact derivatives, keep unwanted regions and resonances out of the range; IPOPT
+    finds the least change that satisfies them. The response is then followed anew, and whatever still lies in the range becomes
+    a further condition, until nothing does. Regions of lost stability and resonances are moved below the range, above it, or
+    removed, and the least change of all combinations is taken.
+
+    Parameters
+    ----------
+    wish : Wish
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Tuned
+        Verified; if the wish cannot be met, the changes with the least sum of excesses.
+
+    Raises
+    ------
+    OrbitError
+        If there is no periodic motion to begin with at either end of the range.
+
+    Examples
+    --------
+    >>> from analysis import Limit, Wish, tune
+    >>> pin = Limit(output="pin.C", below="9 N")
+    >>> change = {"slider.stiffness": "5 %"}
+    >>> wish = Wish(parameters="rig-2-spring-c", speeds=("500 rpm", "510 rpm"), change=change, limits=[pin])
+    >>> tuned = tune(wish)
+    >>> tuned.met, f"{tuned.values[0]:.1f} N/m"
+    (True, '4153.3 N/m')
+    """
+    search = _Search(wish)
+    zero = np.zeros(len(wish.names))
+    start = np.clip(zero, wish.scaled(wish.low), wish.scaled(wish.high))
+    before = search.look(zero)
+    first = before if (start == zero).all() else search.look(start)
+    if search.search_others(first)[0]:
+        first = search.look(start)
+        before = first if (start == zero).all() else search.look(zero)
+    _try_ways(search, first, progress)
+    if search.least == np.inf:
+        nearer = _survey_near_solution(search, first)
+        if nearer is not None:
+            _try_ways(search, nearer, progress)
+    if search.best is None:
+        raise LinkworkError("the motions of the range could not be followed while the parameters were changed")
+    return _tuned(search, before, *search.best[1:])
+
+
+def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
+    """Try all combinations of ways from some changes."""
+    ways = _ways(first)
+    with shown(progress, len(ways), "trying changes") as show:
+        for number, way in enumerate(ways):
+            found = _exchange(search, first, list(way))
+            show(number + 1)
+            if found is not None:
+                search.keep(*found)
+
+
+def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
+    """Find changes within the bounds that meet the requirements, and return the survey just before them.
+
+    Where all ways from the first changes lose their motions, the ways from there may not. None if no changes of a sample spread
+    over the bounds meet the requirements.
+    """
+    wish = search.wish
+    low, high = wish.scaled(wish.low), wish.scaled(wish.high)
+    spread = low + (high - low) * qmc.Sobol(len(low), rng=0).random(_SPREAD)
+    for x in sorted([low, high, *spread], key=lambda x: float(objective(wish, x))):
+        if _try_changes(search, x)[0]:
+            break
+    else:
+        return None
+    dirty, clean, found = first.x, x, None
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (dirty + clean)
+        is_clean, there = _try_changes(search, middle)
+        if is_clean:
+            clean = middle
+        else:
+            dirty, found = middle, there or found
+    return found
+
+
+def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
+    """Return whether some changes meet all requirements, and the survey."""
+    several: tuple[float, ...] = ()
+    try:
+        found = search.look(x)
+        if search.excess(found, several) == 0.0:
+            new, several = search.search_others(found)
+            found = search.look(x) if new else found
+    except LinkworkError:
+        return False, None
+    if search.excess(found, several) > 0.0:
+        return False, found
+    search.keep(found, several)
+    return True, found
+
+
+def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
+    wish = search.wish
+    largest, level, count = charted(after)
+    problems = list(after.response.problems)
+    if wish.judged and not largest <= wish.radius + MARGINAL and all(r.excess == 0.0 for r in readings(after).values()):
+        problems.append(f"a chart has a multiplier of {largest:.6g}, which the response does not have")
+    return Tuned(
+        wish=wish,
+        x=after.x,
+        requirements=requirements(before, after, several),
+        before=before,
+        after=after,
+        verification=Verification(
+            orbits=sum(len(branch) for branch in after.response.branches),
+            charted=count,
+            largest=largest,
+            place=wish.say(level),
+            sought=SOUGHT,
+            several=wish.say(*several) if several else "",
+            problems=tuple(problems),
+        ),
+        rounds=search.rounds,
+    )
+
+
+# Ways
+
+
+def _end(region: Region, side: int) -> SpecialPoint | None:
+    """Return the special point at the upper end of a region (side -1, to go below the range) or at its lower end."""
+    ends = [s for s in (region.first, region.last) if s is not None]
+    return next((s for s in ends if s.parameter == (region.high if side == _BELOW else region.low)), None)
+
+
+def _ways(found: Survey) -> list[tuple[_Way, ...]]:
+    """Return combinations of ways round all regions and resonances in the range, the nearest first."""
+    wish = found.wish
+    low, high = wish.span
+    choices: list[list[tuple[float, _Way]]] = []
+    for region in _unwanted(found):
+        middle, sides = 0.5 * (region.low + region.high), [(0.5 * (region.high - region.low), _REMOVED)]
+        sides += [
+            (d, s) for d, s in ((region.high - low, _BELOW), (high - region.low, _ABOVE)) if _end(region, s) is not None
+        ]
+        choices.append([(d, _Way(kind=region.kind, level=middle, side=s)) for d, s in sides])
+    low, high = wish.without_resonance
+    for spot in found.peaks:
+        sides = [(spot.level - low, _BELOW), (high - spot.level, _ABOVE)]
+        choices.append([(d, _Way(kind=None, level=spot.level, side=s)) for d, s in sides])
+    combined = sorted(product(*choices), key=lambda way: sum(d for d, _ in way))
+    return [tuple(w for _, w in way) for way in combined[:_WAYS]]
+
+
+def _unwanted(found: Survey) -> list[Region]:
+    """Return the regions of lost stability that the wish excludes from the range."""
+    wish = found.wish
+    if wish.judged:
+        return list(found.regions)
+    jumps = [r for r in found.regions if wish.no_jump and r.kind is Crossing.FOLD]
+    return jumps + [
+        r for r in found.regions if r not in jumps and any(r.low < b and a < r.high for a, b in found.unstable)
+    ]
+
+
+def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | None:
+    same = [way for way in ways if way.kind is kind]
+    return min(same, key=lambda way: abs(way.level - level)).side if same else None
+
+
+# Exchange
+
+
+def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey, tuple[float, ...]] | None:
+    """Find the least change by these ways, or the nearest to it, and the levels with two stable motions.
+
+    None where a place is lost, or another way has found a change as small.
+    """
+    wish, found = search.wish, first
+    conditions: list[Condition] = []
+    several: tuple[float, ...] = ()
+    answer = Answer(x=first.x, objective=0.0, violations={})
+    for number in range(_ROUNDS):
+        try:
+            new = [c for c in _conditions(found, ways) if _counts(c, answer)]
+            if not new:
+                own, several = search.search_others(found)
+                if not own and (number > 0 or not wish.least):
+                    return found, several
+            # a condition far from active is found again if it matters
+            conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
+            answer = nearest(wish, conditions, answer.x)
+            search.rounds += 1
+            if not isfinite(answer.total) or (answer.met and answer.objective >= search.least):
+                return None
+            found = search.look(answer.x)
+        except LinkworkError:
+            return None
+    return found, several
+
+
+def _counts(condition: Condition, answer: Answer) -> bool:
+    """Return whether a condition is violated by more than its requirement already is."""
+    return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
+
+
+def _value(condition: Condition, answer: Answer) -> float:
+    """Return a condition's value, infinite where its motion is lost."""
+    try:
+        return condition.value(answer.x)
+    except LinkworkError:
+        return np.inf
+
+
+def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
+    """Yield the conditions that the survey violates; choices for new regions are added to the ways."""
+    wish, x = found.wish, found.x
+    low, high = wish.span
+    gone: list[Region] = []
+    for region in _unwanted(found):
+        side = _side(ways, region.kind, 0.5 * (region.low + region.high))
+        if side is None:
+            nearer = _BELOW if region.high - low < high - region.low else _ABOVE
+            side = next((s for s in (nearer, -nearer) if _end(region, s) is not None), _REMOVED)
+            ways.append(_Way(kind=region.kind, level=0.5 * (region.low + region.high), side=side))
+        end = _end(region, side) if side else None
+        group = JUMP if wish.no_jump and region.kind is Crossing.FOLD else STABLE
+        if end is not None:
+            gone.append(region)
+            place = Place(wish, Lost(end.kind), known_spot(wish, x, end.orbit))
+            yield Beyond(group, place, high if side == _ABOVE else low, side)
+        elif region.kind is Crossing.FOLD:
+            yield Inside(group, Place(wish, region.across, region.worst), region.kind, 1.0)
+    for lost in found.least:
+        if not any(r.kind is lost.kind and r.low <= lost.spot.level <= r.high for r in gone):
+            place = Place(wish, Across.level_plane(wish, lost.spot, lost.spot.level), lost.spot)
+            yield Inside(STABLE, place, lost.kind, wish.radius)
+    low, high = wish.without_resonance
+    for spot in found.peaks:
+        side = _side(ways, None, spot.level) or (_BELOW if spot.level - low < high - spot.level else _ABOVE)
+        yield PeakBeyond(RESONANCE, wish, spot, high if side == _ABOVE else low, side)
+    for top in found.greatest:
+        yield Below(str(top.limit), wish, top.spot, top.limit, top.angles)

@@ -1,0 +1,252 @@
+"""Result of a tuning: parameters before and after, requirement by requirement, and how it was verified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..display import Shown, format_count
+from ..mechanisms import Parameters
+from ..run import parameters_to
+from .conditions import FloatArray
+from .survey import MARGINAL, Survey
+from .wishes import Wish
+
+#: Names of the requirements; a limit is named by its text.
+RESONANCE, JUMP, STABLE = "no resonance", "no jump", "stable motion"
+#: Violation of a limit, relative to it, that counts as none.
+NO_EXCESS = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """State of a requirement with some parameters.
+
+    Attributes
+    ----------
+    text : str
+        Description with units.
+    excess : float
+        Amount by which the requirement is missed, zero if it is met: distance of a resonance or jump from the nearer end, and
+        width without a stable motion, relative to the range's middle; excess of the largest multiplier; relative excess of a
+        limit.
+    missed : str
+        Description of the excess; empty if the requirement is met.
+    """
+
+    text: str
+    excess: float = 0.0
+    missed: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Requirement:
+    """A requirement, with its state before and after the change."""
+
+    name: str
+    wished: str
+    before: Reading
+    after: Reading
+
+    @property
+    def met(self) -> bool:
+        """Whether the requirement is met after the change."""
+        return self.after.excess == 0.0
+
+
+def wished(wish: Wish) -> dict[str, str]:
+    """Return the requirements of a wish with a description of each."""
+    found: dict[str, str] = {}
+    if wish.no_resonance:
+        found[RESONANCE] = f"none from {wish.say(*wish.without_resonance, joint=' to ')}"
+    if wish.no_jump:
+        found[JUMP] = "none"
+    if wish.judged:
+        found[STABLE] = f"largest multiplier at most {wish.radius:.6g}"
+    found |= {str(limit): f"below {limit.below:.6g} {limit.unit}" for limit in wish.limits}
+    return found if wish.judged else found | {STABLE: "one at each place of the range"}
+
+
+def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
+    """Return the state of each requirement; ``several`` are levels with two stable motions."""
+    wish, result = found.wish, {}
+    if wish.no_resonance:
+        peaks = [(spot.level, spot.level) for spot in found.peaks]
+        result[RESONANCE] = _interval_reading(wish, peaks, "at {}", wish.without_resonance)
+    if wish.no_jump:
+        jumps = [(region.low, region.high) for region in found.folds]
+        text = _interval_reading(wish, jumps, "between {}", wish.span)
+        if not jumps and several:
+            text = Reading(
+                text=f"two stable motions at {wish.say(*several)}",
+                excess=(wish.span[1] - wish.span[0]) / wish.size,
+                missed=f"at {wish.say(*several)} there is a second stable motion",
+            )
+        result[JUMP] = text
+    if wish.judged:
+        value, level = found.largest
+        over = value - wish.radius if value > wish.radius + MARGINAL else 0.0
+        text_of = f"largest multiplier {value:.7g} at {wish.say(level)}"
+        result[STABLE] = Reading(text=text_of, excess=over, missed=f"{text_of}, {over:.3g} too much" if over else "")
+    for limit in wish.limits:
+        greatest = max((top for top in found.greatest if top.limit is limit), key=lambda top: top.value)
+        over = greatest.value / limit.below - 1.0
+        over = over if over > NO_EXCESS else 0.0
+        text_of = f"{greatest.value:.6g} {limit.unit} at {wish.say(greatest.spot.level)}"
+        missed = f"{text_of}, {greatest.value - limit.below:.3g} {limit.unit} too much" if over else ""
+        result[str(limit)] = Reading(text=text_of, excess=over, missed=missed)
+    if not wish.judged:
+        result[STABLE] = _stable_everywhere(found)
+    return result
+
+
+def _stable_everywhere(found: Survey) -> Reading:
+    """Return the state of the requirement that there is a stable motion everywhere in the range."""
+    if not found.unstable:
+        return Reading(text="everywhere")
+    wish = found.wish
+    text = f"none from {', '.join(wish.say(*ends, joint=' to ') for ends in found.unstable)}"
+    width = sum(high - low for low, high in found.unstable)
+    return Reading(text=text, excess=width / wish.size, missed=text)
+
+
+def _interval_reading(
+    wish: Wish, intervals: Sequence[tuple[float, float]], words: str, span: tuple[float, float]
+) -> Reading:
+    """Return the state of a requirement that excludes intervals of levels from a span."""
+    if not intervals:
+        return Reading(text="none")
+    low, high = span
+    text = ", ".join(words.format(wish.say(a) if a == b else f"{wish.say(a)} and {wish.say(b)}") for a, b in intervals)
+    away = max(min(b - low, high - a) for a, b in intervals)
+    return Reading(text=text, excess=away / wish.size, missed=f"{text}, {wish.say(away)} from the nearer end")
+
+
+def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tuple[Requirement, ...]:
+    """Return each requirement with its state before and after the change."""
+    first, last = readings(before), readings(after, several)
+    return tuple(
+        Requirement(name=name, wished=text, before=first[name], after=last[name])
+        for name, text in wished(before.wish).items()
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """Independent computations with the changed parameters.
+
+    Attributes
+    ----------
+    orbits : int
+        Number of motions of the response over the range.
+    charted, largest, place : int, float, str
+        Points of a chart's row over the range, the largest multiplier on it, and its level.
+    sought : int
+        Number of levels at which all motions were sought.
+    several : str
+        Levels with more than one stable motion.
+    problems : tuple of str
+        Failures of the verification; empty if there were none.
+    """
+
+    orbits: int
+    charted: int
+    largest: float
+    place: str
+    sought: int
+    several: str
+    problems: tuple[str, ...]
+
+    def __str__(self) -> str:
+        chart = f"largest multiplier {self.largest:.6g} at {self.place}"
+        several = "one stable motion at most at each"
+        if self.several:
+            several = f"two stable ones at {self.several}"
+        return (
+            f"response followed anew over {format_count(self.orbits, 'motion')}; row of a chart at {self.charted} points: "
+            f"{chart}; all motions sought at {self.sought}: {several}"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tuned(Shown):
+    """The least change that meets a wish; if there is none, the nearest to it.
+
+    Attributes
+    ----------
+    wish : Wish
+    x : ndarray, shape (k,)
+        The changes in their tolerances.
+    requirements : tuple of Requirement
+    before, after : Survey
+    verification : Verification
+    rounds : int
+        Number of solutions of the nonlinear program, over all ways.
+    """
+
+    wish: Wish
+    x: FloatArray
+    requirements: tuple[Requirement, ...]
+    before: Survey
+    after: Survey
+    verification: Verification
+    rounds: int
+
+    def __repr__(self) -> str:
+        changed = ", ".join(
+            f"{n} {a:.6g} -> {b:.6g}" for n, a, b in zip(self.wish.names, self.wish.present, self.values)
+        )
+        return f"<Tuned: {changed}; {'met' if self.met else 'not met: ' + '; '.join(self.missed)}>"
+
+    @property
+    def parameters(self) -> Parameters:
+        """Parameters after the change."""
+        return self.wish.operation(self.x, self.wish.span[0])[0]
+
+    @property
+    def values(self) -> FloatArray:
+        """Changed values, in the order of ``wish.names``; shape (k,)."""
+        return self.wish.present + self.x * self.wish.tolerance
+
+    @property
+    def met(self) -> bool:
+        """Whether all requirements are met, as far as could be verified."""
+        return not self.missed
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """Sentences about requirements that are missed, and about failures of the verification."""
+        return (
+            *(f"{r.name} cannot be met: {r.after.missed}" for r in self.requirements if not r.met),
+            *self.verification.problems,
+        )
+
+    def tables(self) -> dict[str, Any]:
+        """Return everything as nested tables, for a file; numbers in SI."""
+        wish, v = self.wish, self.verification
+        return {
+            "met": self.met,
+            "missed": list(self.missed),
+            "over": wish.over,
+            "between": list(wish.span),
+            "changes": {
+                name: {"before": before, "after": after, "tolerance": tolerance, "in tolerances": x}
+                for name, before, after, tolerance, x in zip(
+                    wish.names, *(a.tolist() for a in (wish.present, self.values, wish.tolerance, self.x))
+                )
+            },
+            "requirements": {
+                r.name: {"wished": r.wished, "before": r.before.text, "after": r.after.text, "met": r.met}
+                for r in self.requirements
+            },
+            "verification": {
+                "orbits": v.orbits,
+                "charted": v.charted,
+                "largest multiplier": v.largest,
+                "its place": v.place,
+                "sought": v.sought,
+                "several": v.several,
+            },
+            "parameters": parameters_to(self.parameters),
+        }

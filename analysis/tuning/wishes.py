@@ -1,0 +1,416 @@
+"""Wishes: requirements on a range of speeds, and the parameters that may be changed to meet them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError
+from linkwork.mechanism import Mechanism, PublishedSet
+from linkwork.parameters import field_name
+
+from ..files import Quantity, Range, check_names, unknown_name
+from ..mechanisms import Parameters, mechanism_of
+from ..periodic import (
+    Drive,
+    Operation,
+    PeriodicOrbit,
+    drive_of,
+    driving_names,
+    require_variable,
+    speed_name,
+    unit_of,
+    value_of,
+    variable_names,
+    with_values,
+)
+from ..run import published_set
+from ..units import RAD_S_PER_RPM, Amount, quantity, si
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A parameter of the mechanism, or a number of its drive, that may be changed.
+
+    Attributes
+    ----------
+    name : str
+        FMI name, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``.
+    low, high : float
+        Bounds of its value (SI).
+    tolerance : float
+        Unit in which its change is measured (SI).
+    given : str or float
+        The tolerance as written, if the bounds follow from it; else empty.
+    """
+
+    name: str
+    low: float
+    high: float
+    tolerance: float
+    given: Amount = ""
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
+            raise ParameterError(f"change.{self.name}", [self.low, self.high], "be a range: [least, greatest]")
+        if not (isfinite(self.tolerance) and self.tolerance > 0.0):
+            raise ParameterError(f"change.{self.name}", self.tolerance, "have a tolerance above zero")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """Upper bound of the magnitude of an output over a turn.
+
+    Attributes
+    ----------
+    output : str
+        An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C``, for the magnitude of the force in
+        it; or ``amplitude of`` an output, for half its range.
+    below : float
+        The bound (SI).
+    unit : str
+        Unit of the bound; `Wish` fills in unit and parts.
+    parts : tuple of str
+        The output, or the components of the force in the joint.
+    """
+
+    output: str
+    below: Amount
+    unit: str = field(init=False, default="")
+    parts: tuple[str, ...] = field(init=False, default=())
+
+    def __str__(self) -> str:
+        return self.output if self.output.startswith(AMPLITUDE) else f"greatest {self.output}"
+
+
+#: How a limit of half the range of an output begins.
+AMPLITUDE = "amplitude of "
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Wish:
+    """Requirements on a range of speeds, or of another drive quantity, and the parameters that may be changed.
+
+    Attributes
+    ----------
+    parameters : parameters of a mechanism
+        Present parameters; or a published set or its name.
+    change : mapping or sequence of Change
+        Parameters that may be changed, by FMI name or by field, and acting drive quantities such as a force on the slider, a
+        torque on the crank, or a motor's numbers. Each has a tolerance, such as "5 %" or "10 N/m": the greatest change either
+        way, and the unit in which the change is measured; or a range (least, greatest), measured in half its width; or both, as
+        a mapping with ``tolerance`` and ``between``.
+    speeds : (float, float), optional
+        Range of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
+    over : str
+        FMI name of another drive quantity of the range, such as ``drive.torque`` or ``slider.force``, or of a motor's number,
+        such as ``drive.torque.synchronous_speed``.
+    between : (float, float), optional
+        Range of that quantity: in SI, or texts.
+    drive : Drive, optional
+        All that drives the mechanism; needed without a range of speeds.
+    start : array_like, optional
+        Guess of the motion at the low end of the range, as for `find_orbit`: needed under a torque without a motor.
+    turns : int
+        Greatest number of turns of the crank in a period that is examined.
+    no_resonance : bool
+        No maximum of the amplitude of a motion of one turn lies in the range, nor within ``resonance_margin`` of it.
+    resonance_margin : float
+        Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
+    no_jump : bool
+        No fold lies in the range, and nowhere in it is there a second stable motion.
+    no_unstable : bool
+        No unstable motion lies in the range. Without it unstable motions may lie beside stable ones, but everywhere in the
+        range there must be a stable one.
+    least_margin : float
+        The largest Floquet multiplier is at most 1 - ``least_margin``.
+    limits : sequence of Limit
+    least : str
+        Parameter to be minimised; without it the sum of the squares of the changes is minimised, each in its tolerance.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If an argument is not usable.
+    """
+
+    parameters: Parameters
+    change: Any
+    speeds: tuple[Amount, Amount] | None = None
+    over: str = ""
+    between: tuple[Amount, Amount] | None = None
+    drive: Drive | None = None
+    start: Any = None
+    turns: int = 1
+    no_resonance: bool = False
+    resonance_margin: float = 0.02
+    no_jump: bool = False
+    no_unstable: bool = False
+    least_margin: float = 0.0
+    limits: Sequence[Limit] = ()
+    least: str = ""
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
+
+        given: Any = self.parameters
+        if isinstance(given, (str, PublishedSet)):
+            put("parameters", published_set(given).parameters)
+        mechanism = self.mechanism
+        put("over", self._required_over())
+        put("between", _span(mechanism, self.over, self.speeds or self.between))
+        drive = self.drive or drive_of(given, speed=self.span[0])
+        require_variable(self.parameters, drive, self.over)
+        alone = (
+            not drive.speed_drive
+            and drive.motor is None
+            and value_of(self.parameters, drive, self.over) == drive.torque
+        )
+        if alone and self.span[0] <= 0.0 <= self.span[1]:
+            raise ParameterError(self.over, list(self.span), "not contain zero: nothing would drive the crank there")
+        put("drive", with_values(self.parameters, drive, {self.over: self.span[0]})[1])
+        if not (isinstance(self.turns, int) and self.turns >= 1):
+            raise ParameterError("turns", self.turns, "be a whole number, at least one")
+        put("change", _changes((self.parameters, drive), self.over, self.change))
+        put("limits", tuple(_checked(mechanism, limit) for limit in self.limits))
+        for name in ("least_margin", "resonance_margin"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ParameterError(name, getattr(self, name), "be at least zero and less than one")
+        if not (self.no_resonance or self.no_jump or self.judged or self.limits):
+            raise InputError(
+                "nothing is wished: say no_resonance, no_jump, no_unstable or least_margin, or give a limit of an output"
+            )
+        if self.least:
+            put("least", _changeable(mechanism, self.least))
+            if self.least not in self.names:
+                raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
+        self._check_bounds()
+
+    def _check_bounds(self) -> None:
+        """Make sure that mechanism and drive take the bounds of what may be changed."""
+        assert self.drive is not None
+        for change in self.change:
+            for value in (change.low, change.high):
+                try:
+                    with_values(self.parameters, self.drive, {change.name: value})
+                except ParameterError as error:
+                    if not change.given:
+                        raise
+                    unit = unit_of(self.mechanism, change.name)
+                    raise ParameterError(
+                        f"change.{change.name}",
+                        change.given,
+                        f"be a smaller tolerance or a range [least, greatest]: it allows {value:.6g} {unit}, and "
+                        f"{error.name} must {error.requirement}",
+                    ) from None
+        for x in (self.scaled(self.low), self.scaled(self.high)):
+            self.operation(x, self.span[0])
+
+    def _required_over(self) -> str:
+        """Return the name of the range's quantity after a check of the arguments about the range."""
+        speed = speed_name(self.mechanism)
+        if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
+            raise InputError(
+                "give the range: either speeds of the crank, or over (a drive quantity) and between (its values)"
+            )
+        driven = self.drive is not None and not self.drive.speed_drive
+        if self.between is None and (speed is None or driven):
+            why = (
+                "the drive is by torque, so that the speed follows from it"
+                if driven
+                else "its speed cannot be prescribed"
+            )
+            names = ", ".join(name for name in driving_names(self.mechanism) if name != speed)
+            raise InputError(
+                f"the crank has no range of speeds: {why}; give over and between instead, over one of {names}"
+            )
+        known = driving_names(self.mechanism)
+        if self.over and self.over not in known:
+            raise unknown_name(self.over, known)
+        if self.between is not None and self.drive is None and self.over != speed:
+            raise InputError(f"the range is of {self.over}: give the drive of the crank, drive=Drive(...)")
+        return self.over or str(speed)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The range, in SI."""
+        low, high = self.between or (0.0, 0.0)
+        return float(low), float(high)
+
+    def level(self, orbit: PeriodicOrbit) -> float:
+        """Return the level of a motion in the range."""
+        return value_of(orbit.parameters, orbit.drive, self.over)
+
+    def say(self, *levels: float, joint: str = ", ") -> str:
+        """Return values of the range's quantity as text with the unit; speeds in rpm."""
+        unit = unit_of(self.mechanism, self.over)
+        factor, unit = (RAD_S_PER_RPM, "rpm") if unit == "rad/s" else (1.0, unit)
+        return f"{joint.join(f'{level / factor:.6g}' for level in levels)} {unit}"
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Mechanism of the parameters."""
+        return mechanism_of(self.parameters)
+
+    @property
+    def judged(self) -> bool:
+        """Whether the stability of all motions is part of the wish."""
+        return self.no_unstable or self.least_margin > 0.0
+
+    @property
+    def radius(self) -> float:
+        """Bound of the largest multiplier."""
+        return 1.0 - self.least_margin
+
+    @property
+    def without_resonance(self) -> tuple[float, float]:
+        """The range with the margin of a resonance on either side, in SI."""
+        (low, high), margin = self.span, self.resonance_margin
+        return low - margin * abs(low), high + margin * abs(high)
+
+    @property
+    def size(self) -> float:
+        """Middle of the range (SI), the reference of relative distances."""
+        low, high = self.span
+        return 0.5 * (abs(low) + abs(high))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters that may be changed."""
+        return tuple(change.name for change in self.change)
+
+    @property
+    def present(self) -> FloatArray:
+        """Present values, shape (k,)."""
+        assert self.drive is not None
+        return np.array([value_of(self.parameters, self.drive, name) for name in self.names])
+
+    @property
+    def low(self) -> FloatArray:
+        """Least values, shape (k,)."""
+        return np.array([change.low for change in self.change])
+
+    @property
+    def high(self) -> FloatArray:
+        """Greatest values, shape (k,)."""
+        return np.array([change.high for change in self.change])
+
+    @property
+    def tolerance(self) -> FloatArray:
+        """Tolerances of the changes, shape (k,)."""
+        return np.array([change.tolerance for change in self.change])
+
+    def scaled(self, values: FloatArray) -> FloatArray:
+        """Return values as changes in their tolerances."""
+        return (values - self.present) / self.tolerance
+
+    def operation(self, x: FloatArray, level: float) -> Operation:
+        """Return mechanism and drive with changes in their tolerances, at a level of the range."""
+        assert self.drive is not None
+        values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
+        return with_values(self.parameters, self.drive, {**dict(zip(self.names, values)), self.over: level})
+
+
+def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
+    name = "speeds" if over == speed_name(mechanism) else over
+    low, high = (float(si(value, unit_of(mechanism, over), name)) for value in given)
+    if not (isfinite(low) and isfinite(high) and low < high):
+        raise ParameterError(name, list(given), "be a range: [least, greatest]")
+    if name == "speeds" and not low > 0.0:
+        raise ParameterError(name, list(given), "be a range above zero: [least, greatest]")
+    return low, high
+
+
+def _changeable(mechanism: Mechanism, name: str) -> str:
+    """Return the FMI name of a parameter or drive quantity, given by that name or its field."""
+    known = {field_name(n): n for n in variable_names(mechanism)}
+    found = known.get(field_name(name))
+    if found is None:
+        raise unknown_name(name, known.values())
+    return found
+
+
+def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
+    if not isinstance(given, Mapping):
+        changes = tuple(given)
+    else:
+        changes = tuple(_change(operation, n, value) for n, value in _named(given, mechanism_of(operation[0])).items())
+    if not changes:
+        raise InputError("nothing may be changed: name at least one parameter in change")
+    for change in changes:
+        require_variable(*operation, change.name)
+        if change.name == over:
+            raise ParameterError(f"change.{over}", over, "be something else: the range is of it")
+    return changes
+
+
+def _named(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
+    """Return the entries about parameters by FMI name, from nested tables or dotted names."""
+    parts = [name.split(".") for name in variable_names(mechanism)]
+    groups = {".".join(part[:n]) for part in parts for n in range(1, len(part))}
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        if prefix + name in groups and isinstance(value, Mapping) and not {"tolerance", "between"} & set(value):
+            found |= _named(value, mechanism, f"{prefix}{name}.")
+        else:
+            found[_changeable(mechanism, prefix + name)] = value
+    return found
+
+
+def _change(operation: Operation, name: str, value: Any) -> Change:
+    require_variable(*operation, name)
+    unit = unit_of(mechanism_of(operation[0]), name)
+    now, what = value_of(*operation, name), f"change.{name}"
+    given: Mapping[str, Any]
+    if isinstance(value, Mapping):
+        check_names(value, what, ("tolerance", "between"))
+        given = value
+    else:
+        given = {"between": value} if isinstance(value, (list, tuple)) else {"tolerance": value}
+    tolerance = None
+    if "tolerance" in given:
+        tolerance = _tolerance(given["tolerance"], unit, now, what)
+    if "between" in given:
+        low, high = Range(Quantity(unit))(list(given["between"]), what)
+        return Change(name=name, low=low, high=high, tolerance=tolerance or 0.5 * (high - low))
+    if tolerance is None:
+        raise ParameterError(what, dict(given), "have a tolerance, or a range between [least, greatest]")
+    return Change(name=name, low=now - tolerance, high=now + tolerance, tolerance=tolerance, given=given["tolerance"])
+
+
+def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
+    """Return a tolerance in SI; per cent are a share of the present value."""
+    if isinstance(value, str) and value.rstrip().endswith("%"):
+        found = quantity(value, "1", name) * abs(now)
+        if now == 0.0:
+            raise ParameterError(name, value, f"be a quantity in {unit}: it is zero now")
+    else:
+        found = quantity(value, unit, name)
+    if not found > 0.0:
+        raise ParameterError(name, value, "be above zero")
+    return found
+
+
+def _checked(mechanism: Mechanism, limit: Limit) -> Limit:
+    """Return a limit in SI, with its unit and the outputs that it is about."""
+    name = limit.output.removeprefix(AMPLITUDE)
+    units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
+    known = {output: (output,) for output in units} | (mechanism.joints if name == limit.output else {})
+    if name not in known:
+        raise unknown_name(name, known, f"output {name!r}")
+    parts = known[name]
+    value = si(limit.below, units[parts[0]], f"limit of {limit.output}")
+    if not (isinstance(value, (int, float)) and isfinite(value) and value > 0.0):
+        raise ParameterError(f"limit of {limit.output}", limit.below, "be above zero")
+    checked = replace(limit, below=float(value))
+    object.__setattr__(checked, "unit", units[parts[0]])
+    object.__setattr__(checked, "parts", parts)
+    return checked

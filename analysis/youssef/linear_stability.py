@@ -1,0 +1,76 @@
+"""Stability of u = 0 by the linear equation, as in the thesis; `analysis.periodic` has the stability of the true motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import FiveBarParameters, without_friction
+
+from ..numerics.boundaries import Test
+from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, plane_test, verdict
+from ..run import takes_published
+from .hill import PeriodicEquation, monodromy
+from .linearisation import Load, Variant, slider_equation
+from .premises import require_five_bar
+
+
+def constant_load(drive: Drive) -> Load:
+    """Return the constant forces of a five-bar's drive."""
+    x, y, slider = (drive.forces.get(name, 0.0) for name in ("load.fx", "load.fy", "slider.force"))
+    return Load(x=x, y=y, slider=slider)
+
+
+@takes_published()
+def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
+    """Return the homogeneous linear equation of the slider about u = 0, whose stability the thesis investigates.
+
+    Raises
+    ------
+    InputError
+        If the drive is by torque.
+    """
+    if drive.speed is None:
+        raise InputError("the linear equation is at constant speed: the drive is by torque")
+    require_five_bar(parameters, "the linear equation")
+    equation = slider_equation(parameters, drive.speed, variant=variant, load=constant_load(drive))
+    return equation.homogeneous().stiffened(equation.spring)
+
+
+@takes_published()
+def linear_verdict(
+    parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
+) -> StabilityVerdict:
+    """Judge the stability of u = 0 by the linear equation; `PeriodicOrbit.verdict` judges the true motion."""
+    return verdict(multipliers(monodromy(linear_equation(parameters, drive, variant))), tolerance)
+
+
+def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
+    """Return a function for the monodromy matrix of the linear equation over a plane of parameters; it caches points."""
+
+    @cache
+    def matrix(x: float, y: float) -> NDArray[np.float64]:
+        return monodromy(linear_equation(*operation(x, y), variant))
+
+    return matrix
+
+
+def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
+    """Return the stability test of a multiplier of the linear equation over a plane; see `analysis.periodic.plane_test`."""
+    return plane_test(linear_monodromy(operation, variant=variant), multiplier)
+
+
+@takes_published()
+def linear_motion(
+    parameters: FiveBarParameters, drive: Drive, names: tuple[str, str]
+) -> Mapping[str, Callable[[Plane], Monodromy]]:
+    """Return the linear equation as a second motion for a `stability_chart` over parameters of these names.
+
+    The mapping is empty where no linear equation exists: for a drive by torque and with friction that is not viscous.
+    """
+    friction = parameters != without_friction(parameters) or any("friction" in name for name in names)
+    return {"linear equation": linear_monodromy} if drive.speed_drive and not friction else {}

@@ -1,0 +1,303 @@
+"""Synthesis with the quality function as a black box: differential evolution, and the thesis's downhill simplex.
+
+Neither knows a derivative. `synthesize` is compared with them; chapter VI of the thesis has only the simplex.
+
+The quality is that of the task in normal form. A path without crank rotations is compared with the coupler curve at equal
+shares of both lengths, in both directions of travel, so that a curve that collapses onto a piece of the target, or makes
+detours, is far from it. Constraints are those of the benchmarks: bounds, transmission angle, full turn, a straight part.
+
+Links that cannot be joined are stretched until they meet: C lies then on the line through B and D, where the circles of
+coupler and rocker have equal power, so that the quality has no cliff there. The gap between them is a violated constraint
+and, as every other inequality, counts in proportion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differential_evolution, minimize
+
+from analysis.numerics.tracing import rebound
+from analysis.synthesis.linkage.linkage import Linkage
+from analysis.synthesis.search.polish import sum_of_squares
+from analysis.synthesis.search.start import Answer, Start
+from analysis.synthesis.task.constraint import TURNING
+from analysis.synthesis.task.limits import Limits
+from analysis.synthesis.task.task import Normal
+from linkwork.five_bar import kinematics
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: Violation up to which a constraint counts as kept.
+KEPT = 1e-4
+#: Points of a coupler curve that a path is compared with.
+CURVE = 128
+#: Least crank rotation over which an open path is traced (rad).
+SPAN = 0.1
+#: Generations of differential evolution, and members of a generation for each unknown.
+GENERATIONS, MEMBERS = 400, 10
+#: Random linkages of which the best is a simplex's first vertex; edge of that simplex (units, rad).
+DRAWS, EDGE = 64, 0.2
+#: Factor of violated constraints in the simplex's quality function, in mean squared sizes of the target.
+PENALTY = 10.0
+#: Evaluations that a simplex may take for each unknown.
+EVALUATIONS = 600
+#: The plant's loop closure over arrays, its square root zero where the links cannot be joined.
+_joined = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).joined
+
+
+def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
+    """The regular simplex of n + 1 vertices about a first one, all edges of one length; shape (n + 1, n).
+
+    The thesis's rule (6.11). Its formula is not legible in the copy at hand; this is the regular simplex of Spendley, Hext and
+    Himsworth (Technometrics 4 (1962), p 441), which its description fits: the vertex k is off by p in the unknown k and by q
+    in every other,
+
+        p = e (sqrt(n + 1) + n - 1) / (n sqrt 2),   q = e (sqrt(n + 1) - 1) / (n sqrt 2).
+    """
+    n = len(first)
+    p = edge * (sqrt(n + 1.0) + n - 1.0) / (n * sqrt(2.0))
+    q = edge * (sqrt(n + 1.0) - 1.0) / (n * sqrt(2.0))
+    vertices: FloatArray = np.vstack([np.zeros(n), np.full((n, n), q) + (p - q) * np.eye(n)]) + first
+    return vertices
+
+
+def evolve(
+    box: BlackBox,
+    random: np.random.Generator,
+    callback: Callable[[OptimizeResult], bool | None] | None = None,
+    quality: Callable[[FloatArray], FloatArray] | None = None,
+    *,
+    maxiter: int = GENERATIONS,
+    tol: float = 1e-8,
+) -> OptimizeResult:
+    """SciPy's differential evolution of a quality, by default the box's, over whole generations.
+
+    ``callback(intermediate_result)`` sees each, and ends it by a true answer.
+    """
+    measure = quality or box.quality
+
+    def violations(x: FloatArray) -> FloatArray:
+        # of one vector first, of a generation then
+        return box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
+
+    return differential_evolution(
+        # SciPy asks for none where no member of a generation keeps the constraints
+        lambda x: measure(x.T) if x.size else np.empty(0),
+        Bounds(box.low, box.high),
+        maxiter=maxiter,
+        popsize=MEMBERS,
+        tol=tol,
+        init="sobol",
+        updating="deferred",
+        vectorized=True,
+        polish=False,
+        constraints=(NonlinearConstraint(violations, -np.inf, 0.0),),
+        callback=callback,
+        rng=random,
+    )
+
+
+def descend(
+    box: BlackBox, random: np.random.Generator, score: Callable[[FloatArray], float] | None = None
+) -> OptimizeResult:
+    """Nelder and Mead's simplex on a score, by default `BlackBox.charge`, from the best of `DRAWS` random linkages."""
+    draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
+    return descend_from(box, draws[np.argmin(box.charged(draws))], score or box.charge)
+
+
+def descend_from(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
+    """Nelder and Mead's simplex from a linkage, regular at the start and away from the nearer bounds."""
+    away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
+    simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)
+    return minimize(
+        score,
+        first,
+        method="Nelder-Mead",
+        bounds=Bounds(box.low, box.high),
+        options={"initial_simplex": simplex, "maxfev": EVALUATIONS * len(first), "xatol": 1e-7, "fatol": 1e-12},
+    )
+
+
+class BlackBox:
+    """The quality function of one assembly, and how far each constraint is violated, over rows of unknowns.
+
+    The unknowns are those of `constraints.UNKNOWNS` that are free, and of an open path the rotation over which it is traced.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (k,)
+        Bounds of the unknowns; angles within a turn.
+    """
+
+    def __init__(self, normal: Normal, limits: Limits, branch: int) -> None:
+        self.normal, self.limits, self.branch = normal, limits, branch
+        low, high = limits.low.copy(), limits.high.copy()
+        whole = high[7:] - low[7:] >= 2.0 * pi
+        low[7:][whole], high[7:][whole] = -pi, pi
+        if normal.points is not None:
+            # farther off no point of the coupler reaches the target
+            reach = high[3] + high[6] + 1.0
+            near, far = np.maximum(low[:2], -reach), np.minimum(high[:2], reach)
+            sensible = near <= far
+            low[:2][sensible], high[:2][sensible] = near[sensible], far[sensible]
+        self._free = np.nonzero(high > low)[0]
+        self._fixed = low
+        self._open = not normal.timed and not normal.closed
+        self.low, self.high = low[self._free], high[self._free]
+        if self._open:
+            self.low, self.high = np.append(self.low, SPAN), np.append(self.high, 2.0 * pi)
+
+    def quality(self, x: FloatArray) -> FloatArray:
+        """Sum of weighted squared errors at the stations, shape (m,), in units squared."""
+        q = self._linkages(x)
+        return self._errors(q, self._rotations(x, q))
+
+    def charged(self, x: FloatArray) -> FloatArray:
+        """The quality and, in proportion, every violated constraint, shape (m,)."""
+        q = self._linkages(x)
+        rotation = self._rotations(x, q)
+        charge = sum(np.maximum(value, 0.0) for _, value in self._inequalities(q, rotation))
+        charged: FloatArray = self._errors(q, rotation) + PENALTY * self.normal.weights.sum() * charge
+        return charged
+
+    def charge(self, x: FloatArray) -> float:
+        """`charged` of one linkage."""
+        return float(self.charged(x[None, :])[0])
+
+    def violations(self, x: FloatArray) -> FloatArray:
+        """Left sides of the inequalities g(x) <= 0, shape (m, number of them)."""
+        q = self._linkages(x)
+        # what holds over a turn does not ask for the stations' rotations, which take most of the time
+        needed = self.limits.turn is None or self.normal.straight is not None
+        rotation = self._rotations(x, q) if needed else np.zeros((len(q), 1))
+        return np.column_stack([value for _, value in self._inequalities(q, rotation)])
+
+    def answer(self, result: OptimizeResult) -> Answer:
+        """Where a search ended."""
+        x = np.asarray(result.x)[None, :]
+        q = self._linkages(x)
+        rotation = self._rotations(x, q)
+        inequalities = self._inequalities(q, rotation)
+        worst, violation = max(((name, float(value[0])) for name, value in inequalities), key=lambda pair: pair[1])
+        start = Start(q=q[0], branch=self.branch, rotation=None if self.normal.timed else rotation[0])
+        quality = sum_of_squares(self.normal, start)
+        # the simplex comes to lie on a constraint, not within it
+        kept = violation <= KEPT and bool(np.isfinite(quality))
+        return Answer(
+            start=replace(start, quality=quality),
+            feasible=kept,
+            converged=bool(result.success),
+            violation=max(0.0, violation),
+            worst=worst if violation > 0.0 else "",
+            excess="",
+            status=str(result.message),
+            iterations=int(result.nit),
+        )
+
+    # Linkages and their curves
+
+    def _linkages(self, x: FloatArray) -> FloatArray:
+        q = np.repeat(self._fixed[None, :], len(x), axis=0)
+        q[:, self._free] = x[:, : len(self._free)]
+        return q
+
+    def _pins(self, q: FloatArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Components of the vector from B to D, in the frame of the ground link; shape (m, n)."""
+        th2 = rotation + q[:, 8, None]
+        return q[:, 2, None] - q[:, 3, None] * np.cos(th2), -q[:, 3, None] * np.sin(th2)
+
+    def _directions(self, q: FloatArray, rotation: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Directions of coupler and rocker, shape (m, n); of other length than one where the links are stretched."""
+        dx, dy = self._pins(q, rotation)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            g = _joined(0.0, 0.0, dx, dy, q[:, 4, None], q[:, 5, None], float(self.branch))
+        coupler, rocker = g.c3 + 1j * g.s3, g.c4 + 1j * g.s4
+        # B on D: any direction
+        return np.nan_to_num(coupler, nan=1.0), np.nan_to_num(rocker, nan=1.0)
+
+    def _traced(self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray) -> ComplexArray:
+        turn = np.exp(1j * q[:, 7])
+        point = q[:, 6] * np.exp(1j * q[:, 9])
+        crank = q[:, 3, None] * np.exp(1j * (rotation + q[:, 8, None]))
+        traced: ComplexArray = (q[:, 0] + 1j * q[:, 1])[:, None] + turn[:, None] * (crank + point[:, None] * coupler)
+        return traced
+
+    def _errors(self, q: FloatArray, rotation: FloatArray) -> FloatArray:
+        normal = self.normal
+        coupler, rocker = self._directions(q, rotation)
+        squares: FloatArray = np.zeros(rotation.shape)
+        if normal.points is not None:
+            squares = np.abs(self._traced(q, rotation, coupler) - normal.points) ** 2
+        if normal.angle is not None:
+            squares = squares + self._turned(q, rotation, coupler, rocker, normal.angle) ** 2
+        weighted = squares * normal.weights
+        errors: FloatArray = np.sqrt(weighted.max(axis=1)) if normal.quality == "worst" else weighted.sum(axis=1)
+        return errors
+
+    def _turned(
+        self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
+    ) -> FloatArray:
+        """Errors of angle, as lengths; where a link is stretched, its error is that of its direction."""
+        own = rocker if self.normal.of_rocker else coupler * np.exp(1j * q[:, 7])[:, None]
+        left: FloatArray = self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
+        return left
+
+    def _rotations(self, x: FloatArray, q: FloatArray) -> FloatArray:
+        """Crank rotations of the stations, shape (m, n)."""
+        if self.normal.rotation is not None:
+            return np.broadcast_to(self.normal.rotation, (len(q), self.normal.n))
+        span = x[:, -1] if self._open else np.full(len(q), 2.0 * pi)
+        found = [self._paired(q, way * span) for way in (1.0, -1.0)]
+        forward = self._errors(q, found[0]) <= self._errors(q, found[1])
+        return np.where(forward[:, None], *found)
+
+    def _paired(self, q: FloatArray, span: FloatArray) -> FloatArray:
+        """Rotations at the stations' shares of the length of the curve."""
+        normal = self.normal
+        assert normal.points is not None
+        steps = np.abs(np.diff(np.append(normal.points, normal.points[0]) if normal.closed else normal.points))
+        shares = (np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum())[: normal.n]
+        rotation = span[:, None] * np.linspace(0.0, 1.0, CURVE + 1)
+        curve = self._traced(q, rotation, self._directions(q, rotation)[0])
+        length = np.hstack([np.zeros((len(q), 1)), np.cumsum(np.abs(np.diff(curve, axis=1)), axis=1)])
+        return np.array([np.interp(shares * s[-1], s, r) for s, r in zip(length, rotation)])
+
+    # Constraints
+
+    def _inequalities(self, q: FloatArray, rotation: FloatArray) -> list[tuple[str, FloatArray]]:
+        """Names and left sides of the inequalities g <= 0, each shape (m,)."""
+        limits, normal = self.limits, self.normal
+        l1, l2, l3, l4 = (q[:, k] for k in range(2, 6))
+        found: list[tuple[str, FloatArray]] = []
+        # distances from crank pin to rocker pivot: over the turn, and over the way of the task
+        spans: list[tuple[FloatArray, FloatArray, float | None]] = []
+        if limits.turn is not None:
+            spans.append((np.abs(l1 - l2), l1 + l2, limits.turn))
+        if limits.turn is None or limits.way is not None:
+            distance = np.hypot(*self._pins(q, rotation))
+            spans.append((distance.min(axis=1), distance.max(axis=1), limits.way))
+        for nearest, farthest, least in spans:
+            found += [
+                ("loop closure", farthest - (l3 + l4)),
+                ("loop closure", np.abs(l3 - l4) - nearest),
+            ]
+            if least is not None:
+                # as lengths, so that no constraint outweighs another
+                both = Linkage.transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
+                found += [("transmission angle", excess / (l3 + l4)) for excess in both]
+        straight = normal.straight
+        if straight is not None:
+            assert normal.points is not None
+            spent = np.abs(rotation[:, straight.end] - rotation[:, straight.start])
+            found.append(("crank rotation of the straight part", spent - straight.rotation))
+            if straight.flatness is not None:
+                line = normal.points[straight.end] - normal.points[straight.start]
+                traced = self._traced(q, rotation, self._directions(q, rotation)[0])
+                off = (traced[:, straight.start : straight.end + 1] * line.conjugate()).imag / abs(line)
+                found.append(("flatness of the straight part", np.ptp(off, axis=1) - straight.flatness))
+        return found

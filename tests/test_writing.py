@@ -1,0 +1,38 @@
+"""Only `files` and the command line write files, beside a few modules that make files of their own kind."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1] / "analysis"
+#: Who writes, and what.
+WRITERS = {
+    "files": "results, in whole and never over what another command wrote",
+    "cli": "what a command makes",
+    "export": "FMUs and the sources that they are compiled from",
+    "probe": "a working folder for an FMU under test",
+    "numerics/codegen.py": "machine code in the cache",
+    "numerics/workers.py": "results of workers in a temporary folder",
+    "display.py": "a picture in memory",
+}
+METHODS = {"write_text", "write_bytes", "savefig", "savetxt", "tofile", "copyfile", "copytree"}
+
+
+def writes(call: ast.Call) -> bool:
+    """Whether a call writes a file: a method such as ``path.write_text``, or opening for writing."""
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    if name in ("open", "ZipFile"):
+        values = [*call.args, *(keyword.value for keyword in call.keywords)]
+        modes = [v.value for v in values if isinstance(v, ast.Constant) and isinstance(v.value, str)]
+        return any(len(mode) <= 3 and set(mode) & set("wax") for mode in modes)
+    return name in METHODS and isinstance(call.func, ast.Attribute)
+
+
+def test_only_some_modules_write_files() -> None:
+    found = set()
+    for path in PACKAGE.rglob("*.py"):
+        place = path.relative_to(PACKAGE).as_posix()
+        if any(isinstance(node, ast.Call) and writes(node) for node in ast.walk(ast.parse(path.read_text("utf-8")))):
+            found.add(place if place in WRITERS else place.partition("/")[0])
+    assert found == set(WRITERS)
