@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differential_evolution, minimize
 
 from analysis.numerics.tracing import rebound
-from analysis.synthesis.linkage.linkage import transmission_excess
-from analysis.synthesis.search.polish import quality_of
+from analysis.synthesis.linkage.linkage import Linkage
+from analysis.synthesis.search.polish import sum_of_squares
 from analysis.synthesis.search.start import Answer, Start
 from analysis.synthesis.task.constraint import TURNING
 from analysis.synthesis.task.limits import Limits
@@ -185,7 +185,7 @@ class BlackBox:
         inequalities = self._inequalities(q, rotation)
         worst, violation = max(((name, float(value[0])) for name, value in inequalities), key=lambda pair: pair[1])
         start = Start(q=q[0], branch=self.branch, rotation=None if self.normal.timed else rotation[0])
-        quality = quality_of(self.normal, start)
+        quality = sum_of_squares(self.normal, start)
         # the simplex comes to lie on a constraint, not within it
         kept = violation <= KEPT and bool(np.isfinite(quality))
         return Answer(
@@ -288,7 +288,7 @@ class BlackBox:
             ]
             if least is not None:
                 # as lengths, so that no constraint outweighs another
-                both = transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
+                both = Linkage.transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
                 found += [("transmission angle", excess / (l3 + l4)) for excess in both]
         straight = normal.straight
         if straight is not None:

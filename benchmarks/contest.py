@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from analysis.studies.youssef.problems import AREA_N, PACKAGING_FLATNESS, PACKAGING_ROTATION, PACKAGING_TRAVEL, N
 from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
 from analysis.synthesis.linkage.kernels import symmetric_difference
-from analysis.synthesis.search.start import linkage_of
+from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import Constraint
-from analysis.synthesis.task.limits import Limits, limits_of
+from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal, Task
 
 from .black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
@@ -88,7 +88,7 @@ class Contest:
     def of(cls, problem: Problem, *, on_area: bool = False) -> Contest:
         """The contest on a problem."""
         normal = normal_form(problem.task)
-        limits = limits_of(problem.task, normal, problem.bounds, problem.constraints)
+        limits = make_limits(problem.task, normal, problem.bounds, problem.constraints)
         boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
         plain = {branch: BlackBox(replace(normal, straight=None), limits, branch) for branch in limits.branches}
         whole = normal.quality == "area" and normal.straight is None and not np.ptp(normal.outline_weights)
@@ -122,7 +122,7 @@ class Contest:
         """Error by the task's own measure, in the unit of print; infinite where a constraint is violated."""
         plain = self.plain[box.branch]
         answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
-        linkage = linkage_of(answer.start, self.normal)
+        linkage = make_linkage(answer.start, self.normal)
         if not answer.feasible or (self.normal.straight is not None and not packs(linkage)):
             return inf
         return self.problem.convert(evaluate(self.problem.task, linkage).error)

@@ -30,9 +30,9 @@ from threadpoolctl import threadpool_limits
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
 from analysis.synthesis.linkage.kernels import coupler_path, nearest, symmetric_difference
 from analysis.synthesis.search.refine import divided
-from analysis.synthesis.search.start import linkage_of
+from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import USUAL, Constraint
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 
 from .black_box import PENALTY, BlackBox, descend_from, evolve
@@ -146,7 +146,7 @@ class Evolution:
             return inf
         start = self.box.answer(OptimizeResult(x=x, success=True, message="", nit=0)).start
         span = tau if self.normal.closed else float(x[-1])
-        return evaluate(self.task, linkage_of(start, self.normal), np.linspace(0.0, span, self.normal.n)).error
+        return evaluate(self.task, make_linkage(start, self.normal), np.linspace(0.0, span, self.normal.n)).error
 
     def run(self, random: np.random.Generator, over: Callable[[], bool]) -> float:
         """One run, stopped where its time is over, and a simplex from where it ended."""
@@ -164,7 +164,7 @@ class Evolution:
 def by_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:
     """The least error of all runs within the time (m2)."""
     normal = normal_form(task)
-    limits = limits_of(task, normal, None, constraints)
+    limits = make_limits(task, normal, None, constraints)
     searches = [Evolution(task, normal, BlackBox(normal, limits, branch)) for branch in limits.branches]
     for search in searches:
         search.areas(search.box.low[None, :])

@@ -35,7 +35,7 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from analysis.synthesis import InfeasibleError, Search, synthesize
-from analysis.synthesis.search.start import start_of
+from analysis.synthesis.search.start import make_start
 
 from .black_box import BlackBox
 from .contest import (
@@ -90,7 +90,7 @@ def by_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> Non
         with suppress(InfeasibleError):
             answer = synthesize(problem.task, problem.bounds, problem.constraints, kinds=("four-bar",), search=search)
             linkage = answer.best.linkage
-            q = start_of(linkage, contest.normal).q
+            q = make_start(linkage, contest.normal).q
             if ((q >= limits.low - EXACT) & (q <= limits.high + EXACT)).all():
                 trace.offer(contest.plain[linkage.branch], q[limits.high > limits.low])
         trace.tick()

@@ -48,10 +48,10 @@ from analysis.synthesis import (
     turn,
 )
 from analysis.synthesis.linkage.kernels import coupler_path, coupler_path_jacobian
-from analysis.synthesis.search.polish import Polisher, fit_least_squares, quality_of
+from analysis.synthesis.search.polish import Polisher, fit_least_squares, sum_of_squares
 from analysis.synthesis.search.scan import scan
-from analysis.synthesis.search.start import Start, linkage_of, start_of
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.search.start import Start, make_linkage, make_start
+from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.five_bar import kinematics
 
@@ -215,7 +215,7 @@ def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Sta
     task = TimedPath(points=ellipse(10.0, N), weights=weights)
     normal = normal_form(task)
     largest = LargestLink(length=PROBLEMS["ellipse-a"].linkage.largest_link)
-    limits = limits_of(task, normal, None, (largest,))
+    limits = make_limits(task, normal, None, (largest,))
     boxes = {branch: BlackBox(normal, limits, branch) for branch in limits.branches}
     if scanned:
         starts = scan(normal, limits, seed=0, candidates=1 << 16, starts=number)
@@ -233,7 +233,7 @@ def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Sta
 
     runs: dict[str, Callable[[Start], float]] = {
         "least squares, exact Jacobian": lambda start: fit_least_squares(normal, limits, start).start.quality,
-        "IPOPT, exact derivatives": lambda start: quality_of(normal, program.solve(start).start),
+        "IPOPT, exact derivatives": lambda start: sum_of_squares(normal, program.solve(start).start),
         "simplex": simplex,
     }
     found = []
@@ -252,7 +252,7 @@ def _random_starts(boxes: dict[int, BlackBox], normal: Normal, number: int) -> I
         draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
         best = draws[np.argmin(box.charged(draws))]
         answer = box.answer(SimpleNamespace(x=best, success=True, message="", nit=0))
-        yield start_of(linkage_of(answer.start, normal), normal)
+        yield make_start(make_linkage(answer.start, normal), normal)
 
 
 # Tables

@@ -165,7 +165,6 @@ def run_page(name, tmp_path):
 
 @pytest.mark.slow
 def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
-    """Each command and each piece of Python in turn; what the page then shows is among what was printed."""
     commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path)
     assert (commands, checked) == (9, 43)
     # what the prose says
@@ -185,42 +184,30 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
 
 
 @pytest.mark.slow
-def test_the_page_of_the_slider_crank_runs_and_says_what_is_so(tmp_path):
-    commands, checked, printed = run_page("slider-crank.md", tmp_path)
-    assert (commands, checked) == (15, 19)
-    assert ["the", "two", "agree"] in printed
-    for name in ("out/rahman-a4-10-s1-3.5.gif", "out/slider-crank-range.png", "mechanism.png", "crank.toml"):
-        assert (tmp_path / name).exists()
-
-
-@pytest.mark.slow
-def test_the_page_of_linkages_in_closed_form_runs_and_says_what_is_so(tmp_path):
-    commands, checked, _ = run_page("closed-form.md", tmp_path)
-    assert (commands, checked) == (4, 2)
-    assert (tmp_path / "out/poses.png").exists()
-
-
-@pytest.mark.slow
-def test_the_page_of_synthesis_cases_runs_and_says_what_is_so(tmp_path):
-    commands, checked, printed = run_page("synthesis-cases.md", tmp_path)
-    assert (commands, checked) == (2, 2)
-    # the force on the pins of the first linkage, by the run
-    assert any(words[:1] == ["1"] and words[-3:-1] == ["on", "A"] for words in printed)
-    assert (tmp_path / "calm/solutions.csv").exists()
-
-
-@pytest.mark.slow
-def test_the_page_of_tuning_runs_and_says_what_is_so(tmp_path):
-    commands, checked, _ = run_page("tuning.md", tmp_path)
-    assert (commands, checked) == (3, 7)
-    assert (tmp_path / "out/tuning-jump-tuned.png").exists()
-
-
-@pytest.mark.slow
-def test_the_page_of_several_machines_runs_and_says_what_is_so(tmp_path):
-    pytest.importorskip("distributed")
-    commands, checked, _ = run_page("workers.md", tmp_path)
-    assert (commands, checked) == (1, 1)
+@pytest.mark.parametrize(
+    ("page", "commands", "checked", "files"),
+    [
+        (
+            "slider-crank.md",
+            15,
+            19,
+            ("out/rahman-a4-10-s1-3.5.gif", "out/slider-crank-range.png", "mechanism.png", "crank.toml"),
+        ),
+        ("closed-form.md", 4, 2, ("out/poses.png",)),
+        ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
+        ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
+        ("workers.md", 1, 1, ()),
+    ],
+)
+def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_path):
+    """The numbers of commands and of lines that are checked show that nothing was passed over."""
+    *counts, printed = run_page(page, tmp_path)
+    assert counts == [commands, checked]
+    assert all((tmp_path / name).exists() for name in files)
+    if page == "slider-crank.md":
+        assert ["the", "two", "agree"] in printed
+    if page == "synthesis-cases.md":  # the force on the pins of the first linkage, by the run
+        assert any(words[:1] == ["1"] and words[-3:-1] == ["on", "A"] for words in printed)
 
 
 def test_pictures_of_the_documentation_are_small():

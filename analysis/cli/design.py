@@ -31,7 +31,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..synthesis import PinForces, Solution, TradeOff
+    from ..synthesis import Assessment, Make, PinForces, Solution, TradeOff
 
 #: Further positions in a drawing.
 POSES = 6
@@ -80,86 +80,67 @@ def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
 
 
 def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[PinForces] | None = None) -> None:
-    """Ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known."""
-    from ..synthesis import error_unit, format_transmission, quality_name, quality_unit
+    """Print ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known."""
+    from ..synthesis import format_transmission, quality_cells, quality_headings
 
-    task = solutions[0].task
-    (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
-    headings = (
-        "",
-        f"{quality_name(task)} [{unit}]",
-        f"rms error [{length}]",
-        f"worst [{length}]",
-        "largest link [mm]",
-        "transmission angle [deg]",
-        *(["pin force [N]"] if forces else []),
-        "verdict",
-    )
+    headings = ["", *quality_headings(solutions[0].task), "largest link [mm]", "transmission angle [deg]"]
     rows = [
-        (
-            str(rank),
-            f"{factor * s.error:.5g}",
-            f"{scale * s.evaluation.rms:.4g}",
-            f"{scale * s.evaluation.worst:.4g}",
-            f"{1e3 * s.linkage.largest_link:.6g}",
-            format_transmission(v),
-            *([f"{forces[rank - 1].greatest:.4g} on {forces[rank - 1].pin}"] if forces else []),
-            ", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]),
-        )
-        for rank, (s, v) in enumerate(((s, s.verdicts) for s in solutions), start=1)
+        [str(rank), *quality_cells(s), f"{1e3 * s.linkage.largest_link:.6g}", format_transmission(s.verdicts)]
+        for rank, s in enumerate(solutions, start=1)
     ]
+    if forces:
+        headings.append("pin force [N]")
+        for row, force in zip(rows, forces):
+            row.append(f"{force.greatest:.4g} on {force.pin}")
+    headings.append("verdict")
+    for row, s in zip(rows, solutions):
+        v = s.verdicts
+        row.append(", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]))
     styles = [None if s.verdicts.sound else "yellow" for s in solutions]
     show_table(title, headings, rows, words=("verdict",), styles=styles)
 
 
-def print_best(solution: Solution) -> None:
-    """Dimensions of a solution, and what an error in each costs."""
-    from ..synthesis import dimension_rows, rounding_line
-
-    head, *rows = dimension_rows(solution)
+def print_best(best: Assessment) -> None:
+    """Print the dimensions of a solution, and what an error in each costs."""
+    head, *rows = best.dimensions
     show_table("the first of them", head, rows, words=head[:1])
-    console.print(rounding_line(solution), highlight=False, soft_wrap=True)
+    console.print(best.rounding, highlight=False, soft_wrap=True)
 
 
-def write_described(solution: Solution, folder: Path, title: str, *, curve: str, text: str, drawn: str) -> list[Path]:
-    """The curve of a solution, its report, and its drawing as DXF and SVG, under these names; what was written."""
+def write_described(best: Assessment, folder: Path, title: str, *, curve: str, text: str, drawn: str) -> list[Path]:
+    """Write the curve of a solution, its report, and its drawing as DXF and SVG, under these names; return the paths."""
     from ..files import save_drawing, write_text
-    from ..synthesis import drawing, report
+    from ..synthesis import drawing
 
-    described = write_text(folder / f"{text}.txt", f"{title}\n\n{report(solution)}")
-    written = [solution.to_csv(folder / f"{curve}.csv"), described]
-    picture = drawing(solution, poses=POSES, title=title)
+    described = write_text(folder / f"{text}.txt", f"{title}\n\n{best.report}")
+    written = [best.solution.to_csv(folder / f"{curve}.csv"), described]
+    picture = drawing(best.solution, poses=POSES, title=title)
     return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
 
 
-def write_solution(
-    solution: Solution, folder: Path, title: str, *, make: Any, plots: bool, animate: bool
-) -> list[Path]:
-    """Everything about one solution: drawing, curve, report, parameters and a case that runs; what was written."""
+def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, plots: bool, animate: bool) -> list[Path]:
+    """Write everything about one solution: drawing, curve, report, parameters and a case that runs; return the paths."""
     from .. import figures
     from ..files import save_drawing, save_figure, write_tables
     from ..run import save_parameters
-    from ..synthesis import SecondCrank, plates
+    from ..synthesis import plates
 
-    written = write_described(solution, folder, title, curve="best-curve", text="best-report", drawn="best")
-    pivot = solution.linkage.pivot
-    slides = solution.linkage.slides
-    if not (slides or isinstance(pivot, SecondCrank)):
-        written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution.linkage)))
-    if pivot is None:
-        case = folder / ("slider-crank.toml" if slides else "five-bar.toml")
+    written = write_described(best, folder, title, curve="best-curve", text="best-report", drawn="best")
+    solution = best.solution
+    linkage = solution.linkage
+    if linkage.kind == "four-bar":
+        written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(linkage)))
+    if linkage.pivot is None:
+        case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
         written.append(write_tables(case, solution.run_case(make, title)))
-    if isinstance(pivot, SecondCrank):
-        say(
-            "no case to run: the house has no mechanism with two geared cranks; its drawings, sheet and curve are written"
-        )
+    if linkage.kind == "geared-five-bar":
+        say("no case to run: a geared five-bar cannot be simulated yet; its drawings, sheet and curve are written")
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     written += plotted(plots, solution, folder / "best-linkage.png", title=title)
     if plots:
         forces = _forces(solution, make)
-        made = make.describe(forces=forces is not None)
-        sheet = figures.plot_sheet(solution, forces, title=title, made=made)
+        sheet = figures.plot_sheet(best, forces, title=title, made=make.describe(forces=forces is not None))
         written.append(save_figure(sheet, folder / "best-sheet.pdf"))
     if animate:
         with console.status("animating"):
@@ -167,14 +148,13 @@ def write_solution(
     return written
 
 
-def _forces(solution: Solution, make: Any) -> PinForces | None:
-    """The forces on the pins at constant speed; None if the plant has no such linkage, or it is not joined on its way."""
+def _forces(solution: Solution, make: Make) -> PinForces | None:
+    """Return the pin forces at constant speed; None if the plant has no such linkage, or it is not joined on its way."""
     from ..synthesis import pin_forces
 
     if solution.linkage.pivot is not None or not (solution.verdicts.circuit and solution.verdicts.branch):
         return None
-    way = None if solution.verdicts.full_turn else (float(solution.rotation.min()), float(solution.rotation.max()))
-    return pin_forces(solution.linkage, make, way, run=False)
+    return pin_forces(solution.linkage, make, solution.way, run=False)
 
 
 @click.command()
@@ -211,9 +191,10 @@ def synthesize(
         SynthesisInterrupted,
         TradeOffInterrupted,
         alternatives,
-        columns_of,
+        assess,
         has_cognates,
         load_synthesis_case,
+        solution_columns,
     )
 
     overrides = overrides_of(settings, task__objective=objective, search__seed=seed, search__jobs=jobs)
@@ -229,15 +210,16 @@ def synthesize(
     forces = chosen.forces(result.solutions)
     title = f"{chosen.title}: {len(result.solutions)} linkages, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
-    print_best(result.best)
+    best = assess(result.best)
+    print_best(best)
     folder = folder_of(out)
     carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
     written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
     if has_cognates(result.best):
         others = alternatives(result.best)
         print_solutions("the same curve from other pivots: the first one's cognates", others)
-        written.append(write_csv(folder / "cognates.csv", columns_of(others)))
-    written += write_solution(result.best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
+        written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
+    written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     written += plotted(plots, result, folder / "alternatives.png", title=chosen.title)
     print_written(written)
     if not result.best.verdicts.sound:
@@ -253,19 +235,18 @@ def synthesize(
 
 
 def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[Path]:
-    from ..synthesis import OVER, error_unit, format_limit, quality_name, quality_unit
+    from ..synthesis import OVER, format_limit, quality_cells, quality_headings
 
     task = next((s.task for s in traded.solutions if s is not None), None)
     what = OVER[traded.over].name
     if task is None:
         print_error(f"note: no linkage keeps any of the limits of the {what}")
         return []
-    (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
-    headings = ("limit", f"{quality_name(task)} [{unit}]", f"worst [{length}]")
-    rows = []
-    for limit, s in zip(traded.limit, traded.solutions):
-        numbers = ("no linkage", "") if s is None else (f"{factor * s.error:.5g}", f"{scale * s.evaluation.worst:.4g}")
-        rows.append((format_limit(traded.over, float(limit)), *numbers))
+    headings = ("limit", *quality_headings(task)[::2])
+    rows = [
+        (format_limit(traded.over, float(limit)), *(("no linkage", "") if s is None else quality_cells(s)[::2]))
+        for limit, s in zip(traded.limit, traded.solutions)
+    ]
     show_table(f"{title}: error against the {what}", headings, rows)
     written = [traded.to_csv(folder / "trade-off.csv")]
     return written + plotted(plots, traded, folder / "trade-off.png", title=title)

@@ -51,10 +51,11 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         Guidance,
         GuidanceMap,
         RockerFunction,
-        columns_of,
+        assess,
         function_generators,
         guidance,
         load_synthesis_case,
+        solution_columns,
     )
 
     check_kind(case, SYNTHESIS)
@@ -70,10 +71,13 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
     if found.solutions:
         print_solutions(f"{chosen.title}: in closed form", found.solutions)
         best = found.solutions[0]
-        written.append(write_csv(folder / "solutions.csv", columns_of(found.solutions)))
+        written.append(write_csv(folder / "solutions.csv", solution_columns(found.solutions)))
         if best.verdicts.sound:
-            print_best(best)
-            written += write_described(best, folder, chosen.title, curve="best-curve", text="best-report", drawn="best")
+            assessment = assess(best)
+            print_best(assessment)
+            written += write_described(
+                assessment, folder, chosen.title, curve="best-curve", text="best-report", drawn="best"
+            )
     if not isinstance(found, Generators):
         written += plotted(plots, found, folder / "poses.png", title=chosen.title)
     if found.solutions:

@@ -131,14 +131,14 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
     """The fixed pivot and the motions, a row each, in mm and degrees."""
     from ..slider import greatest_derivative
-    from ..synthesis import SliderMotion, error_unit, format_transmission, quality_name, quality_unit
+    from ..synthesis import SliderMotion, format_transmission, quality_cells, quality_headings, quality_name
 
     task = solutions[0].task
-    (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
+    error, _, worst = quality_headings(task)
     headings = (
         "pivot",
-        f"error [{unit}]",
-        f"worst [{length}]",
+        error.replace(quality_name(task), "error"),
+        worst,
         "stroke [mm]",
         "du/dphi [mm/rad]",
         "d2u/dphi2 [mm/rad2]",
@@ -157,15 +157,16 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
                 *(f"{1e3 * greatest_derivative(s.linkage, k):.5g}" for k in (1, 2)),
                 f"{degrees(pivot.guide_angle):.2f}",
             ]
-        errors = (f"{factor * s.error:.5g}", f"{scale * s.evaluation.worst:.4g}")
-        rows.append((words, *errors, *motion, format_transmission(s.verdicts)))
+        rows.append((words, *quality_cells(s)[::2], *motion, format_transmission(s.verdicts)))
     styles = [None if s.verdicts.sound else "yellow" for s in solutions]
     title = f"{title}: {quality_name(task)}"
     show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
 
 
 def _write_solution(solution: Solution, folder: Path, title: str, plots: bool) -> list[Path]:
-    written = write_described(solution, folder, title, curve="curve", text="report", drawn="linkage")
+    from ..synthesis import assess
+
+    written = write_described(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
     return written + plotted(plots, solution, folder / "linkage.png", title=title)
 
 

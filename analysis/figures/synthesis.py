@@ -24,18 +24,19 @@ from linkwork.errors import InputError
 from ..synthesis import (
     OVER,
     SHOWN,
+    Assessment,
     InfeasibleError,
     LinkageScene,
     PinForces,
+    SliderCrank,
     Solution,
     Synthesis,
     TradeOff,
-    dimension_rows,
+    assess,
     error_unit,
     headline,
     quality_name,
     quality_unit,
-    rounding_line,
 )
 from .animation import check_frames, gif
 from .dispatch import animate, plot
@@ -161,7 +162,7 @@ def _draw_linkage(
     if p is not None:
         axis.add_patch(Polygon([b, c, p], facecolor=COUPLER, alpha=0.14, edgecolor="none", zorder=5))
         _line(axis, [b, p, c], color=COUPLER, linewidth=LINE, zorder=6)
-    if not scene.linkage.slides:
+    if not isinstance(scene.linkage, SliderCrank):
         _line(axis, [d, c], color=ROCKER, zorder=6, **link)
     _line(axis, [b, c], color=COUPLER, zorder=7, **link)
     _line(axis, [a, b], color=CRANK, zorder=8, **link)
@@ -384,12 +385,15 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         return finish(figure)
 
 
-def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: str = "", made: str = "") -> Figure:
+def plot_sheet(
+    solution: Solution | Assessment, forces: PinForces | None = None, *, title: str = "", made: str = ""
+) -> Figure:
     """A page for the workshop, A4: the linkage, its curve against the target, transmission angle, pin forces, dimensions.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or Assessment
+        An assessment is not computed anew.
     forces : PinForces, optional
         Without them there is no panel of them.
     title : str
@@ -401,6 +405,8 @@ def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: st
     InputError
         If the links cannot be joined anywhere.
     """
+    assessment = solution if isinstance(solution, Assessment) else assess(solution)
+    solution = assessment.solution
     scene = LinkageScene(solution, title)
     with styled():
         figure = Figure(figsize=A4)
@@ -415,8 +421,8 @@ def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: st
         _task(panels["task"], scene)
         _transmission(panels["transmission"], scene)
         if forces is not None:
-            _forces(panels["forces"], forces, "guide" if solution.linkage.slides else "D")
-        head, *dimensions = dimension_rows(solution)
+            _forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, SliderCrank) else "D")
+        head, *dimensions = assessment.dimensions
         panels["table"].axis("off")
         grid = panels["table"].table(
             dimensions, colLabels=head, cellLoc="right", loc="upper center", edges="horizontal"
@@ -426,7 +432,7 @@ def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: st
         grid.auto_set_column_width(range(len(head)))
         write_title(figure, scene.title)
         verdict = f"{solution.verdicts.grashof}; " + headline(solution).replace("\n", "; ")
-        write_notes(figure, [line for line in (verdict, rounding_line(solution), made) if line])
+        write_notes(figure, [line for line in (verdict, assessment.rounding, made) if line])
         return finish(figure)
 
 

@@ -19,13 +19,13 @@ from .reader import unknown_name
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
-#: Deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
+#: Greatest deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
 _CHORD_ERROR = 1e-4
-#: Widest curve of an SVG file (m): beyond it are slips of the pen.
+#: Greatest extent of a curve of an SVG file (m), against typing errors.
 _WIDEST = 1e9
-#: Groups and uses inside each other, and elements with all uses replaced, that an SVG file may have.
+#: Greatest depth of groups and uses in an SVG file, and greatest number of elements with all uses replaced.
 _DEPTH, _ELEMENTS = 100, 100_000
-#: Words of SVG's transformations, and the units that svgelements knows in them; what else stands there it would leave out.
+#: Words and units in SVG's transforms that svgelements knows; it ignores others silently.
 _TRANSFORMS = {
     "matrix", "translate", "translateX", "translateY", "scale", "scaleX", "scaleY", "rotate", "skew", "skewX", "skewY",
     "px", "pt", "pc", "mm", "cm", "in", "deg", "rad", "grad", "turn", "e", "E",
@@ -35,17 +35,15 @@ _TRANSFORMS = {
 def read_points(
     path: str | Path, *, unit: str | None = None, name: str | None = None
 ) -> tuple[NDArray[np.float64], bool]:
-    """Points of a curve from a CSV or SVG file, as the path's ending says.
+    """Read the points of a curve from a CSV or SVG file.
 
-    CSV (also ``.txt``): two columns, x and y, between commas, semicolons, tabs or spaces; a header line, empty lines and
-    lines that start with # are passed over. The curve is closed if its last point is its first again, which is then left
-    out.
+    CSV (also ``.txt``): two columns, x and y, separated by commas, semicolons, tabs or spaces; a header line, empty lines and
+    lines that start with # are ignored. If the last point repeats the first, it is left out and the curve is closed.
 
-    SVG: the first path, or without one the first ellipse, circle, polygon, polyline, rectangle or line; ``name`` is the
-    ``id`` of the element, or of a group to take the first one from.
-    Transforms are honoured, and y, which points down in SVG, is turned upwards: a point (x, y) of the user space that the
-    drawing's ``viewBox`` is in comes out at (x, -y). Curves become chords that are within 1e-4 of the curve's extent.
-    The curve is closed if its path says so or ends where it started.
+    SVG: the first path, or without one the first ellipse, circle, polygon, polyline, rectangle or line; ``name`` selects an
+    element by its ``id``, or the first one in a group. Transforms are applied, and y, which points down in SVG, is turned
+    upwards: a point (x, y) in the user space of the drawing's ``viewBox`` comes out at (x, -y). Chords replace curves, with
+    a deviation below 1e-4 of the curve's extent. The curve is closed if its path is, or ends where it started.
 
     Parameters
     ----------
@@ -82,7 +80,7 @@ def read_points(
         except LinkworkError:
             raise
         except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
-            # what svgelements, and numpy after it, make of a drawing that breaks the rules
+            # errors of svgelements and NumPy for an invalid drawing
             raise InputError(f"{path} has a curve that cannot be read: {first_line(error)[:200]}") from error
         if len(points) < 2 or not np.isfinite(points).all() or not 0.0 < np.ptp(points, axis=0).max() < _WIDEST:
             raise InputError(f"{path} has a curve without an extent, or one beyond {_WIDEST:.0e} m")
@@ -95,6 +93,7 @@ def read_points(
 
 
 def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
+    """Read x and y from the lines of a CSV file."""
     rows: list[tuple[float, float]] = []
     header = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -117,6 +116,7 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
 
 
 def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:
+    """Read the points of a curve from an SVG document, and whether it is closed."""
     require("svgelements")
     from io import StringIO
     from xml.etree import ElementTree
@@ -146,7 +146,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
     shapes.sort(key=lambda shape: not isinstance(shape, svgelements.Path))
     if not shapes:
         raise InputError(f"{path} has no path")
-    # back from the pixels of the page to the user space; svgelements rounds a millimetre to 3.7795296 px
+    # from the pixels of the page back to the user space, as svgelements rounds a millimetre to 3.7795296 px
     curve = abs(svgelements.Path(shapes[0]) * ~svgelements.Matrix(drawing.viewbox_transform or ""))
     curves = [part for part in curve.as_subpaths() if any(not isinstance(s, svgelements.Move) for s in part)]
     if len(curves) != 1:
@@ -154,7 +154,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
     segments = [s for s in curves[0] if not isinstance(s, svgelements.Move)]
     extent = float(np.ptp(np.vstack([_chords(s, np.inf) for s in segments]), axis=0).max())
     points = np.vstack([_chords(s, _CHORD_ERROR * extent) for s in segments])
-    # each segment starts where the one before ended, and may have no length, as a Z at the first point
+    # a segment repeats the end of the one before, and may have no length, such as a Z at the first point
     points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9 * extent)]
     gap = float(np.hypot(*(points[-1] - points[0])))
     closed = gap <= 1e-9 * extent
@@ -162,12 +162,12 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
 
 
 def _check_tree(path: Path, root: Any) -> None:
-    """Make sure that a drawing can be expanded: each ``<use>`` stands for a copy of what it names, uses in it included."""
+    """Check transforms, and the size of a drawing in which each ``<use>`` is replaced by a copy of its target."""
     named = {element.get("id"): element for element in root.iter() if element.get("id") is not None}
     sizes: dict[int, int] = {}
 
     def size(element: Any, depth: int) -> int:
-        """Elements that one stands for."""
+        """Return the number of elements that replace an element."""
         if depth > _DEPTH:
             raise InputError(f"{path} has groups and uses inside each other, deeper than {_DEPTH}, or a use of itself")
         if id(element) not in sizes:
@@ -190,14 +190,14 @@ def _check_tree(path: Path, root: Any) -> None:
 
 
 def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
-    """Points of a segment of an SVG path whose chords are within ``allowed`` of it."""
+    """Return points on a segment of an SVG path whose chords deviate by at most ``allowed``."""
     import svgelements
 
     if isinstance(segment, svgelements.Line | svgelements.Close):
         return np.array([segment.start, segment.end], dtype=float)
     n = 8
     while True:
-        # a chord from each second point to the next; between them the middles
+        # chords join every second point; the points between them show the deviation
         points = np.array(segment.npoint(np.linspace(0.0, 1.0, 2 * n + 1)), dtype=float)
         if n > 2000 or np.hypot(*(points[1::2] - 0.5 * (points[:-1:2] + points[2::2])).T).max() <= allowed:
             return points[::2]
@@ -205,7 +205,7 @@ def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
 
 
 def _svg_scale(path: Path, root: Any) -> float:
-    """Metres per user unit of an SVG document."""
+    """Return the metres per user unit of an SVG document."""
     lengths: list[float | None] = []
     for key in ("width", "height"):
         found = re.fullmatch(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|)\s*", root.get(key, ""))

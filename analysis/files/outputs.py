@@ -1,8 +1,8 @@
-"""Files that commands write: one is written over by the command that wrote it, or with --force, and by nothing else.
+"""Output files: a command overwrites only its own files, unless --force is given.
 
-A folder of results has a file ``.linkwork`` with a line for each: hash, command and name. Where a file is there that the
-command did not write, or that was changed since, it stays, and the new one is put beside it: no result is lost, old or new.
-Outside of commands, in Python, what is written to a path takes the place of what was there.
+A folder of results has a file ``.linkwork`` with hash, command and name of each result. A file that the command did not write,
+or that has changed since, stays, and the new file is put beside it: no result is lost, old or new. Outside of commands, in
+Python, a file replaces the one that was there.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ RECORD = ".linkwork"
 
 @dataclass(slots=True)
 class Writing:
-    """Files that a command writes.
+    """Record of a command that writes files.
 
     Attributes
     ----------
     command : str
-        Its name; the same command may write over its files.
+        Its name; it may overwrite its own files.
     force : bool
-        Whether it may write over all others.
+        Whether it may overwrite other files.
     notes : list of str
         A sentence for each file that was put beside another one.
     """
@@ -45,7 +45,7 @@ _CURRENT: ContextVar[Writing | None] = ContextVar("writing", default=None)
 
 @contextmanager
 def written_by(command: str, force: bool = False) -> Iterator[Writing]:
-    """Inside of it, files are written by a command."""
+    """Attribute the files written inside this context to a command."""
     token = _CURRENT.set(writing := Writing(command, force))
     try:
         yield writing
@@ -55,7 +55,7 @@ def written_by(command: str, force: bool = False) -> Iterator[Writing]:
 
 @contextmanager
 def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
-    """A path to write to, and the one where it will be: the file is there complete, or not at all."""
+    """Yield a path to write to and the final path, where the file then appears complete, or not at all."""
     path = free(path)
     with whole(path) as part:
         yield part, path
@@ -63,14 +63,14 @@ def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a text in UTF-8, its lines ended as they are; returns where it is."""
+    """Write a text in UTF-8 without changing its line ends, and return its path."""
     with output(path) as (part, path):
         part.write_bytes(text.encode())
     return path
 
 
 def free(path: str | Path) -> Path:
-    """The path, or one beside it where a file is there that the command may not write over."""
+    """Return the path, or one beside it if the command may not overwrite the file there."""
     path, writing = Path(path), _CURRENT.get()
     if writing is None or writing.force or _is_own(path, writing.command):
         return path
@@ -83,32 +83,33 @@ def free(path: str | Path) -> Path:
 
 
 def record(path: Path) -> None:
-    """Keep in mind that the command wrote a file."""
+    """Record that the command wrote a file."""
     writing = _CURRENT.get()
     if writing is None:
         return
     line = _line(path, writing.command)
     if _recorded(path) != line:
-        # one short line at a time, so that commands in one folder do not disturb each other; without it nothing is lost
+        # one short line at a time, so that commands in one folder do not disturb each other; if it fails, nothing is lost
         with suppress(OSError), path.with_name(RECORD).open("a", encoding="utf-8") as file:
             file.write(f"{line}\n")
 
 
 def _is_own(path: Path, command: str) -> bool:
-    """Whether nothing is there, or what the command wrote."""
+    """Return whether the path is free, or holds what the command wrote."""
     if not os.path.lexists(path):
         return True
     return path.is_file() and _recorded(path) == _line(path, command)
 
 
 def _line(path: Path, command: str) -> str:
+    """Return the line of the record for a file as it is."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     return f"{digest} {command}: {path.name}"
 
 
 def _recorded(path: Path) -> str:
-    """The last line about a file."""
+    """Return the last line of the record about a file."""
     try:
         lines = path.with_name(RECORD).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""What reading and writing files of every kind share."""
+"""Reading and writing files of any kind: limits of size, plain files only, files that are written in whole."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from zipfile import BadZipFile, LargeZipFile, ZipFile
 
 from linkwork.errors import InputError, LinkworkError
 
-#: Megabytes of a text file that are read at most, by its ending; ``""`` for all others.
+#: Greatest size of a text file (MB), by its ending; ``""`` for all others.
 _TEXT = {".toml": 16, ".json": 16, ".svg": 8, "": 1024}
-#: Megabytes of an FMU, packed and unpacked, and its members.
+#: Greatest size of an FMU (MB), packed and unpacked, and its greatest number of members.
 _FMU, _MEMBERS = 4096, 20_000
 _MB = 1_000_000
-#: Marks of the encodings that spreadsheets and editors write beside plain UTF-8.
+#: Byte order marks of UTF-16, which spreadsheets and editors write.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 class WritingError(LinkworkError, OSError):
-    """A file cannot be written: no space, no permission; the sentence names the file."""
+    """A file cannot be written, for lack of space or of permission; the message names the file."""
 
 
 def limit(name: str, default: int) -> int:
-    """A limit on what is read: ``default``, unless the environment variable ``LINKWORK_MAX_<name>`` is another.
+    """Return a limit for input files: the environment variable ``LINKWORK_MAX_<name>`` if it is set, else ``default``.
 
     Raises
     ------
@@ -44,14 +44,14 @@ def limit(name: str, default: int) -> int:
 
 
 def prepare(path: str | Path) -> Path:
-    """The path, its folder made."""
+    """Make the folder of a path, and return the path."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 
 
 def ending_of(path: Path, known: Sequence[str]) -> str:
-    """The ending of a path, in small letters; raises InputError if it is not one of those known."""
+    """Return the ending of a path in lower case; raise InputError unless it is among those ``known``."""
     ending = path.suffix.lower()
     if ending not in known:
         endings = f"{', '.join(known[:-1])} or {known[-1]}"
@@ -61,7 +61,7 @@ def ending_of(path: Path, known: Sequence[str]) -> str:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A path to write to instead, which takes the place of ``path`` at the end: the file is there complete, or not at all."""
+    """Yield a path to write to, which is renamed to ``path`` at the end: the file is there complete, or not at all."""
     part = prepare(path).with_name(f"{path.name}.{os.getpid()}.part")
     try:
         yield part
@@ -74,7 +74,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def read_text(path: Path) -> str:
-    """The text of a file in UTF-8, or in UTF-16 with a byte order mark; of one that ends in ``.gz``, what is packed in it.
+    """Read a text in UTF-8, or in UTF-16 with a byte order mark; a file that ends in ``.gz`` is unpacked.
 
     Raises InputError if it cannot be read, is no plain file, or is larger than the limit for its kind (LINKWORK_MAX_FILE_MB).
     """
@@ -103,10 +103,7 @@ def read_text(path: Path) -> str:
 
 
 def check_plain(path: Path) -> None:
-    """Make sure that a path leads to a file, where it leads to anything: devices and pipes may never end.
-
-    Raises InputError if it is something else; OSError if it is not there.
-    """
+    """Raise InputError unless a path leads to a plain file, as devices and pipes may never end; OSError if nothing is there."""
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):
         kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
@@ -115,12 +112,12 @@ def check_plain(path: Path) -> None:
 
 
 def check_fmu(path: str | Path) -> None:
-    """Make sure that an FMU can be unpacked: an archive of bounded size whose members stay in its folder.
+    """Check that an FMU can be unpacked: an archive of bounded size whose members stay in its folder.
 
     Raises
     ------
     InputError
-        If it cannot; the sentence says how a limit is raised.
+        If not; the message says how to raise a limit.
     """
     path, most, members = Path(path), limit("FMU_MB", _FMU), limit("FMU_MEMBERS", _MEMBERS)
     try:
@@ -138,7 +135,7 @@ def check_fmu(path: str | Path) -> None:
             f"{path} has {len(found)} members: more than {members} are unpacked where LINKWORK_MAX_FMU_MEMBERS in the "
             "environment is greater"
         )
-    # an archive cannot give more of a member than it declares here
+    # a member cannot unpack to more than its declared size
     size = sum(member.file_size for member in found)
     description = sum(member.file_size for member in found if member.filename == "modelDescription.xml")
     for what, amount, allowed in (("unpacked", size, most), ("of modelDescription.xml", description, most // 16)):
@@ -154,18 +151,18 @@ def check_fmu(path: str | Path) -> None:
 
 
 def _shown(path: Path) -> str:
-    """A path as an error names it: of bounded length, without what cannot be printed."""
+    """Return a path as an error names it: printable, and of bounded length."""
     text = str(path)
     return text if text.isprintable() and len(text) <= 300 else repr(text[:300])
 
 
 def first_line(error: Exception) -> str:
-    """What an error of a library says, in one line."""
+    """Return the first line of an error's message."""
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number as Python reads one."""
+    """Return whether Python reads a text as a number."""
     try:
         float(text)
     except ValueError:

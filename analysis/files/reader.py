@@ -1,7 +1,7 @@
-"""Tables of a file read into frozen dataclasses, by what their fields say of units, bounds and choices.
+"""Read tables of a file into frozen dataclasses, whose fields declare units, bounds and choices.
 
-A reader is a function of a value and its dotted name: it returns what the value stands for, or raises a ParameterError that
-names it. `entry` attaches one to a field of a dataclass, and `read` reads a whole table:
+A reader is a function of a value and its dotted name: it returns the converted value, or raises a ParameterError with the
+name. `entry` attaches a reader to a field of a dataclass, and `read` reads a whole table:
 
 >>> @dataclass(frozen=True, slots=True, kw_only=True)
 ... class Bar:
@@ -33,23 +33,23 @@ Made = TypeVar("Made")
 
 
 def unknown_name(name: str, known: Iterable[str], words: str | None = None) -> UnknownNameError:
-    """The error for a name that is not among those known, with the nearest of them; ``words`` say it more fully."""
+    """Return the error for a name that is not among those known, with the nearest one; ``words`` replace the name in it."""
     names = tuple(known)
     near = difflib.get_close_matches(name, names, n=1)
     return UnknownNameError(words or name, names, near[0] if near else None)
 
 
 def entry(reader: Reader, default: Any = MISSING, *, factory: Any = MISSING, key: str = "") -> Any:
-    """A field of a dataclass that `read` fills from a table.
+    """Declare a field of a dataclass that `read` fills from a table.
 
     Parameters
     ----------
     reader : callable
         ``reader(value, name)``.
     default, factory : optional
-        As of `dataclasses.field`; without either the entry must be in the table.
+        As in `dataclasses.field`; without either the table must have the entry.
     key : str, optional
-        Name in the table, where it is not the field's.
+        Name in the table, if it is not the field's.
     """
     return field(default=default, default_factory=factory, metadata={"reader": reader, "key": key})
 
@@ -61,7 +61,7 @@ class _Entry(NamedTuple):
 
 
 def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapping[str, str]) -> dict[str, _Entry]:
-    """Entries of the tables of a kind, by their name in the table; those without a default are required."""
+    """Return the entries of a kind of table by their names in the table; those without a default are required."""
     needed = set()
     if kind is not dict:
         arguments = inspect.signature(kind).parameters.values()
@@ -73,18 +73,12 @@ def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapp
 
 
 def names_of(kind: type) -> tuple[str, ...]:
-    """Names of the entries of a table that is read into a dataclass."""
+    """Return the names of the entries of a table that is read into a dataclass."""
     return tuple(_entries(kind, {}, {}))
 
 
 def check_names(table: Mapping[str, Any], name: str, known: Iterable[str]) -> None:
-    """Make sure that a table has no other entries than these.
-
-    Raises
-    ------
-    UnknownNameError
-        For the first that is none of them.
-    """
+    """Raise UnknownNameError for the first entry of a table that is not ``known``."""
     prefix = f"{name}." if name else ""
     known = tuple(known)
     for key in table:
@@ -101,7 +95,7 @@ def read(
     keys: Mapping[str, str] | None = None,
     base: Any = None,
 ) -> Made:
-    """An object of a kind from a table.
+    """Read a table into an object.
 
     Parameters
     ----------
@@ -111,11 +105,11 @@ def read(
     name : str
         Its dotted name; empty for a whole file.
     readers : mapping, optional
-        Readers by field: of a kind whose fields have none, or in the place of those that they have.
+        Readers by field, for fields that declare none, or in place of those that they declare.
     keys : mapping, optional
-        Names in the table of fields that are named otherwise there.
+        Names in the table by field, where they differ.
     base : dataclass instance, optional
-        What the table leaves out is taken from.
+        Source of the values that the table leaves out.
 
     Raises
     ------
@@ -141,26 +135,26 @@ def read(
 
 
 def as_it_is(value: Any, name: str) -> Any:
-    """Anything, to be looked at later."""
+    """Return any value unchanged, for a later check."""
     return value
 
 
 def text(value: Any, name: str) -> str:
-    """A text; a number or a truth value is taken by its name."""
+    """Read a text; a number or a truth value is converted to text."""
     if isinstance(value, (list, Mapping)):
         raise ParameterError(name, value, "be a text")
     return str(value)
 
 
 def flag(value: Any, name: str) -> bool:
-    """True or false."""
+    """Read true or false."""
     if not isinstance(value, bool):
         raise ParameterError(name, value, "be true or false")
     return value
 
 
 def table_of(value: Any, name: str) -> Mapping[str, Any]:
-    """A table, whatever is in it."""
+    """Read a table without looking inside."""
     if not isinstance(value, Mapping):
         raise ParameterError(name, value, "be a table")
     return value
@@ -171,18 +165,18 @@ def table_of(value: Any, name: str) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A quantity, in SI; see `analysis.units.quantity`.
+    """Reader of a quantity, which it returns in SI; see `analysis.units.quantity`.
 
     Attributes
     ----------
     unit : str
-        SI unit, which says the dimension.
+        SI unit, for the dimension.
     above, least, below : float, optional
         Bounds in SI: greater than, not less than, less than.
     bare : str, optional
-        Unit of numbers that come without one; by default SI.
+        Unit of numbers without a unit; by default SI.
     requirement : str, optional
-        What is said of a number outside of the bounds, where they are not about zero.
+        End of the sentence "it must ..." for a number outside of bounds that are not zero.
     """
 
     unit: str
@@ -200,13 +194,13 @@ class Quantity:
         return number
 
 
-#: Greatest whole number that is read: that of an Integer of FMI.
+#: Greatest whole number: that of an Integer in FMI.
 _GREATEST = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A whole number, not less than ``least``."""
+    """Reader of a whole number, not less than ``least``."""
 
     least: int | None = None
 
@@ -222,7 +216,7 @@ class Whole:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of some texts."""
+    """Reader of one of some texts."""
 
     names: Iterable[str]
 
@@ -237,16 +231,16 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """A list, as a tuple.
+    """Reader of a list, which it returns as a tuple.
 
     Attributes
     ----------
     item : callable
-        Reader of what is in it; each has its number in the name.
+        Reader of the items; their names have their number.
     least, length : int, optional
-        How many there must be.
+        Least number, or number, of items.
     single : bool
-        Whether one alone may stand without a list.
+        Whether a single item may stand without a list.
     """
 
     item: Reader
@@ -266,7 +260,7 @@ class Many:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """[least, greatest], or one value for both."""
+    """Reader of [least, greatest], or of one value for both."""
 
     item: Reader
     ordered: bool = True
@@ -283,7 +277,7 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table inside a table: the arguments of `read`."""
+    """Reader of a table inside a table, with the arguments of `read`."""
 
     kind: Callable[..., Any]
     readers: Mapping[str, Reader] = field(default_factory=dict)
@@ -294,7 +288,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Kinds:
-    """A table whose entry ``kind`` says how the rest of it is read."""
+    """Reader of a table whose entry ``kind`` selects the reader of the rest."""
 
     readers: Mapping[str, Reader]
 

@@ -17,13 +17,13 @@ from .paths import ending_of, first_line, read_text
 from .reader import table_of
 
 ENDINGS = (".toml", ".json")
-#: What a file of tables may hold at most: tables and lists inside each other, characters of a text and of a name, bits of a
-#: whole number. More is no case file, and errors would repeat it.
+#: Limits of a file of tables, which no case file exceeds: depth of nesting, characters of a text and of a name, bits of a whole
+#: number.
 _DEPTH, _TEXT, _NAME, _BITS = 50, 10_000, 200, 1024
 
 
 def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
-    """Write nested tables to a TOML or JSON file, as the path's ending says.
+    """Write nested tables to a TOML or JSON file, according to the path's ending.
 
     Raises
     ------
@@ -34,18 +34,18 @@ def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
     if ending_of(path, ENDINGS) == ".json":
         text = json.dumps(data, indent=2) + "\n"
     else:
-        # plain values before tables, as TOML asks
+        # TOML needs plain values before tables
         text = tomli_w.dumps(dict(sorted(data.items(), key=lambda item: isinstance(item[1], dict))))
     return write_text(path, text)
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:
-    """Nested tables from a TOML or JSON file.
+    """Read nested tables from a TOML or JSON file.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or is not what its ending says.
+        If the file cannot be read, or does not have the format of its ending.
     """
     path = Path(path)
     ending = ending_of(path, ENDINGS)
@@ -54,7 +54,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
     except RecursionError:
         raise InputError(f"{path} has tables or lists inside each other, deeper than {_DEPTH}") from None
-    except ValueError as error:  # of the syntax, and of whole numbers with thousands of digits
+    except ValueError as error:  # wrong syntax, or a whole number with thousands of digits
         raise InputError(f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}") from error
     if not isinstance(data, dict):
         raise InputError(f"{path} must hold tables, not {type(data).__name__}")
@@ -63,7 +63,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
 
 
 def _check(path: Path, data: dict[str, Any]) -> None:
-    """Make sure that tables are of a size that can be worked with, and named in an error."""
+    """Check the sizes of names, texts, numbers and nesting."""
     level: list[tuple[str, Any]] = [("", data)]
     for _ in range(_DEPTH):
         inside: list[tuple[str, Any]] = []
@@ -93,7 +93,7 @@ def _check_text(path: Path, name: str, text: str, longest: int) -> None:
 def overridden(
     data: Mapping[str, Any], overrides: Mapping[str, Any], *, exclusive: Collection[str] = ()
 ) -> dict[str, Any]:
-    """Tables with single values replaced.
+    """Return tables with single values replaced.
 
     Parameters
     ----------
@@ -101,12 +101,12 @@ def overridden(
     overrides : mapping
         Values by dotted name of any depth, such as ``slider.stiffness``.
     exclusive : collection of str, optional
-        Tables of which one entry counts: where one is set the others go.
+        Tables that hold one entry only: setting one removes the others.
 
     Raises
     ------
     ParameterError
-        If what is to hold a value is no table.
+        If a value would have to stand inside something that is no table.
     """
     result = dict(data)
     for name, value in overrides.items():
@@ -123,7 +123,7 @@ def overridden(
 
 
 def flattened(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values of nested tables by dotted name."""
+    """Return the values of nested tables by dotted name."""
     flat: dict[str, Any] = {}
     for name, value in data.items():
         flat |= flattened(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}

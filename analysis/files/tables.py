@@ -21,9 +21,9 @@ from .outputs import output
 from .paths import first_line, is_number, read_text, whole
 from .reader import unknown_name
 
-#: Numbers that are formatted at a time; Ctrl-C waits for no more.
+#: Numbers that are formatted at a time, for which Ctrl-C waits.
 _BLOCK = 50_000
-#: Bytes from which on a file is announced, with its size and, on a terminal, its progress.
+#: Size (bytes) from which on a file is announced, with its progress on a terminal.
 LARGE = 20_000_000
 
 
@@ -35,7 +35,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
     InputError
         If the columns differ in length, or there is no such folder.
     Interrupted
-        If Ctrl-C was pressed; there is no half file then.
+        If Ctrl-C was pressed; no file is left then.
     """
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     lengths = {name: len(values) for name, values in arrays.items()}
@@ -55,7 +55,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
 
 
 def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]) -> None:
-    """The rows, block by block."""
+    """Write the rows block by block."""
     count, block = len(columns[0]), max(1, _BLOCK // len(columns))
     row = ",".join(["%.17g"] * len(columns)) + "\n"
     done: Callable[[int], None] | None = None
@@ -74,7 +74,7 @@ def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]
 
 @contextmanager
 def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
-    """A progress bar on standard error where that is a terminal, as a function of the rows done."""
+    """Show a progress bar if standard error is a terminal; yield the function that takes the number of rows done."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -85,10 +85,9 @@ def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
 
 
 def cell(text: str) -> str:
-    """A text as a cell of a CSV file: in one line, quoted where it has to be, and harmless to a spreadsheet.
+    """Return a text as a cell of a CSV file: in one line, quoted if necessary, and harmless to a spreadsheet.
 
-    What begins like a formula, blanks before it left aside, gets an apostrophe before it, which spreadsheets take for the mark
-    of a text; numbers stay.
+    A text that begins like a formula, also after blanks, gets an apostrophe in front, which marks a text in spreadsheets.
     """
     text = " ".join(text.splitlines())
     if text.lstrip().startswith(_FORMULA) and not is_number(text):
@@ -96,14 +95,14 @@ def cell(text: str) -> str:
     return '"{}"'.format(text.replace('"', '""')) if any(mark in text for mark in _SPLITTING) else text
 
 
-#: What a cell begins with that a spreadsheet executes.
+#: First characters of a cell that a spreadsheet executes.
 _FORMULA = tuple("=+-@")
-#: What ends a cell, here or in a spreadsheet of another country.
+#: Characters that end a cell, here or in a spreadsheet of another country.
 _SPLITTING = ',;\t"'
 
 
 def read_csv(path: str | Path) -> NDArray[np.float64]:
-    """The numbers of a CSV file below its header line, shape (rows, columns).
+    """Read the numbers of a CSV file below its header line, shape (rows, columns).
 
     Raises
     ------
@@ -122,19 +121,19 @@ def read_csv(path: str | Path) -> NDArray[np.float64]:
 
 
 def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[np.float64]]:
-    """Columns of numbers from a CSV file, between commas, semicolons or tabs.
+    """Read columns of numbers from a CSV file, separated by commas, semicolons or tabs.
 
     Parameters
     ----------
     path : str or Path
     names : sequence of str or None
-        What each is called in the header line, with or without a unit in brackets behind it; None is the column at its own
-        place in the file. A file without a header has columns by their places alone.
+        Name of each column in the header line, with or without its unit in brackets; None takes the column at the same place
+        in the file. In a file without a header, columns are taken by their places.
 
     Raises
     ------
     InputError
-        If it cannot be read, or what stands in a column is not a number, with the line.
+        If it cannot be read, or a cell is not a number; the message has the line.
     UnknownNameError
         If there is no such column.
     """
@@ -163,7 +162,7 @@ def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[
 
 
 def read_rows(path: str | Path) -> list[dict[str, str]]:
-    """The rows of a CSV file, their texts by the names in its header line.
+    """Read the rows of a CSV file as texts by the names in its header line.
 
     Raises
     ------
@@ -173,7 +172,7 @@ def read_rows(path: str | Path) -> list[dict[str, str]]:
     path = Path(path)
     try:
         return [
-            # of cells beyond the header, and names without a cell, nothing is kept
+            # without cells beyond the header, and names without a cell
             {name: text for name, text in row.items() if isinstance(name, str) and isinstance(text, str)}
             for row in csv.DictReader(read_text(path).splitlines())
         ]
@@ -182,7 +181,7 @@ def read_rows(path: str | Path) -> list[dict[str, str]]:
 
 
 def save_array(path: str | Path, values: ArrayLike) -> Path:
-    """Write an array to a file that is there complete or not at all, for caches; see `load_array`."""
+    """Write an array for a cache, complete or not at all; see `load_array`."""
     content = io.BytesIO()
     np.save(content, np.asarray(values, dtype=float))
     with whole(path := Path(path)) as part:
@@ -191,10 +190,7 @@ def save_array(path: str | Path, values: ArrayLike) -> Path:
 
 
 def load_array(path: str | Path) -> NDArray[np.float64] | None:
-    """An array from a file of `save_array`; None if it is not there, or, with a warning, if it is damaged.
-
-    The hash at its end says whether it is what was written.
-    """
+    """Read an array of `save_array`; None if there is no file, or, with a warning, if its hash says that it is damaged."""
     path = Path(path)
     try:
         if not path.is_file():

@@ -1,4 +1,4 @@
-"""Tables of files written out with every entry explained, from the readers and docstrings of `analysis.files.reader`."""
+"""Write tables with every entry explained, from the readers of `analysis.files.reader` and docstrings."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from ..units import with_unit
 from . import reader
 from .reader import Choice, Many, Quantity, Range, Reader, Table, Whole
 
-#: How a quantity is written where its unit is hard to read, by its SI unit: the unit, and how many of it one of SI is.
+#: Easily read units by SI unit, with the number of them in one SI unit.
 _FRIENDLY = {"rad": ("deg", degrees(1.0)), "rad/s": ("rpm", 30.0 / pi)}
-#: Of examples (rad).
+#: Angle of examples (rad).
 _ANGLE = pi / 6.0
-#: Column of what explains an entry.
+#: Column of the explanations.
 _COLUMN = 46
 
 
 def in_words(value: float, unit: str) -> str:
-    """A quantity in SI as a text with a unit that is easy to read, to ten digits."""
+    """Write a quantity in SI with an easily read unit, to ten digits."""
     name, factor = _FRIENDLY.get(unit, (with_unit(value, unit).partition(" ")[2], 1.0))
     return f"{value * factor:.10g} {name}"
 
 
 def literal(value: Any) -> str:
-    """A value as TOML in one line."""
+    """Write a value as TOML in one line."""
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{key} = {literal(inner)}' for key, inner in value.items())} }}"
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -41,7 +41,7 @@ def literal(value: Any) -> str:
 
 
 def requirement(read: Reader) -> str:
-    """What a reader takes, in a few words."""
+    """Describe the values that a reader accepts, in a few words."""
     match read:
         case Quantity(unit=unit, above=above, least=least):
             bounds = "above zero" if above == 0.0 else "not below zero" if least == 0.0 else ""
@@ -65,7 +65,7 @@ def requirement(read: Reader) -> str:
 
 
 def example(read: Reader) -> Any:
-    """A value that a reader takes; None where that cannot be known."""
+    """Return a value that a reader accepts; None if none is known."""
     match read:
         case Quantity(unit=unit, below=below):
             value = _ANGLE if unit == "rad" else 1.0 if below > 1.0 else 0.5 * below
@@ -87,7 +87,7 @@ def example(read: Reader) -> Any:
 
 
 def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
-    """What the docstring of a class or function says of its entries, and those of the names in backticks in its first line."""
+    """Return what the docstrings of a class or function, and of names in backticks in its first line, say of the entries."""
     doc = inspect.getdoc(kind) or ""
     found: dict[str, str] = {}
     if follow:
@@ -101,7 +101,7 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
     for head in heads:
         words = " ".join(head[2].split()).removesuffix(".")
         sentence = words if len(words) < 90 else re.split(r"[.;:] ", words)[0]
-        # a unit alone says what the value says
+        # a unit alone repeats what the value says
         if not re.fullmatch(r"\S{1,6}", words):
             sentence = re.sub(r" \([^)]*$", "", sentence.replace("`", ""))
             found |= {name.strip(): sentence for name in head[1].split(",")}
@@ -109,7 +109,7 @@ def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
 
 
 def line(name: str, value: Any, comment: str, *, active: bool) -> str:
-    """An entry with what explains it; one that is not active, or has no value, is a comment."""
+    """Write an entry and its explanation; an entry that is not active, or has no value, becomes a comment."""
     text = f"{name} = {literal(value)}" if value is not None else f"{name} = ..."
     if value is None or not active:
         text = f"# {text}"
@@ -117,7 +117,7 @@ def line(name: str, value: Any, comment: str, *, active: bool) -> str:
 
 
 def _default(of: Any, read: Reader) -> Any:
-    """A default as it stands in a file; None where it has none that a file could say."""
+    """Return a default as a file has it; None if a file cannot express it."""
     if isinstance(read, Quantity) and isinstance(of, (int, float)):
         return (float(of) if read.unit == "1" else in_words(of, read.unit)) if isfinite(of) else None
     if isinstance(read, Range) and isinstance(of, tuple):
@@ -131,7 +131,7 @@ def _default(of: Any, read: Reader) -> Any:
 def entries(
     kind: Any, given: Mapping[str, Any], *, readers: Mapping[str, Reader] | None = None, active: bool = True
 ) -> Iterator[str]:
-    """Lines for the entries of a table: those that are ``given``, then all others as comments, with their defaults.
+    """Yield a line for each entry of a table: first the ``given`` ones, then the others as comments with their defaults.
 
     Parameters
     ----------
@@ -139,9 +139,9 @@ def entries(
     given : mapping
         Values by name in the file.
     readers : mapping, optional
-        Readers by name, in the place of the dataclass's own.
+        Readers by name, instead of the dataclass's own.
     active : bool
-        Whether the entries that are given are no comments.
+        Whether the given entries are no comments.
     """
     about = {} if kind is dict else meanings(kind)
     known: dict[str, tuple[Reader, Any, str]] = {name: (read, None, "") for name, read in (readers or {}).items()}

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isfinite
+from itertools import pairwise
+from math import isfinite, isnan
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-from .continuation import ContinuationError, Curve, End, Evaluation, Follower, Reason, Settings
+from .continuation import ContinuationError, End, Evaluation, Follower, Reason, Settings
 
 #: A smooth function of a point of a chart, negative in a region of instability.
 Test = Callable[[float, float], float]
@@ -73,71 +74,70 @@ def scan(
     InputError
         If the interval or the number of samples is not usable.
     """
-    points = _samples(low, high, samples)
-    values, gaps = np.full(samples, np.nan), []
-    for i, point in enumerate(points.tolist()):
+    points, values, gaps = _sampled(function, _samples(low, high, samples))
+    roots: list[float] = []
+    intervals: list[tuple[float, float]] = []
+    begun = points[0] if values[0] < 0.0 else None
+
+    def end(place: float) -> None:
+        nonlocal begun
+        if begun is not None:
+            intervals.append((begun, place))
+        begun = None
+
+    for (here, value), (there, following) in pairwise(zip(points, values)):
+        if isnan(following):
+            end(here)
+        elif isnan(value):
+            begun = there if following < 0.0 else None
+        elif (value < 0.0) != (following < 0.0):
+            # a function value of zero counts as positive: the same root is not found from both sides
+            try:
+                root = there
+                if following != 0.0:
+                    root = float(scipy.optimize.brentq(function, here, there, xtol=tolerance * (high - low)))
+            except LinkworkError as error:
+                gaps.append((there, f"just before: {error}"))
+                # the boundary is somewhere between the samples, and so is the end of the interval
+                end(here)
+                root = there
+            else:
+                roots.append(root)
+                end(root)
+            begun = root if following < 0.0 else None
+    end(points[-1])
+    return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
+
+
+def _sampled(
+    function: Callable[[float], float], samples: NDArray[np.float64]
+) -> tuple[list[float], list[float], list[tuple[float, str]]]:
+    """Return places, values, NaN at gaps, and gaps of a function at samples and at extrema of another sign between them."""
+    values, gaps = np.full(len(samples), np.nan), []
+    for i, place in enumerate(samples.tolist()):
         try:
-            values[i] = function(point)
+            values[i] = function(place)
         except LinkworkError as error:
-            gaps.append((point, str(error)))
-    places, results = list(points), list(values)
-    for i in range(samples):
-        first, last = max(i - 1, 0), min(i + 1, samples - 1)
+            gaps.append((place, str(error)))
+    found = list(zip(samples.tolist(), values.tolist()))
+    for i in range(len(samples)):
+        first, last = max(i - 1, 0), min(i + 1, len(samples) - 1)
         around, sign = values[first : last + 1], np.sign(values[i])
         if np.isfinite(around).all() and (np.sign(around) == sign).all() and first + np.argmin(sign * around) == i:
             try:
-                found = scipy.optimize.minimize_scalar(
+                extremum = scipy.optimize.minimize_scalar(
                     lambda x, sign=sign: sign * function(x),
-                    bounds=(points[first], points[last]),
+                    bounds=(samples[first], samples[last]),
                     method="bounded",
-                    options={"xatol": 1e-9 * (high - low)},
+                    options={"xatol": 1e-9 * (samples[-1] - samples[0])},
                 )
             except LinkworkError as error:
-                gaps.append((float(points[i]), f"between the samples: {error}"))
+                gaps.append((float(samples[i]), f"between the samples: {error}"))
                 continue
-            if found.fun < 0.0:
-                places.append(float(found.x))
-                results.append(sign * float(found.fun))
-    order = np.argsort(places, kind="stable")
-    points, values = np.array(places)[order], np.array(results)[order]
-    roots = []
-    intervals: list[tuple[float, float]] = []
-    begun = float(points[0]) if values[0] < 0.0 else None
-    for i in range(1, len(points)):
-        left, right = values[i - 1], values[i]
-        here = float(points[i])
-        if np.isnan(left) or np.isnan(right):
-            if begun is not None and np.isnan(right):
-                intervals.append((begun, float(points[i - 1])))
-                begun = None
-            elif right < 0.0:
-                begun = here
-            continue
-        if (left < 0.0) == (right < 0.0):
-            continue
-        # a function value of zero counts as positive: the same root is not found from both sides
-        try:
-            root = (
-                here
-                if right == 0.0
-                else float(scipy.optimize.brentq(function, points[i - 1], here, xtol=tolerance * (high - low)))
-            )
-        except LinkworkError as error:
-            gaps.append((here, f"just before: {error}"))
-            # the boundary is somewhere between the samples, and so is the end of the interval
-            if begun is not None:
-                intervals.append((begun, float(points[i - 1])))
-            begun = here if right < 0.0 else None
-            continue
-        roots.append(root)
-        if right < 0.0:
-            begun = root
-        elif begun is not None:
-            intervals.append((begun, root))
-            begun = None
-    if begun is not None:
-        intervals.append((begun, float(points[-1])))
-    return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
+            if extremum.fun < 0.0:
+                found.append((float(extremum.x), float(sign * extremum.fun)))
+    found.sort(key=lambda pair: pair[0])
+    return [place for place, _ in found], [value for _, value in found], gaps
 
 
 def lowest(
@@ -353,20 +353,13 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
         raise InputError(f"no boundary within {step:g} of the box of the seed {seed}")
     if start.orientation < 0.0:
         start = start.turned()
-    forth = follower.follow(start)
-    back = forth if forth.closed else follower.follow(start.turned())
-    way = [*forth.points] if forth.closed else [*(point.turned() for point in back.points[:0:-1]), *forth.points]
+    way, *curves = follower.follow_both(start)
     return Boundary(
         points=np.array([[point.y[0], point.parameter] for point in way]),
         tangents=np.array([point.tangent for point in way]),
         residual=max(point.data for point in way),
-        ends=(_end(back), _end(forth)),
+        ends=(curves[0].plane_end(curves[0].message), curves[1].plane_end(curves[1].message)),
     )
-
-
-def _end(curve: Curve) -> End:
-    last = curve.points[-1]
-    return End(reason=curve.end, point=(float(last.y[0]), last.parameter), message=curve.message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

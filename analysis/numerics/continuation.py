@@ -129,6 +129,11 @@ class Curve:
     reason: str
     message: str = ""
 
+    def plane_end(self, message: str) -> End:
+        """Return its end in the plane of the last unknown and the parameter."""
+        last = self.points[-1]
+        return End(reason=self.end, point=(float(last.y[-1]), last.parameter), message=message)
+
     @property
     def closed(self) -> bool:
         """Whether it came back to where it began."""
@@ -340,6 +345,16 @@ class Follower:
         return Curve(
             tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
         )
+
+    def follow_both(
+        self, first: Point, *, leave: Callable[[Point], str] | None = None
+    ) -> tuple[list[Point], Curve, Curve]:
+        """Follow the curve from a point in both directions; return all its points, and both curves, backward first."""
+        forth = self.follow(first, leave=leave)
+        if forth.closed:
+            return [*forth.points], forth, forth
+        back = self.follow(first.turned(), leave=leave)
+        return [*(point.turned() for point in back.points[:0:-1]), *forth.points], back, forth
 
     def locate(self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]) -> tuple[Point, float]:
         """Return the point within a step at which a test with opposite signs at its ends is zero, and its distance."""

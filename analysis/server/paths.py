@@ -18,6 +18,7 @@ from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..studio import state_of
 from ..synthesis import (
     Constraint,
+    FiveBar,
     FullTurn,
     Kind,
     LargestLink,
@@ -27,6 +28,7 @@ from ..synthesis import (
     Make,
     Search,
     SecondCrank,
+    SliderCrank,
     SliderMotion,
     SliderUnknown,
     Solution,
@@ -34,7 +36,6 @@ from ..synthesis import (
     UntimedPath,
     drawing,
     format_transmission,
-    kind_of,
     synthesize,
 )
 from ..youssef import require_five_bar
@@ -122,11 +123,11 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
                 ]
             )
             title = f"Linkage {rank} for a path that was drawn"
-            shown = not isinstance(solution.linkage.pivot, SecondCrank)
+            shown = not isinstance(solution.linkage, FiveBar)
             states.append(_state(solution, title) if shown else None)
             curves.append(_turned(np.array(wanted.points), solution.linkage).tolist())
             files.append([] if shown else _kept(solution, wanted, Path(place) / f"linkage-{rank}", title))
-        of = {kind_of(solution.linkage) for solution in found.solutions}
+        of = {solution.linkage.kind for solution in found.solutions}
         said = (
             f"{format_count(len(rows), 'linkage')} in {found.seconds:.1f} s, the area between the curves the least first. "
             f"linkwork synthesize {_TASK} finds them again, and writes drawings, plates and a sheet of the first."
@@ -154,7 +155,7 @@ def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[
     """A drawing of a linkage that the page cannot show, and a case that searches its kind and its gears alone."""
     pivot = solution.linkage.pivot
     assert isinstance(pivot, SecondCrank)
-    case = wanted.tables(title, kinds=[kind_of(solution.linkage)], gears=[pivot.ratio])
+    case = wanted.tables(title, kinds=[solution.linkage.kind], gears=[pivot.ratio])
     drawn = drawing(solution, title=title)
     return [file(write_tables(path.with_suffix(".toml"), case)), file(save_drawing(path.with_suffix(".dxf"), drawn))]
 
@@ -163,7 +164,12 @@ def _picture(solution: Solution) -> Answer:
     """Lines of a small picture in the plane of the path, where the task begins: links and guide, and what is traced."""
     scene = LinkageScene(solution)
     pins = scene.pins(float(scene.rotation[0])) or {}
-    links = ["AB", "BCPB", *([] if solution.linkage.slides else ["CD"]), *(["DE"] if scene.second_crank else [])]
+    links = [
+        "AB",
+        "BCPB",
+        *([] if isinstance(solution.linkage, SliderCrank) else ["CD"]),
+        *(["DE"] if scene.second_crank else []),
+    ]
     guide = [] if scene.guide is None else [scene.guide.tolist()]
     return {
         "links": [[pins[name] for name in link] for link in links if pins] + guide,

@@ -35,7 +35,7 @@ from ..synthesis import (
     SynthesisInterrupted,
     Task,
     improve,
-    there_and_back,
+    solve_both_ways,
 )
 from ..units import Amount, in_si
 
@@ -232,7 +232,7 @@ def smoothness_curve(
             widest = best(inf, [], search.starts)
         except InfeasibleError:
             widest = ()
-        found, done = there_and_back(
+        found, done = solve_both_ways(
             range(len(values))[::-1],
             lambda k, guesses, back: best(float(values[k]), guesses, 0 if back else search.starts),
             widest,

@@ -11,42 +11,27 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult
 
-from analysis.synthesis import (
-    USUAL,
-    Constraint,
-    FullTurn,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    Motion,
-    RockerFunction,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    normal_form,
-    turn,
-)
-from analysis.synthesis.search.polish import quality_of
-from analysis.synthesis.search.start import linkage_of, start_of
-from analysis.synthesis.task.limits import limits_of
+import analysis.synthesis as syn
+from analysis.synthesis.search.polish import sum_of_squares
+from analysis.synthesis.search.start import make_linkage, make_start
+from analysis.synthesis.task.limits import make_limits
 from benchmarks.black_box import BlackBox, descend, evolve, initial_simplex
 from tests.linkages import drawn, ellipse
 
 FloatArray = NDArray[np.float64]
 ELLIPSE = ellipse(18)
-TASK = TimedPath(points=ELLIPSE)
-SMALL = LargestLink(length=0.5)
+TASK = syn.TimedPath(points=ELLIPSE)
+SMALL = syn.LargestLink(length=0.5)
 
 
-def box(task: Task, *constraints: Constraint, branch: int = 1) -> BlackBox:
-    normal = normal_form(task)
-    return BlackBox(normal, limits_of(task, normal, None, constraints), branch)
+def box(task: syn.Task, *constraints: syn.Constraint, branch: int = 1) -> BlackBox:
+    normal = syn.normal_form(task)
+    return BlackBox(normal, make_limits(task, normal, None, constraints), branch)
 
 
-def unknowns(black: BlackBox, linkage: Linkage, *more: float) -> FloatArray:
+def unknowns(black: BlackBox, linkage: syn.Linkage, *more: float) -> FloatArray:
     """A linkage as a row of the black box's unknowns."""
-    q = start_of(linkage, black.normal).q
+    q = make_start(linkage, black.normal).q
     return np.array([[*q[black.limits.high > black.limits.low], *more]])
 
 
@@ -64,15 +49,15 @@ class TestInitialSimplex:
 class TestQuality:
     KNOWN = replace(drawn(np.random.default_rng(5), least=0.6), branch=1)
 
-    def tasks(self) -> dict[str, Task]:
+    def tasks(self) -> dict[str, syn.Task]:
         linkage, phi = self.KNOWN, np.linspace(0.0, 4.0, 7)
         points = linkage.path(phi) + 0.05 * np.random.default_rng(0).normal(size=(7, 2))
         angle = linkage.coupler_angle(phi) + 0.1 * np.sin(phi)
         weights = np.linspace(1.0, 2.0, 7)
         return {
-            "timed": TimedPath(points=points, rotation=phi, weights=weights),
-            "motion": Motion(points=points, angle=angle, rotation=phi, weights=weights),
-            "rocker": RockerFunction(
+            "timed": syn.TimedPath(points=points, rotation=phi, weights=weights),
+            "motion": syn.Motion(points=points, angle=angle, rotation=phi, weights=weights),
+            "rocker": syn.RockerFunction(
                 angle=linkage.rocker_angle(phi) + 0.1 * phi, rotation=phi, mounting=True, weights=weights
             ),
         }
@@ -82,14 +67,14 @@ class TestQuality:
         black = box(self.tasks()[kind])
         # of a rocker function the ground link is given
         linkage = self.KNOWN.scaled(0.1 / self.KNOWN.ground_length) if kind == "rocker" else self.KNOWN
-        expected = quality_of(black.normal, start_of(linkage, black.normal))
+        expected = sum_of_squares(black.normal, make_start(linkage, black.normal))
         x = unknowns(black, linkage)
         assert black.quality(np.vstack([x, x]))[1] == pytest.approx(expected, rel=1e-12)
 
     @pytest.mark.parametrize("way", [1, -1])
     def test_of_a_closed_path_it_vanishes_on_the_curve_itself(self, way: int) -> None:
-        points = self.KNOWN.path(turn(240))[::way]
-        black = box(UntimedPath(path=TargetPath(points=points, closed=True)))
+        points = self.KNOWN.path(syn.turn(240))[::way]
+        black = box(syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)))
         # the crank's phase is where the path starts
         assert black.quality(unknowns(black, self.KNOWN))[0] < 1.5e-4 * black.normal.n
         assert black.quality(unknowns(black, self.KNOWN.moved(0.05, 0.0)))[0] > 3e-4 * black.normal.n
@@ -97,7 +82,7 @@ class TestQuality:
     @pytest.mark.parametrize("way", [1, -1])
     def test_of_an_open_path_it_vanishes_on_the_piece_itself(self, way: int) -> None:
         points = self.KNOWN.path(np.linspace(0.0, 2.0, 60) * way)
-        black = box(UntimedPath(path=TargetPath(points=points, closed=False)))
+        black = box(syn.UntimedPath(path=syn.TargetPath(points=points, closed=False)))
         assert black.quality(unknowns(black, self.KNOWN, 2.0))[0] < 1e-5 * black.normal.n
         # more or less of the curve than the target is no match
         for span in (1.0, 3.0):
@@ -105,18 +90,18 @@ class TestQuality:
 
     def test_a_curve_that_collapses_onto_the_target_is_far_from_it(self) -> None:
         """One-sided, a point on the target would be perfect."""
-        points = self.KNOWN.path(turn(120))
-        black = box(UntimedPath(path=TargetPath(points=points, closed=True)))
+        points = self.KNOWN.path(syn.turn(120))
+        black = box(syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)))
         tiny = self.KNOWN.scaled(1e-3)
         tiny = tiny.moved(points[3, 0] - tiny.path([0.0])[0, 0], points[3, 1] - tiny.path([0.0])[0, 1])
         assert black.quality(unknowns(black, tiny))[0] > 0.05 * black.normal.n
 
 
 class TestGrading:
-    APART = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.2, rocker_length=0.25, point_distance=0.1)
+    APART = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.2, rocker_length=0.25, point_distance=0.1)
 
     def test_what_cannot_be_joined_is_graded(self) -> None:
-        black = box(TASK, FullTurn())
+        black = box(TASK, syn.FullTurn())
         charges, violations = [], []
         for length in np.linspace(0.15, 0.45, 30):
             x = unknowns(black, replace(self.APART, rocker_length=length))
@@ -154,7 +139,7 @@ class TestGrading:
         np.testing.assert_allclose(values, values[1], rtol=1e-3)
 
     def test_violations_are_those_of_the_constraints(self) -> None:
-        good = Linkage(
+        good = syn.Linkage(
             pivot_x=0.3,
             pivot_y=0.4,
             ground_length=0.4,
@@ -164,9 +149,9 @@ class TestGrading:
             ground_angle=0.5,
         )
         for constraint, bad in (
-            (LeastTransmission(angle=radians(50)), replace(good, crank_length=0.25)),
-            (LeastTransmission(angle=radians(50)), replace(good, coupler_length=0.25, rocker_length=0.28)),
-            (FullTurn(), replace(good, crank_length=0.3)),
+            (syn.LeastTransmission(angle=radians(50)), replace(good, crank_length=0.25)),
+            (syn.LeastTransmission(angle=radians(50)), replace(good, coupler_length=0.25, rocker_length=0.28)),
+            (syn.FullTurn(), replace(good, crank_length=0.3)),
         ):
             black = box(TASK, constraint)
             assert (black.violations(unknowns(black, good)) <= 0.0).all(), constraint
@@ -180,13 +165,13 @@ def evolved(black: BlackBox, random: np.random.Generator) -> OptimizeResult:
 class TestSearch:
     @pytest.mark.parametrize("search", [evolved, descend])
     def test_a_rocker_function_of_a_known_linkage_is_found(self, search: Any) -> None:
-        linkage = Linkage(
+        linkage = syn.Linkage(
             ground_length=0.1, crank_length=0.03, coupler_length=0.09, rocker_length=0.07, crank_phase=0.8
         )
-        task = RockerFunction(angle=linkage.rocker_angle(turn(24)))
-        boxes = [box(task, *USUAL, branch=branch) for branch in (1, -1)]
+        task = syn.RockerFunction(angle=linkage.rocker_angle(syn.turn(24)))
+        boxes = [box(task, *syn.USUAL, branch=branch) for branch in (1, -1)]
         answers = [boxes[k % 2].answer(search(boxes[k % 2], np.random.default_rng([0, k]))) for k in range(8)]
         best = min((answer for answer in answers if answer.feasible), key=lambda answer: answer.start.quality)
-        found = linkage_of(best.start, boxes[0].normal)
-        assert np.abs(found.rocker_angle(turn(24)) - task.angle).max() < 0.02
+        found = make_linkage(best.start, boxes[0].normal)
+        assert np.abs(found.rocker_angle(syn.turn(24)) - task.angle).max() < 0.02
         assert found.least_transmission > radians(39.9)

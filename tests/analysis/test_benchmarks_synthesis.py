@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import Linkage, Search, evaluate, turn
-from analysis.synthesis.search.start import start_of
+from analysis.synthesis.search.start import make_start
 from benchmarks.black_box import PENALTY
 from benchmarks.contest import (
     SEARCHES,
@@ -34,7 +34,7 @@ PUBLISHED = [pytest.param(problem.linkage, id=name) for name, problem in PROBLEM
 
 def unknowns(contest: Contest, linkage: Linkage) -> np.ndarray:
     free = contest.limits.high > contest.limits.low
-    return start_of(linkage, contest.normal).q[free]
+    return make_start(linkage, contest.normal).q[free]
 
 
 def good(name: str) -> Linkage:

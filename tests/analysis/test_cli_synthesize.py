@@ -14,31 +14,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import analysis.synthesis as syn
 from analysis import cli, figures
 from analysis.files import names_of
 from analysis.numerics.symbolic import library
 from analysis.run import case_from, load_case, load_parameters, simulate
-from analysis.synthesis import (
-    Assembly,
-    FullTurn,
-    Grashof,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    Make,
-    Motion,
-    PivotRegion,
-    PrecisionPoints,
-    Search,
-    Solution,
-    SynthesisInterrupted,
-    TimedPath,
-    TradeOff,
-    TradeOffInterrupted,
-    load_synthesis_case,
-    synthesis_case_from,
-    turn,
-)
 from analysis.synthesis.case import case as cases
 from analysis.synthesis.case.tables import KINDS
 from analysis.synthesis.task.constraint import UNKNOWNS
@@ -56,7 +36,7 @@ SQUARE = "[[0, 0], [1, 0], [1, 1], [0, 1]]"
 def case(text: str, folder: Path, **overrides):
     path = folder / "case.toml"
     path.write_text(text)
-    return load_synthesis_case(path, overrides)
+    return syn.load_synthesis_case(path, overrides)
 
 
 # The command
@@ -149,17 +129,17 @@ def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
     search += 'kinds = ["slider-crank", "geared-five-bar"]\ngears = [2]\n'
     found = case(ELLIPSE + search + '[trade_off]\nover = "size"\nlimits = [1, 2]\nstarts = 3\n', tmp_path)
     found.solve(progress=True)
-    search = Search(seed=5, candidates=99, starts=7, solutions=2, n_jobs=2, progress=True)
+    search = syn.Search(seed=5, candidates=99, starts=7, solutions=2, n_jobs=2, progress=True)
     which = {"kinds": ("slider-crank", "geared-five-bar"), "gears": (2.0,)}
     assert given == {"search": search, **which}
     given.clear()
     found.trade()
     assert given.pop("limits").tolist() == [1.0, 2.0]
-    assert given == {"search": Search(seed=5, starts=3, n_jobs=2), **which}
+    assert given == {"search": syn.Search(seed=5, starts=3, n_jobs=2), **which}
 
 
 def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> None:
-    linkage = Linkage(
+    linkage = syn.Linkage(
         ground_length=0.35,
         crank_length=0.25,
         coupler_length=0.215,
@@ -168,10 +148,10 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
         crank_phase=0.2,
     )
     at = np.linspace(0.4, -0.6, 11)
-    task = Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
-    solution = Solution.of(task, linkage)
+    task = syn.Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
+    solution = syn.Solution.of(task, linkage)
     assert not solution.verdicts.full_turn
-    ran = case_from(solution.run_case(Make(speed=3.0), "swing"), folder=tmp_path)
+    ran = case_from(solution.run_case(syn.Make(speed=3.0), "swing"), folder=tmp_path)
     motion = simulate(
         ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
     )
@@ -192,7 +172,7 @@ def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -
     found = cases.synthesize
 
     def stopped(*arguments, **more):
-        raise SynthesisInterrupted(found(*arguments, **more), 2, 3)
+        raise syn.SynthesisInterrupted(found(*arguments, **more), 2, 3)
 
     monkeypatch.setattr(cases, "synthesize", stopped)
     result = linkwork("synthesize", "case.toml", "--no-plots")
@@ -201,7 +181,7 @@ def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -
     assert Path("out/solutions.csv").exists()
 
     def nothing(*arguments, **more):
-        raise SynthesisInterrupted(None, 0, 3)
+        raise syn.SynthesisInterrupted(None, 0, 3)
 
     monkeypatch.setattr(cases, "synthesize", nothing)
     assert linkwork("synthesize", "case.toml", "--out", "none").exit_code == cli.INTERRUPTED
@@ -215,8 +195,8 @@ def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypa
 
     def stopped(self, **more):
         found = self.solve()
-        front = TradeOff(over="size", limit=np.array([0.4, 0.5]), solutions=(None, found.best))
-        raise TradeOffInterrupted(front, 1, 4)
+        front = syn.TradeOff(over="size", limit=np.array([0.4, 0.5]), solutions=(None, found.best))
+        raise syn.TradeOffInterrupted(front, 1, 4)
 
     monkeypatch.setattr(cases.SynthesisCase, "trade", stopped)
     result = linkwork("synthesize", "case.toml", "--no-plots")
@@ -321,21 +301,21 @@ def test_a_setting_without_a_value_is_refused(linkwork, tmp_path) -> None:
 
 
 def test_points_file_and_formula_give_the_same_target(tmp_path) -> None:
-    phi = turn(24)
+    phi = syn.turn(24)
     points = np.column_stack([20.0 + 10.0 * np.cos(phi), 15.0 + 5.0 * np.sin(phi)])
     (tmp_path / "ellipse.csv").write_text("x,y\n" + "\n".join(f"{x!r},{y!r}" for x, y in points.tolist()))
     written = ", ".join(f"[{x!r}, '{10.0 * y!r} mm']" for x, y in points.tolist())
     kind = '[task]\nkind = "timed-path"\nunit = "cm"\n'
     for text in (ELLIPSE, kind + 'file = "ellipse.csv"\n', kind + f"points = [{written}]\n"):
         task = case(text, tmp_path).task
-        assert isinstance(task, TimedPath)
+        assert isinstance(task, syn.TimedPath)
         np.testing.assert_allclose(task.points, 0.01 * points)
         np.testing.assert_allclose(task.rotation, phi)
 
 
 def test_a_target_is_scaled_turned_and_shifted(tmp_path) -> None:
     text = ELLIPSE + 'scale = 2.0\nturn = "90 deg"\nshift = [1, "2 mm"]\n'
-    phi = turn(24)
+    phi = syn.turn(24)
     x, y = 0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)
     np.testing.assert_allclose(case(text, tmp_path).task.points, np.column_stack([-2.0 * y + 0.01, 2.0 * x + 0.002]))
 
@@ -379,14 +359,14 @@ def test_a_function_of_the_rocker_as_formula_list_and_file(tmp_path) -> None:
 def test_motion_and_precision_points(tmp_path) -> None:
     text = f'[task]\nkind = "motion"\npoints = {SQUARE}\nangle = [0, 10, "0.5 rad", 30]\nangle_unit = "deg"\nlength = "2 m"\n'
     task = case(text, tmp_path).task
-    assert isinstance(task, Motion)
+    assert isinstance(task, syn.Motion)
     np.testing.assert_allclose(task.angle, [0.0, radians(10.0), 0.5, radians(30.0)])
     assert (task.length, task.rotation) == (2.0, None)
     # a body turned with its target
     turned = case(text + 'turn = "15 deg"\n', tmp_path).task
     np.testing.assert_allclose(turned.angle, task.angle + radians(15.0))
     precise = case(f'[task]\nkind = "precision-points"\npoints = {SQUARE}\n', tmp_path).task
-    assert isinstance(precise, PrecisionPoints)
+    assert isinstance(precise, syn.PrecisionPoints)
     assert precise.angle is None
 
 
@@ -425,18 +405,25 @@ def test_bounds_constraints_and_the_rest(tmp_path) -> None:
         "crank_length": (0.01, pytest.approx(0.08)),
     }
     kinds = [type(c) for c in found.constraints]
-    assert kinds[:6] == [LeastTransmission, FullTurn, Grashof, LargestLink, Assembly, PivotRegion]
+    assert kinds[:6] == [
+        syn.LeastTransmission,
+        syn.FullTurn,
+        syn.Grashof,
+        syn.LargestLink,
+        syn.Assembly,
+        syn.PivotRegion,
+    ]
     assert (found.constraints[0].angle, found.constraints[0].over) == (pytest.approx(radians(35.0)), "task")
     np.testing.assert_allclose(found.constraints[5].polygon, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
     assert (found.make.density, found.make.speed) == (pytest.approx(2700.0), pytest.approx(4.0 * pi))
     np.testing.assert_allclose(found.trade_off.limits, np.radians([20.0, 40.0]))
     # without a table, and with one that says nothing of it, 40 degrees over the turn
     for more in ("", "[constraints]\nlargest_link = 1\n"):
-        assert case(ELLIPSE + more, tmp_path).constraints[0] == LeastTransmission()
+        assert case(ELLIPSE + more, tmp_path).constraints[0] == syn.LeastTransmission()
     assert case(ELLIPSE + "[constraints]\nleast_transmission_angle = false\n", tmp_path).constraints == ()
     # a crank that swings is not asked to turn
     swings = case(ELLIPSE + '[constraints]\ngrashof = "double-rocker"\n', tmp_path).constraints
-    assert swings[0] == LeastTransmission(over="task")
+    assert swings[0] == syn.LeastTransmission(over="task")
 
 
 def test_overrides_reach_any_depth(tmp_path) -> None:
@@ -450,7 +437,7 @@ def test_overrides_reach_any_depth(tmp_path) -> None:
 def test_json_does_as_well(tmp_path) -> None:
     data = {"task": {"kind": "timed-path", "x": "cos(t)", "y": "sin(t)"}, "search": {"seed": 4}}
     (tmp_path / "case.json").write_text(json.dumps(data))
-    assert load_synthesis_case(tmp_path / "case.json").search.seed == 4
+    assert syn.load_synthesis_case(tmp_path / "case.json").search.seed == 4
     assert data == json.loads((tmp_path / "case.json").read_text())
 
 
@@ -460,10 +447,10 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
     ]
     assert len(examples) >= 4
     for path in examples:
-        load_synthesis_case(path)
+        syn.load_synthesis_case(path)
     page = (ROOT / "docs" / "synthesis-cases.md").read_text()
     (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
-    synthesis_case_from(tomllib.loads(block), folder=ROOT)
+    syn.synthesis_case_from(tomllib.loads(block), folder=ROOT)
     for kind in (
         cases.SynthesisCase,
         *KINDS.values(),

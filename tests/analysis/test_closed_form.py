@@ -14,37 +14,20 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import root
 
+import analysis.synthesis as syn
 from analysis import cli, figures
-from analysis.synthesis import (
-    Guidance,
-    GuidanceMap,
-    Linkage,
-    Motion,
-    PrecisionPoints,
-    RockerFunction,
-    Solution,
-    TargetPath,
-    TimedPath,
-    UntimedPath,
-    alternatives,
-    chebyshev_spacing,
-    cognates,
-    function_from_formula,
-    function_generators,
-    guidance,
-)
 from linkwork.errors import InputError, ParameterError
 
 FloatArray = NDArray[np.float64]
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-def random_poses(seed: int, n: int) -> PrecisionPoints:
+def random_poses(seed: int, n: int) -> syn.PrecisionPoints:
     random = np.random.default_rng(seed)
-    return PrecisionPoints(points=random.uniform(-1.0, 1.0, (n, 2)), angle=random.uniform(-1.5, 1.5, n))
+    return syn.PrecisionPoints(points=random.uniform(-1.0, 1.0, (n, 2)), angle=random.uniform(-1.5, 1.5, n))
 
 
-def kept_distance(task: PrecisionPoints, pivot: complex, point: complex) -> float:
+def kept_distance(task: syn.PrecisionPoints, pivot: complex, point: complex) -> float:
     """How much the distance from a pivot to a point of the body varies over the poses, relative."""
     p = np.asarray(task.points) @ np.array([1.0, 1j])
     angle = np.asarray(task.angle)
@@ -52,14 +35,14 @@ def kept_distance(task: PrecisionPoints, pivot: complex, point: complex) -> floa
     return float(np.ptp(distance) / distance.max())
 
 
-def poses_of(linkage: Linkage, rotation: FloatArray) -> PrecisionPoints:
-    return PrecisionPoints(points=linkage.path(rotation), angle=linkage.coupler_angle(rotation))
+def poses_of(linkage: syn.Linkage, rotation: FloatArray) -> syn.PrecisionPoints:
+    return syn.PrecisionPoints(points=linkage.path(rotation), angle=linkage.coupler_angle(rotation))
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_dyads_of_five_poses_keep_their_length(seed: int) -> None:
-    found = guidance(random_poses(seed, 5))
-    assert isinstance(found, Guidance)
+    found = syn.guidance(random_poses(seed, 5))
+    assert isinstance(found, syn.Guidance)
     assert len(found.dyads) + found.complex_dyads == 4
     assert found.complex_dyads % 2 == 0
     for dyad in found.dyads:
@@ -82,23 +65,23 @@ def test_no_dyad_is_missed(seed: int) -> None:
     random = np.random.default_rng(seed)
     met = [root(lengths, random.uniform(-3.0, 3.0, 4), tol=1e-13) for _ in range(300)]
     there = {tuple(np.round(m.x, 5)) for m in met if m.success and np.abs(m.fun).max() < 1e-11}
-    found = guidance(task)
-    assert isinstance(found, Guidance)
+    found = syn.guidance(task)
+    assert isinstance(found, syn.Guidance)
     mine = {tuple(np.round([d.point.real, d.point.imag, d.pivot.real, d.pivot.imag], 5)) for d in found.dyads}
     assert there <= mine
     # those far away are not hit from these places
     assert {m for m in mine if np.abs(m).max() < 3.0} <= there
 
 
-FOUR_BAR = Linkage(
+FOUR_BAR = syn.Linkage(
     pivot_x=0.1, pivot_y=-0.2, ground_length=0.4, crank_length=0.12, coupler_length=0.35, rocker_length=0.25,
     point_distance=0.3, point_angle=0.6, ground_angle=0.3, crank_phase=0.5, output_angle=0.2,
 )  # fmt: skip
 
 
 def test_a_four_bar_is_found_again_from_its_own_poses() -> None:
-    found = guidance(poses_of(FOUR_BAR, np.array([0.0, 0.4, 0.9, 1.5, 2.2])))
-    assert isinstance(found, Guidance)
+    found = syn.guidance(poses_of(FOUR_BAR, np.array([0.0, 0.4, 0.9, 1.5, 2.2])))
+    assert isinstance(found, syn.Guidance)
     near = min(found.sound, key=lambda s: abs(s.linkage.ground_length - 0.4) + abs(s.linkage.crank_length - 0.12))
     for name, value in FOUR_BAR.values().items():
         assert near.linkage.values()[name] == pytest.approx(value, abs=1e-10), name
@@ -108,12 +91,12 @@ def test_a_four_bar_is_found_again_from_its_own_poses() -> None:
 
 def test_poses_on_both_assemblies_are_a_circuit_defect() -> None:
     """Three poses of one circuit of a crank-rocker and two of the other cannot be joined by any motion of its crank."""
-    other = Linkage(**FOUR_BAR.values() | {"branch": -1})
+    other = syn.Linkage(**FOUR_BAR.values() | {"branch": -1})
     one, two = np.array([0.0, 0.4, 0.9]), np.array([1.5, 2.2])
     points = np.vstack([FOUR_BAR.path(one), other.path(two)])
     angle = np.concatenate([FOUR_BAR.coupler_angle(one), other.coupler_angle(two)])
-    found = guidance(PrecisionPoints(points=points, angle=angle))
-    assert isinstance(found, Guidance)
+    found = syn.guidance(syn.PrecisionPoints(points=points, angle=angle))
+    assert isinstance(found, syn.Guidance)
     near = min(found.solutions, key=lambda s: abs(s.linkage.ground_length - 0.4) + abs(s.linkage.crank_length - 0.12))
     assert near.linkage.coupler_length == pytest.approx(0.35, abs=1e-9)
     assert set(near.verdicts.defects) >= {"circuit defect", "branch defect"}
@@ -121,8 +104,8 @@ def test_poses_on_both_assemblies_are_a_circuit_defect() -> None:
 
 
 def test_none_is_sound_is_said_as_a_proof() -> None:
-    found = guidance(random_poses(0, 5))
-    assert isinstance(found, Guidance)
+    found = syn.guidance(random_poses(0, 5))
+    assert isinstance(found, syn.Guidance)
     assert found.solutions
     assert not found.sound
     assert "no sound four-bar exists" in found.describe()
@@ -130,8 +113,8 @@ def test_none_is_sound_is_said_as_a_proof() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_curve_of_four_poses(seed: int) -> None:
-    found = guidance(random_poses(seed, 4))
-    assert isinstance(found, GuidanceMap)
+    found = syn.guidance(random_poses(seed, 4))
+    assert isinstance(found, syn.GuidanceMap)
     for pivot, point in zip(found.pivots, found.points):
         assert kept_distance(found.task, complex(pivot), complex(point)) < 1e-10  # type: ignore[arg-type]
 
@@ -139,8 +122,8 @@ def test_curve_of_four_poses(seed: int) -> None:
 def test_map_of_four_poses_is_what_each_linkage_is_judged() -> None:
     from analysis.synthesis.exact.burmester import Dyad, four_bar
 
-    found = guidance(random_poses(3, 4))
-    assert isinstance(found, GuidanceMap)
+    found = syn.guidance(random_poses(3, 4))
+    assert isinstance(found, syn.GuidanceMap)
     dyads = [Dyad(pivot=complex(m), point=complex(z)) for m, z in zip(found.pivots, found.points)]
     random = np.random.default_rng(0)
     places = np.argwhere(found.sound)
@@ -161,13 +144,15 @@ def test_map_of_four_poses_is_what_each_linkage_is_judged() -> None:
 def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
     """Pose by pose left out, the dyads of five poses lie on the curve of the other four."""
     task = random_poses(0, 5)
-    five = guidance(task)
-    assert isinstance(five, Guidance)
+    five = syn.guidance(task)
+    assert isinstance(five, syn.Guidance)
     assert five.dyads
     for out in range(1, 5):
         kept = [k for k in range(5) if k != out]
-        four = guidance(PrecisionPoints(points=np.asarray(task.points)[kept], angle=np.asarray(task.angle)[kept]))
-        assert isinstance(four, GuidanceMap)
+        four = syn.guidance(
+            syn.PrecisionPoints(points=np.asarray(task.points)[kept], angle=np.asarray(task.angle)[kept])
+        )
+        assert isinstance(four, syn.GuidanceMap)
         for dyad in five.dyads:
             if abs(dyad.point) < 2.0:
                 assert np.abs(four.points - dyad.point).min() < 0.15
@@ -186,15 +171,18 @@ def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
 )
 def test_poses_that_cannot_be_taken(points: object, angle: object, rotation: object, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        guidance(PrecisionPoints(points=points, angle=angle, rotation=rotation))  # type: ignore[arg-type]
+        syn.guidance(syn.PrecisionPoints(points=points, angle=angle, rotation=rotation))  # type: ignore[arg-type]
 
 
 def test_a_motion_is_poses_too() -> None:
     task = random_poses(5, 5)
-    assert guidance(Motion(points=task.points, angle=np.asarray(task.angle))).describe() == guidance(task).describe()
+    assert (
+        syn.guidance(syn.Motion(points=task.points, angle=np.asarray(task.angle))).describe()
+        == syn.guidance(task).describe()
+    )
 
 
-def exact_at(solution: Solution) -> float:
+def exact_at(solution: syn.Solution) -> float:
     return float(np.abs(solution.evaluation.errors).max())
 
 
@@ -207,8 +195,8 @@ def test_function_at_its_points(n: int, mounting: bool, crank_phase: float | Non
     random = np.random.default_rng(seed)
     rotation = np.append(0.0, np.cumsum(random.uniform(0.2, 0.6, n - 1)))
     angle = 1.5 + 0.6 * np.sin(rotation + random.uniform(-1.0, 1.0))
-    found = function_generators(
-        RockerFunction(angle=angle, rotation=rotation, mounting=mounting), crank_phase=crank_phase
+    found = syn.function_generators(
+        syn.RockerFunction(angle=angle, rotation=rotation, mounting=mounting), crank_phase=crank_phase
     )
     assert len(found.solutions) <= most
     for solution in found.solutions:
@@ -228,10 +216,10 @@ def test_function_at_its_points(n: int, mounting: bool, crank_phase: float | Non
 
 @pytest.mark.parametrize("n", [4, 5])
 def test_a_function_generator_is_found_again(n: int) -> None:
-    made = Linkage(ground_length=0.1, crank_length=0.04, coupler_length=0.12, rocker_length=0.07, crank_phase=0.7)
+    made = syn.Linkage(ground_length=0.1, crank_length=0.04, coupler_length=0.12, rocker_length=0.07, crank_phase=0.7)
     rotation = np.linspace(0.0, 1.8, n)
-    task = RockerFunction(angle=made.rocker_angle(rotation), rotation=rotation, mounting=n == 5)
-    found = function_generators(task)
+    task = syn.RockerFunction(angle=made.rocker_angle(rotation), rotation=rotation, mounting=n == 5)
+    found = syn.function_generators(task)
     assert any(np.allclose(s.linkage.vector, made.vector, rtol=0.0, atol=1e-9) for s in found.sound)
 
 
@@ -244,31 +232,31 @@ def test_a_function_generator_is_found_again(n: int) -> None:
     ],
 )
 def test_points_and_unknowns_are_counted(n: int, mounting: bool, crank_phase: float | None, said: str) -> None:
-    task = RockerFunction(angle=np.linspace(1.0, 2.0, n) ** 2, rotation=np.linspace(0.0, 1.0, n), mounting=mounting)
+    task = syn.RockerFunction(angle=np.linspace(1.0, 2.0, n) ** 2, rotation=np.linspace(0.0, 1.0, n), mounting=mounting)
     with pytest.raises(InputError, match=said):
-        function_generators(task, crank_phase=crank_phase)
+        syn.function_generators(task, crank_phase=crank_phase)
 
 
 def test_a_constant_function_has_no_generator() -> None:
     with pytest.raises(InputError, match="stands still"):
-        function_generators(RockerFunction(angle=[1.0, 1.0, 1.0], rotation=[0.0, 0.5, 1.0]), crank_phase=0.0)
+        syn.function_generators(syn.RockerFunction(angle=[1.0, 1.0, 1.0], rotation=[0.0, 0.5, 1.0]), crank_phase=0.0)
     # an output that turns with the crank: the coupler is as long as the ground link, the others as long as one likes
     with pytest.raises(InputError, match="not independent"):
-        function_generators(RockerFunction(angle=[0.5, 1.0, 1.5], rotation=[0.0, 0.5, 1.0]), crank_phase=0.5)
+        syn.function_generators(syn.RockerFunction(angle=[0.5, 1.0, 1.5], rotation=[0.0, 0.5, 1.0]), crank_phase=0.5)
 
 
 def test_chebyshev_spacing() -> None:
     """The cosines of 30, 90 and 150 degrees; between the points an error that the polynomial through them levels."""
-    assert chebyshev_spacing(0.0, 2.0, 3) == pytest.approx([1.0 - sqrt(0.75), 1.0, 1.0 + sqrt(0.75)])
-    rotation, angle = function_from_formula("10*t", unit="deg", n=4, start=0.0, end="pi/2", spacing="chebyshev")
-    assert rotation == pytest.approx(chebyshev_spacing(0.0, 0.5 * pi, 4))
+    assert syn.chebyshev_spacing(0.0, 2.0, 3) == pytest.approx([1.0 - sqrt(0.75), 1.0, 1.0 + sqrt(0.75)])
+    rotation, angle = syn.function_from_formula("10*t", unit="deg", n=4, start=0.0, end="pi/2", spacing="chebyshev")
+    assert rotation == pytest.approx(syn.chebyshev_spacing(0.0, 0.5 * pi, 4))
     assert angle == pytest.approx(radians(10.0) * rotation)
     with pytest.raises(InputError, match="in order"):
-        chebyshev_spacing(1.0, 0.0, 3)
+        syn.chebyshev_spacing(1.0, 0.0, 3)
 
 
 @st.composite
-def turning(draw: st.DrawFn) -> Linkage:
+def turning(draw: st.DrawFn) -> syn.Linkage:
     """Crank-rockers and drag-links with a coupler point, placed anywhere."""
     lengths = [draw(st.floats(0.2, 1.0)) for _ in range(3)]
     shortest = draw(st.floats(0.05, 0.15))
@@ -277,7 +265,7 @@ def turning(draw: st.DrawFn) -> Linkage:
         rest[2] = 0.9 * (rest[0] + rest[1] - shortest)
     crank = draw(st.booleans())
     ground, crank_length = (rest[2], shortest) if crank else (shortest, rest[2])
-    return Linkage(
+    return syn.Linkage(
         pivot_x=draw(st.floats(-1.0, 1.0)),
         pivot_y=draw(st.floats(-1.0, 1.0)),
         ground_length=ground,
@@ -294,12 +282,12 @@ def turning(draw: st.DrawFn) -> Linkage:
 
 @settings(max_examples=60, deadline=None)
 @given(turning())
-def test_cognates_trace_the_same_curve(linkage: Linkage) -> None:
+def test_cognates_trace_the_same_curve(linkage: syn.Linkage) -> None:
     phi = np.linspace(0.0, 2.0 * pi, 49)
     path = linkage.path(phi)
     if not np.isfinite(path).all() or linkage.least_transmission < 0.02:
         return
-    same, at_a, at_g = cognates(linkage)
+    same, at_a, at_g = syn.cognates(linkage)
     assert same.path(phi) == pytest.approx(path, abs=1e-9)
     turned = {id(at_a): linkage.coupler_angle(phi), id(at_g): linkage.rocker_angle(phi)}
     for cognate in (at_a, at_g):
@@ -313,8 +301,8 @@ def test_cognates_trace_the_same_curve(linkage: Linkage) -> None:
 
 def test_alternatives_of_a_timed_path() -> None:
     phi = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
-    task = TimedPath(points=FOUR_BAR.path(phi), rotation=phi)
-    (other,) = alternatives(Solution.of(task, FOUR_BAR))
+    task = syn.TimedPath(points=FOUR_BAR.path(phi), rotation=phi)
+    (other,) = syn.alternatives(syn.Solution.of(task, FOUR_BAR))
     assert other.error < 1e-25
     assert other.verdicts.sound
     assert other.linkage.pivot_x != pytest.approx(FOUR_BAR.pivot_x, abs=1e-3)
@@ -323,8 +311,8 @@ def test_alternatives_of_a_timed_path() -> None:
 def test_alternatives_of_an_open_path() -> None:
     """Each is judged as it is driven; one that is sound runs through the points in their order."""
     rotation = np.linspace(0.2, 1.4, 15)
-    task = UntimedPath(path=TargetPath(points=FOUR_BAR.path(rotation), closed=False))
-    found = alternatives(Solution.of(task, FOUR_BAR, rotation))
+    task = syn.UntimedPath(path=syn.TargetPath(points=FOUR_BAR.path(rotation), closed=False))
+    found = syn.alternatives(syn.Solution.of(task, FOUR_BAR, rotation))
     assert len(found) == 3
     for one in found:
         if one.verdicts.sound:
@@ -334,9 +322,9 @@ def test_alternatives_of_an_open_path() -> None:
 
 def test_alternatives_of_a_closed_path_turn_fully() -> None:
     points = FOUR_BAR.path(np.linspace(0.0, 2.0 * pi, 72, endpoint=False))
-    task = UntimedPath(path=TargetPath(points=points, closed=True))
-    own = Solution.of(task, FOUR_BAR)
-    found = alternatives(own)
+    task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=True))
+    own = syn.Solution.of(task, FOUR_BAR)
+    found = syn.alternatives(own)
     assert found
     for one in found:
         assert one.linkage.turns_fully
@@ -344,11 +332,11 @@ def test_alternatives_of_a_closed_path_turn_fully() -> None:
 
 
 def test_what_has_no_cognates() -> None:
-    task = RockerFunction(angle=[1.0, 1.2, 1.3], rotation=[0.0, 0.2, 0.4])
+    task = syn.RockerFunction(angle=[1.0, 1.2, 1.3], rotation=[0.0, 0.2, 0.4])
     with pytest.raises(InputError, match="share the coupler's curve"):
-        alternatives(Solution.of(task, FOUR_BAR))
+        syn.alternatives(syn.Solution.of(task, FOUR_BAR))
     with pytest.raises(ParameterError, match="point_distance"):
-        cognates(Linkage(**FOUR_BAR.values() | {"point_distance": 0.0}))
+        syn.cognates(syn.Linkage(**FOUR_BAR.values() | {"point_distance": 0.0}))
 
 
 # The command
@@ -395,8 +383,8 @@ def test_command_of_a_function(linkwork: Callable[..., Result]) -> None:
 
 
 def test_pictures_show_every_dyad_and_linkage() -> None:
-    found = guidance(random_poses(1, 5))
-    assert isinstance(found, Guidance)
+    found = syn.guidance(random_poses(1, 5))
+    assert isinstance(found, syn.Guidance)
     figure = figures.plot(found, title="five")
     assert len(figure.axes) >= 1 + len(found.solutions)
     titles = [axis.get_title() for axis in figure.axes]
@@ -411,8 +399,8 @@ def test_pictures_show_every_dyad_and_linkage() -> None:
 
 
 def test_picture_of_four_poses_shows_which_pairs_are_sound() -> None:
-    found = guidance(random_poses(3, 4), count=1)
-    assert isinstance(found, GuidanceMap)
+    found = syn.guidance(random_poses(3, 4), count=1)
+    assert isinstance(found, syn.GuidanceMap)
     figure = figures.plot(found)
     shown = figure.axes[1].images[0].get_array()
     assert shown is not None

@@ -283,9 +283,9 @@ def test_counts_in_words(count: int, what: str, words: str) -> None:
     assert format_count(count, what) == words
 
 
-PACKAGES = ("run", "periodic", "linear", "youssef", "slider_crank", "motion")
-#: Functions that write parameters out.
-OF_PARAMETERS = {"parameters_to", "save_parameters"}
+PACKAGES = ("run", "periodic", "linear", "youssef", "slider_crank", "slider")
+#: Functions that write or check parameters.
+OF_PARAMETERS = {"parameters_to", "save_parameters", "require_five_bar"}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

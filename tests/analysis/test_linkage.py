@@ -94,7 +94,7 @@ class TestSecondCrank:
         pivot = SecondCrank(
             0.05, ratio=2.0, phase=0.4, series=FourierSeries(np.array([0.0, 0.1]), np.array([0.0, 0.2]))
         )
-        linkage = replace(drawn(np.random.default_rng(1)), crank_length=0.05, pivot=pivot)
+        linkage = replace(drawn(np.random.default_rng(1)), crank_length=0.05).with_pivot(pivot)
         for phi in (0.0, 1.3, 5.0):
             z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
             psi = 2.0 * phi + 0.4 + 0.1 * cos(phi) + 0.2 * sin(phi)
@@ -102,8 +102,8 @@ class TestSecondCrank:
         assert abs(complex(*linkage.path([0.0])[0]) - complex(*linkage.path([2.0 * pi])[0])) < 1e-12
 
     def test_the_plant_has_none(self) -> None:
-        linkage = replace(drawn(np.random.default_rng(1)), pivot=SecondCrank(0.2))
-        with pytest.raises(ParameterError, match="the plant has no second crank"):
+        linkage = drawn(np.random.default_rng(1)).with_pivot(SecondCrank(0.2))
+        with pytest.raises(ParameterError, match="five-bar slider"):
             linkage.to_five_bar()
 
 
@@ -114,7 +114,7 @@ class TestPlaceAndSize:
         if kind == "slider":
             linkage = moved(linkage)
         if kind == "crank":
-            linkage = replace(linkage, pivot=SecondCrank(0.05 * linkage.crank_length, ratio=-1.0, phase=0.2))
+            linkage = linkage.with_pivot(SecondCrank(0.05 * linkage.crank_length, ratio=-1.0, phase=0.2))
         phi = turn(12)
         np.testing.assert_allclose(linkage.scaled(3.0).path(phi), 3.0 * linkage.path(phi), atol=1e-12)
         np.testing.assert_allclose(
@@ -270,8 +270,8 @@ class TestVerdicts:
         linkage = four_bar(1.0, 0.5, 0.6, 0.7)
         pivot = SliderMotion(FourierSeries(np.array([-0.15, 0.15]), np.array([0.0, 0.0])))
         assert not linkage.turns_fully
-        assert replace(linkage, pivot=pivot).turns_fully
-        assert self.judged(replace(linkage, pivot=pivot), 0.0, 6.0).sound
+        assert linkage.with_pivot(pivot).turns_fully
+        assert self.judged(linkage.with_pivot(pivot), 0.0, 6.0).sound
 
 
 class TestFiveBar:
@@ -414,6 +414,6 @@ class TestMovedPivots:
         assert linkage.grashof == "triple-rocker"
         follows = SliderMotion(FourierSeries(np.array([0.0, 0.3]), np.zeros(2)))
         for pivot, words in ((follows, "four-bar with a moved pivot"), (SecondCrank(0.3), "five-bar, gears 1")):
-            verdicts = judge(replace(linkage, pivot=pivot), np.array([0.0, 2.0 * pi]), closed=True)
+            verdicts = judge(linkage.with_pivot(pivot), np.array([0.0, 2.0 * pi]), closed=True)
             assert verdicts.full_turn
             assert str(verdicts).startswith(f"{words}, full turn")

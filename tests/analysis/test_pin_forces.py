@@ -11,41 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+import analysis.synthesis as syn
 from analysis.numerics import symbolic
 from analysis.numerics.fourier import FourierSeries
 from analysis.run import case_from, simulate
-from analysis.synthesis import (
-    DeadCentre,
-    LargestLink,
-    LeastPinForce,
-    LeastTransmission,
-    Linkage,
-    Make,
-    MaxPinForce,
-    MechanicalAdvantage,
-    NoToggle,
-    RockerFunction,
-    Search,
-    SliderMotion,
-    SliderUnknown,
-    Solution,
-    TargetPath,
-    TimedPath,
-    Toggle,
-    UntimedPath,
-    pin_forces,
-    synthesis_case_from,
-    synthesize,
-    trade_off,
-    turn,
-)
 from analysis.synthesis.linkage.machine import pin_functions
 from analysis.synthesis.task.constraint import InfeasibleError, Way
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 from tests.oracles import multipliers
 
-LINKAGE = Linkage(
+LINKAGE = syn.Linkage(
     pivot_x=0.1,
     pivot_y=-0.2,
     ground_length=0.25,
@@ -58,15 +34,17 @@ LINKAGE = Linkage(
     crank_phase=0.4,
     branch=-1,
 )
-MAKE = Make(speed="240 rpm", load=("3 N", "-15 N"), width="30 mm", thickness="8 mm", density=2700.0, rocker_mass=0.4)
-PHI = turn(24)
+MAKE = syn.Make(
+    speed="240 rpm", load=("3 N", "-15 N"), width="30 mm", thickness="8 mm", density=2700.0, rocker_mass=0.4
+)
+PHI = syn.turn(24)
 ELLIPSE = np.column_stack([0.20 + 0.06 * np.cos(PHI), 0.15 + 0.03 * np.sin(PHI)])
-TASK = TimedPath(points=ELLIPSE)
-USUAL = (LargestLink(length=0.3), LeastTransmission())
-FEW = Search(starts=3, candidates=1 << 12)
+TASK = syn.TimedPath(points=ELLIPSE)
+USUAL = (syn.LargestLink(length=0.3), syn.LeastTransmission())
+FEW = syn.Search(starts=3, candidates=1 << 12)
 
 
-def plant(linkage: Linkage, make: Make) -> FiveBarParameters:
+def plant(linkage: syn.Linkage, make: syn.Make) -> FiveBarParameters:
     """The plant; `test_linkage` sums the masses of its bars."""
     section = (make.width, make.thickness)
     p = linkage.to_five_bar(density=make.density, section=section, slider_mass=1e7, gravity=make.gravity)
@@ -74,7 +52,7 @@ def plant(linkage: Linkage, make: Make) -> FiveBarParameters:
     return replace(p, rocker_mass=m, rocker_inertia=p.rocker_inertia * m / p.rocker_mass)
 
 
-def by_multipliers(linkage: Linkage, make: Make, rotation: float) -> np.ndarray:
+def by_multipliers(linkage: syn.Linkage, make: syn.Make, rotation: float) -> np.ndarray:
     """Magnitudes of the forces on the pins A to D, the slider so heavy that it stands still."""
     p = plant(linkage, make)
     q = multipliers.assemble(p, rotation + linkage.crank_phase, 0.0)
@@ -87,7 +65,7 @@ def by_multipliers(linkage: Linkage, make: Make, rotation: float) -> np.ndarray:
     return np.array([hypot(found.forces[f"pin.{pin}.fx"], found.forces[f"pin.{pin}.fy"]) for pin in "ABCD"])
 
 
-def traced(linkage: Linkage, make: Make, rotation: float, **other: Any) -> np.ndarray:
+def traced(linkage: syn.Linkage, make: syn.Make, rotation: float, **other: Any) -> np.ndarray:
     d = SimpleNamespace(**linkage.values() | other)
     found = pin_functions(d, make, symbolic.library().DM(rotation + linkage.crank_phase))
     return np.array([hypot(float(x), float(y)) for x, y in found.values()])
@@ -96,7 +74,7 @@ def traced(linkage: Linkage, make: Make, rotation: float, **other: Any) -> np.nd
 @pytest.mark.parametrize("change", [{}, {"branch": 1, "ground_angle": -0.6}, {"point_distance": 0.0}])
 def test_the_run_of_the_plant_and_its_trace_have_the_forces_of_multipliers(change: dict[str, Any]) -> None:
     linkage = replace(LINKAGE, **change)
-    run = pin_forces(linkage, MAKE)
+    run = syn.pin_forces(linkage, MAKE)
     assert run.moved < 1e-6
     for k in (0, 100, 333, 600):
         wanted = by_multipliers(linkage, MAKE, float(run.rotation[k]))
@@ -124,58 +102,62 @@ def test_derivatives_by_dimensions_are_those_of_the_oracle(name: str) -> None:
 def test_a_point_on_the_line_of_the_coupler_makes_one_bar() -> None:
     """As `Linkage.to_five_bar`: the bar from B over all of the coupler."""
     linkage = replace(LINKAGE, point_angle=pi, point_distance=0.05)
-    run = pin_forces(linkage, MAKE)
+    run = syn.pin_forces(linkage, MAKE)
     d = SimpleNamespace(**linkage.values())
     found = pin_functions(d, MAKE, symbolic.library().DM(linkage.crank_phase + float(run.rotation[50])), straight=True)
     assert [hypot(float(x), float(y)) for x, y in found.values()] == pytest.approx(run.force[50], rel=1e-6)
 
 
 @pytest.fixture(scope="module", name="free")
-def make_free() -> Solution:
-    return synthesize(TASK, constraints=USUAL, search=FEW).best
+def make_free() -> syn.Solution:
+    return syn.synthesize(TASK, constraints=USUAL, search=FEW).best
 
 
 class TestBound:
     @pytest.mark.parametrize("objective", ["error", "worst"])
-    def test_no_pin_carries_more(self, free: Solution, objective: Any) -> None:
-        bound = 0.8 * pin_forces(free.linkage, MAKE).greatest
+    def test_no_pin_carries_more(self, free: syn.Solution, objective: Any) -> None:
+        bound = 0.8 * syn.pin_forces(free.linkage, MAKE).greatest
         task = replace(TASK, objective=objective)
-        found = synthesize(task, constraints=[*USUAL, MaxPinForce(force=bound, make=MAKE)], search=FEW)
+        found = syn.synthesize(task, constraints=[*USUAL, syn.MaxPinForce(force=bound, make=MAKE)], search=FEW)
         for s in found.solutions:
-            assert pin_forces(s.linkage, MAKE).greatest <= bound * (1.0 + 1e-6)
+            assert syn.pin_forces(s.linkage, MAKE).greatest <= bound * (1.0 + 1e-6)
         # the bound is used, and paid for
-        assert pin_forces(found.best.linkage, MAKE).greatest == pytest.approx(bound, rel=1e-4)
+        assert syn.pin_forces(found.best.linkage, MAKE).greatest == pytest.approx(bound, rel=1e-4)
         assert found.best.error > 1.01 * free.error
 
     def test_of_a_path(self) -> None:
-        path = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True))
-        free = synthesize(path, constraints=USUAL, search=FEW).best
-        bound = 0.8 * pin_forces(free.linkage, MAKE).of("AD")
-        asked = MaxPinForce(force=bound, make=MAKE, pins="AD")
-        found = synthesize(path, constraints=[*USUAL, asked], search=FEW).best
-        assert pin_forces(found.linkage, MAKE).of("AD") == pytest.approx(bound, rel=1e-3)
-        assert pin_forces(found.linkage, MAKE).of("AD") <= bound * (1.0 + 1e-6)
+        path = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True))
+        free = syn.synthesize(path, constraints=USUAL, search=FEW).best
+        bound = 0.8 * syn.pin_forces(free.linkage, MAKE).of("AD")
+        asked = syn.MaxPinForce(force=bound, make=MAKE, pins="AD")
+        found = syn.synthesize(path, constraints=[*USUAL, asked], search=FEW).best
+        assert syn.pin_forces(found.linkage, MAKE).of("AD") == pytest.approx(bound, rel=1e-3)
+        assert syn.pin_forces(found.linkage, MAKE).of("AD") <= bound * (1.0 + 1e-6)
 
     def test_one_that_cannot_be_kept_is_named_with_its_unit(self) -> None:
         with pytest.raises(InfeasibleError, match=r"the force on the pins by [0-9.]+ N"):
-            synthesize(TASK, constraints=[*USUAL, MaxPinForce(force="1 N", make=MAKE)], search=replace(FEW, starts=1))
+            syn.synthesize(
+                TASK, constraints=[*USUAL, syn.MaxPinForce(force="1 N", make=MAKE)], search=replace(FEW, starts=1)
+            )
 
     def test_a_swinging_crank_over_the_way_of_the_task(self) -> None:
         at = np.linspace(0.0, radians(80.0), 9)
-        task = RockerFunction(angle=1.0 + 0.3 * at**2, rotation=at, mounting=True)
-        constraints = [LeastTransmission(angle=0.6, over="task")]
-        free = synthesize(task, constraints=constraints, search=FEW).best
+        task = syn.RockerFunction(angle=1.0 + 0.3 * at**2, rotation=at, mounting=True)
+        constraints = [syn.LeastTransmission(angle=0.6, over="task")]
+        free = syn.synthesize(task, constraints=constraints, search=FEW).best
         over = (0.0, float(at[-1]))
-        bound = 0.9 * pin_forces(free.linkage, MAKE, over).greatest
-        best = synthesize(task, constraints=[*constraints, MaxPinForce(force=bound, make=MAKE)], search=FEW).best
-        assert pin_forces(best.linkage, MAKE, over).greatest <= bound * (1.0 + 1e-6)
+        bound = 0.9 * syn.pin_forces(free.linkage, MAKE, over).greatest
+        best = syn.synthesize(
+            task, constraints=[*constraints, syn.MaxPinForce(force=bound, make=MAKE)], search=FEW
+        ).best
+        assert syn.pin_forces(best.linkage, MAKE, over).greatest <= bound * (1.0 + 1e-6)
 
     @pytest.mark.slow
-    def test_a_trade_off_of_the_error(self, free: Solution) -> None:
-        greatest = pin_forces(free.linkage, MAKE).greatest
+    def test_a_trade_off_of_the_error(self, free: syn.Solution) -> None:
+        greatest = syn.pin_forces(free.linkage, MAKE).greatest
         limits = np.array([0.7, 0.9]) * greatest
-        constraints = [*USUAL, MaxPinForce(force=greatest, make=MAKE)]
-        traded = trade_off(TASK, "pin-force", limits, constraints=constraints, search=FEW)
+        constraints = [*USUAL, syn.MaxPinForce(force=greatest, make=MAKE)]
+        traded = syn.trade_off(TASK, "pin-force", limits, constraints=constraints, search=FEW)
         assert traded.error[0] > traded.error[1] > free.error
         assert "limit of greatest pin force [N]" in traded.columns()
 
@@ -183,14 +165,14 @@ class TestBound:
 def test_the_least_force_within_an_error() -> None:
     """Whoever asks the other way round, for the least error within that force, comes to the same linkage."""
     error = 0.004
-    found = synthesize(TASK, constraints=[*USUAL, LeastPinForce(error="4 mm", make=MAKE)], search=FEW)
+    found = syn.synthesize(TASK, constraints=[*USUAL, syn.LeastPinForce(error="4 mm", make=MAKE)], search=FEW)
     best = found.best
-    least = pin_forces(best.linkage, MAKE).greatest
+    least = syn.pin_forces(best.linkage, MAKE).greatest
     assert best.value <= error * (1.0 + 1e-5)
-    assert all(pin_forces(s.linkage, MAKE).greatest >= least * (1.0 - 1e-6) for s in found.solutions)
-    back = synthesize(
+    assert all(syn.pin_forces(s.linkage, MAKE).greatest >= least * (1.0 - 1e-6) for s in found.solutions)
+    back = syn.synthesize(
         replace(TASK, objective="worst"),
-        constraints=[*USUAL, MaxPinForce(force=least * (1.0 + 1e-5), make=MAKE)],
+        constraints=[*USUAL, syn.MaxPinForce(force=least * (1.0 + 1e-5), make=MAKE)],
         guesses=[best],
         search=replace(FEW, starts=1),
     ).best
@@ -199,26 +181,29 @@ def test_the_least_force_within_an_error() -> None:
 
 @pytest.mark.slow
 def test_the_least_force_of_a_path() -> None:
-    task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), objective="worst")
+    task = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), objective="worst")
     one = replace(FEW, starts=1)
-    free = synthesize(task, constraints=USUAL, search=one).best
+    free = syn.synthesize(task, constraints=USUAL, search=one).best
     assert free.value < 0.0025
-    found = synthesize(task, constraints=[*USUAL, LeastPinForce(error=0.003, make=MAKE)], search=one).best
+    found = syn.synthesize(task, constraints=[*USUAL, syn.LeastPinForce(error=0.003, make=MAKE)], search=one).best
     # the bound is used, and what it buys is much
     assert found.value == pytest.approx(0.003, rel=1e-3)
     assert found.value <= 0.003 * (1.0 + 1e-4)
-    assert pin_forces(found.linkage, MAKE).greatest < 0.8 * pin_forces(free.linkage, MAKE).greatest
+    assert syn.pin_forces(found.linkage, MAKE).greatest < 0.8 * syn.pin_forces(free.linkage, MAKE).greatest
 
 
 class TestRefused:
     @pytest.mark.parametrize(
         ("made", "message"),
         [
-            (lambda: MaxPinForce(force=0.0), "greatest pin force"),
-            (lambda: MaxPinForce(force=1.0, pins="AX"), "letters ABCD"),
-            (lambda: MaxPinForce(force="3 mm"), "force"),
-            (lambda: Make(speed="3 mm"), "speed"),
-            (lambda: pin_forces(replace(LINKAGE, pivot=SliderMotion(FourierSeries.constant(0.0))), MAKE), "pivot"),
+            (lambda: syn.MaxPinForce(force=0.0), "greatest pin force"),
+            (lambda: syn.MaxPinForce(force=1.0, pins="AX"), "letters ABCD"),
+            (lambda: syn.MaxPinForce(force="3 mm"), "force"),
+            (lambda: syn.Make(speed="3 mm"), "speed"),
+            (
+                lambda: syn.pin_forces(replace(LINKAGE, pivot=syn.SliderMotion(FourierSeries.constant(0.0))), MAKE),
+                "pivot",
+            ),
         ],
     )
     def test_what_is_not_usable(self, made: Any, message: str) -> None:
@@ -229,15 +214,15 @@ class TestRefused:
         ("constraint", "more", "error", "message"),
         [
             (
-                MaxPinForce(force=1.0),
-                {"pivot": SliderUnknown(harmonics=1)},
+                syn.MaxPinForce(force=1.0),
+                {"pivot": syn.SliderUnknown(harmonics=1)},
                 InputError,
                 "its rocker pivot must be fixed",
             ),
-            (LeastPinForce(error=0.0), {}, ParameterError, "greatest error"),
-            (LeastPinForce(error="1 deg"), {}, ParameterError, "greatest error"),
+            (syn.LeastPinForce(error=0.0), {}, ParameterError, "greatest error"),
+            (syn.LeastPinForce(error="1 deg"), {}, ParameterError, "greatest error"),
             (
-                LeastPinForce(error="0.01 mm"),
+                syn.LeastPinForce(error="0.01 mm"),
                 {"search": replace(FEW, starts=1)},
                 InfeasibleError,
                 "greatest error by .* mm",
@@ -246,15 +231,15 @@ class TestRefused:
     )
     def test_what_cannot_be_searched(self, constraint: Any, more: dict[str, Any], error: Any, message: str) -> None:
         with pytest.raises(error, match=message):
-            synthesize(TASK, constraints=[*USUAL, constraint], **more)
+            syn.synthesize(TASK, constraints=[*USUAL, constraint], **more)
 
     def test_two_objectives(self) -> None:
         with pytest.raises(InputError, match="one objective"):
-            synthesize(TASK, constraints=[LeastPinForce(error=1.0), LeastPinForce(error=2.0)])
+            syn.synthesize(TASK, constraints=[syn.LeastPinForce(error=1.0), syn.LeastPinForce(error=2.0)])
 
     def test_forces_need_to_know_where_the_crank_goes(self) -> None:
         with pytest.raises(InputError, match="needs crank rotations"):
-            MaxPinForce(force=1.0).requires(Way(False, None))
+            syn.MaxPinForce(force=1.0).requires(Way(False, None))
 
 
 def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
@@ -272,33 +257,33 @@ def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
         },
         "make": {"speed": "300 rpm", "load": ["0 N", "-20 N"], "crank_mass": "200 g"},
     }
-    case = synthesis_case_from(tables, folder=tmp_path)
+    case = syn.synthesis_case_from(tables, folder=tmp_path)
     _, advantage, stretched, folded, clear, most, least = case.constraints
-    assert isinstance(advantage, MechanicalAdvantage)
+    assert isinstance(advantage, syn.MechanicalAdvantage)
     assert (advantage.least, list(advantage.at)) == (1.5, [radians(30.0)])
-    assert isinstance(stretched, DeadCentre)
-    assert isinstance(folded, DeadCentre)
+    assert isinstance(stretched, syn.DeadCentre)
+    assert isinstance(folded, syn.DeadCentre)
     assert stretched.at == (radians(80.0), radians(80.0))
     assert (folded.at, folded.position) == ((radians(200.0), radians(250.0)), "folded")
-    assert isinstance(clear, NoToggle)
-    assert isinstance(most, MaxPinForce)
-    assert isinstance(least, LeastPinForce)
+    assert isinstance(clear, syn.NoToggle)
+    assert isinstance(most, syn.MaxPinForce)
+    assert isinstance(least, syn.LeastPinForce)
     assert (most.force, most.pins, least.error, least.pins) == (40.0, "BC", "2 deg", "BC")
-    assert most.make == least.make == case.make == Make(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
+    assert most.make == least.make == case.make == syn.Make(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
     with pytest.raises(ParameterError, match="come with a least or greatest one"):
-        synthesis_case_from(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
+        syn.synthesis_case_from(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
     swing = {"least_transmission_angle": False, "toggle_stretched": "200 deg", "toggle_folded": ["30 deg", "40 deg"]}
-    *_, toggle, other = synthesis_case_from(tables | {"constraints": swing}, folder=tmp_path).constraints
-    assert isinstance(toggle, Toggle)
-    assert isinstance(other, Toggle)
+    *_, toggle, other = syn.synthesis_case_from(tables | {"constraints": swing}, folder=tmp_path).constraints
+    assert isinstance(toggle, syn.Toggle)
+    assert isinstance(other, syn.Toggle)
     assert (toggle.position, other.position) == ("stretched", "folded")
 
 
-def test_a_case_that_runs_has_the_load(free: Solution, tmp_path: Path) -> None:
+def test_a_case_that_runs_has_the_load(free: syn.Solution, tmp_path: Path) -> None:
     """In the frame of the ground link, as the plant has it; its pins carry what they are said to, but for its spring."""
     made = replace(MAKE, gravity=0.0)
     case = case_from(free.run_case(made, "loaded"), folder=tmp_path)
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=4.0 * pi / made.speed)
     last = run.time > 2.0 * pi / made.speed
     greatest = max(float(np.hypot(run[f"pin.{pin}.fx"], run[f"pin.{pin}.fy"])[last].max()) for pin in "ABC")
-    assert greatest == pytest.approx(pin_forces(free.linkage, made).of("ABC"), rel=5e-3)
+    assert greatest == pytest.approx(syn.pin_forces(free.linkage, made).of("ABC"), rel=5e-3)

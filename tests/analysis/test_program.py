@@ -13,41 +13,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
-from analysis.synthesis import (
-    USUAL,
-    Assembly,
-    Constraint,
-    CrankUnknown,
-    Grashof,
-    InfeasibleError,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    Motion,
-    PivotRegion,
-    Require,
-    RockerFunction,
-    Search,
-    SecondCrank,
-    SliderMotion,
-    SliderUnknown,
-    Solution,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    evaluate,
-    normal_form,
-    synthesize,
-    turn,
-)
-from analysis.synthesis.search.polish import fit_least_squares, polish, quality_of, residuals
+from analysis.synthesis.search.polish import fit_least_squares, polish, residuals, sum_of_squares
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.scan import scan
-from analysis.synthesis.search.start import Start, linkage_of, start_of
+from analysis.synthesis.search.start import Start, make_linkage, make_start
 from analysis.synthesis.search.statement import BETWEEN
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.task import Normal
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse
@@ -56,16 +29,16 @@ pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
 
 
-TASK = TimedPath(points=ellipse(24))
+TASK = syn.TimedPath(points=ellipse(24))
 #: Four-bars within which the target, 0.22 m across, can be traced.
-SMALL = LargestLink(length=0.5)
+SMALL = syn.LargestLink(length=0.5)
 
 
-FEW = Search(candidates=1 << 13, starts=4)
+FEW = syn.Search(candidates=1 << 13, starts=4)
 
 
-def best(*constraints: Constraint, task: Task = TASK, search: Search = FEW, **more: Any) -> Solution:
-    return synthesize(task, constraints=constraints, search=search, **more).best
+def best(*constraints: syn.Constraint, task: syn.Task = TASK, search: syn.Search = FEW, **more: Any) -> syn.Solution:
+    return syn.synthesize(task, constraints=constraints, search=search, **more).best
 
 
 class TestOptimum:
@@ -79,7 +52,7 @@ class TestOptimum:
 
         def quality(x: FloatArray) -> float:
             at = Start(q=x[:11], branch=start.branch, rotation=x[11:] if rotation else None)
-            return quality_of(normal, at)
+            return sum_of_squares(normal, at)
 
         limits = program.limits
 
@@ -110,14 +83,14 @@ class TestOptimum:
         return float(left) / max(scale, 1e-3)
 
     def test_of_a_timed_path(self) -> None:
-        normal = normal_form(TASK)
-        limits = limits_of(TASK, normal, None, (SMALL, LeastTransmission(angle=radians(60))))
+        normal = syn.normal_form(TASK)
+        limits = make_limits(TASK, normal, None, (SMALL, syn.LeastTransmission(angle=radians(60))))
         program = Program(normal, limits)
         for start in scan(normal, limits, seed=0, candidates=4096, starts=4):
             answer = program.solve(start)
             assert answer.feasible
             assert answer.converged
-            assert answer.start.quality == pytest.approx(quality_of(normal, answer.start), rel=1e-9)
+            assert answer.start.quality == pytest.approx(sum_of_squares(normal, answer.start), rel=1e-9)
             assert answer.start.quality < start.quality
             assert self.stationary(program, normal, answer.start, rotation=False) < 1e-4
 
@@ -125,21 +98,21 @@ class TestOptimum:
         known = drawn(np.random.default_rng(3), least=0.8)
         rotation = np.linspace(0.0, 3.0, 8)
         noise = np.random.default_rng(0).normal(scale=0.02, size=(8, 2))
-        task = Motion(points=known.path(rotation) + noise, angle=known.coupler_angle(rotation))
-        normal = normal_form(task)
-        limits = limits_of(task, normal, None, USUAL)
+        task = syn.Motion(points=known.path(rotation) + noise, angle=known.coupler_angle(rotation))
+        normal = syn.normal_form(task)
+        limits = make_limits(task, normal, None, syn.USUAL)
         program = Program(normal, limits)
-        answer = program.solve(start_of(known, normal, rotation=rotation))
+        answer = program.solve(make_start(known, normal, rotation=rotation))
         assert answer.feasible
         assert answer.converged
         assert np.all(np.diff(answer.start.rotation) > 0.01)
         assert self.stationary(program, normal, answer.start, rotation=True) < 1e-4
 
     def test_of_a_rocker_function(self) -> None:
-        angle = 1.2 + 0.5 * np.sin(turn(24)) + 0.1 * np.cos(2.0 * turn(24))
-        task = RockerFunction(angle=angle)
-        normal = normal_form(task)
-        limits = limits_of(task, normal, {"ground_length": (0.1, 0.1)}, USUAL)
+        angle = 1.2 + 0.5 * np.sin(syn.turn(24)) + 0.1 * np.cos(2.0 * syn.turn(24))
+        task = syn.RockerFunction(angle=angle)
+        normal = syn.normal_form(task)
+        limits = make_limits(task, normal, {"ground_length": (0.1, 0.1)}, syn.USUAL)
         program = Program(normal, limits)
         answer = program.solve(scan(normal, limits, seed=0, candidates=4096, starts=1)[0])
         assert answer.feasible
@@ -148,10 +121,10 @@ class TestOptimum:
 
 class TestLeastSquares:
     def test_it_agrees_with_ipopt_where_bounds_are_all_that_is_asked(self) -> None:
-        normal = normal_form(TASK)
-        limits = limits_of(TASK, normal, {"crank_length": (0.02, 0.06), "ground_length": (0.1, 0.4)}, ())
+        normal = syn.normal_form(TASK)
+        limits = make_limits(TASK, normal, {"crank_length": (0.02, 0.06), "ground_length": (0.1, 0.4)}, ())
         assert limits.bounds_only
-        known = Linkage(
+        known = syn.Linkage(
             pivot_x=0.2, pivot_y=-0.1, ground_length=0.3, crank_length=0.05, coupler_length=0.35, rocker_length=0.3,
             point_distance=0.3, ground_angle=0.2, point_angle=0.9, crank_phase=0.4,
         )  # fmt: skip
@@ -163,25 +136,25 @@ class TestLeastSquares:
             assert squares.feasible
             assert ipopt.start.quality == pytest.approx(squares.start.quality, rel=1e-5)
             qualities.append(squares.start.quality)
-        assert min(qualities) < quality_of(normal, start_of(known, normal))
+        assert min(qualities) < sum_of_squares(normal, make_start(known, normal))
 
     @pytest.mark.parametrize("kind", ["path", "rocker", "motion"])
     def test_residuals_have_the_jacobian_that_differences_give(self, kind: str) -> None:
         random = np.random.default_rng(1)
         known = drawn(random, least=0.6)
         rotation = np.linspace(0.0, 4.0, 6)
-        tasks: dict[str, Task] = {
-            "path": TimedPath(points=known.path(rotation), rotation=rotation, weights=[1, 2, 3, 4, 5, 6]),
-            "rocker": RockerFunction(angle=known.rocker_angle(rotation), rotation=rotation, mounting=True),
-            "motion": Motion(
+        tasks: dict[str, syn.Task] = {
+            "path": syn.TimedPath(points=known.path(rotation), rotation=rotation, weights=[1, 2, 3, 4, 5, 6]),
+            "rocker": syn.RockerFunction(angle=known.rocker_angle(rotation), rotation=rotation, mounting=True),
+            "motion": syn.Motion(
                 points=known.path(rotation),
                 angle=known.coupler_angle(rotation),
                 rotation=rotation,
                 weights=[1, 2, 3, 4, 5, 6],
             ),
         }
-        normal = normal_form(tasks[kind])
-        q = start_of(known, normal).q
+        normal = syn.normal_form(tasks[kind])
+        q = make_start(known, normal).q
         residual, jacobian, rate = residuals(normal, known.branch, q, rotation)
         assert np.abs(residual).max() < 1e-12
         q = q + 0.01 * random.normal(size=11)
@@ -203,7 +176,7 @@ class TestLeastSquares:
         solution = best()
         assert solution.error < 2e-5
         with pytest.raises(ImportError):
-            best(*USUAL)
+            best(*syn.USUAL)
 
 
 class TestBounds:
@@ -223,19 +196,19 @@ class TestBounds:
         ],
     )
     def test_each_holds(self, name: str, low: float, high: float) -> None:
-        solution = best(*USUAL, bounds={name: (low, high)})
+        solution = best(*syn.USUAL, bounds={name: (low, high)})
         assert low - 1e-9 <= getattr(solution.linkage, name) <= high + 1e-9
 
     def test_equal_ones_fix(self) -> None:
-        for constraints in ((), USUAL):
+        for constraints in ((), syn.USUAL):
             solution = best(*constraints, bounds={"crank_length": (0.05, 0.05), "pivot_x": (0.25, 0.25)})
             assert solution.linkage.crank_length == pytest.approx(0.05, abs=1e-12)
             assert solution.linkage.pivot_x == pytest.approx(0.25, abs=1e-12)
 
     def test_the_size_cap_counts_the_coupler_point_too(self) -> None:
-        solution = best(*USUAL, LargestLink(length=0.2))
+        solution = best(*syn.USUAL, syn.LargestLink(length=0.2))
         assert max(solution.linkage.largest_link, solution.linkage.point_distance) <= 0.2 + 1e-9
-        assert solution.error > best(*USUAL, LargestLink(length=0.5)).error
+        assert solution.error > best(*syn.USUAL, syn.LargestLink(length=0.5)).error
 
 
 L_SHAPE = np.array([[0.0, -0.3], [0.6, -0.3], [0.6, -0.2], [0.1, -0.2], [0.1, 0.3], [0.0, 0.3]])
@@ -247,7 +220,7 @@ class TestConstraints:
     def test_a_pivot_stays_in_its_region(self, pivot: Any, polygon: FloatArray) -> None:
         from shapely import Point, Polygon
 
-        solution = best(*USUAL, SMALL, PivotRegion(pivot=pivot, polygon=polygon))
+        solution = best(*syn.USUAL, SMALL, syn.PivotRegion(pivot=pivot, polygon=polygon))
         place = solution.linkage.pins(0.0)[pivot]
         assert Polygon(polygon).distance(Point(place)) < 1e-7
 
@@ -255,7 +228,9 @@ class TestConstraints:
         from shapely import Point, Polygon
 
         square = np.array([[0.2, -0.35], [0.5, -0.35], [0.5, 0.0], [0.2, 0.0]])
-        solution = best(*USUAL, PivotRegion(pivot="A", polygon=square), PivotRegion(pivot="D", polygon=L_SHAPE), SMALL)
+        solution = best(
+            *syn.USUAL, syn.PivotRegion(pivot="A", polygon=square), syn.PivotRegion(pivot="D", polygon=L_SHAPE), SMALL
+        )
         pins = solution.linkage.pins(0.0)
         assert Polygon(square).distance(Point(pins["A"])) < 1e-7
         assert Polygon(L_SHAPE).distance(Point(pins["D"])) < 1e-7
@@ -264,8 +239,8 @@ class TestConstraints:
     def test_every_grashof_type_can_be_had(self, type_: Any) -> None:
         # an arc, half a turn of the crank at most: what each type can do
         t = np.linspace(0.0, 1.2, 9)
-        task = TimedPath(points=np.column_stack([np.cos(t), np.sin(t) + 0.1 * t * t]), rotation=t)
-        solution = best(Grashof(type=type_), task=task)
+        task = syn.TimedPath(points=np.column_stack([np.cos(t), np.sin(t) + 0.1 * t * t]), rotation=t)
+        solution = best(syn.Grashof(type=type_), task=task)
         assert solution.verdicts.grashof in (type_, "change-point")
         lengths = np.sort(
             [getattr(solution.linkage, f"{name}_length") for name in ("ground", "crank", "coupler", "rocker")]
@@ -276,14 +251,16 @@ class TestConstraints:
 
     def test_least_transmission_over_a_turn(self) -> None:
         for angle in (20.0, 40.0, 65.0):
-            solution = best(SMALL, LeastTransmission(angle=radians(angle)), bounds={"rocker_length": (0.01, 0.12)})
+            solution = best(SMALL, syn.LeastTransmission(angle=radians(angle)), bounds={"rocker_length": (0.01, 0.12)})
             assert solution.linkage.least_transmission >= radians(angle) - 1e-7
             assert solution.verdicts.full_turn
 
     def test_least_transmission_over_the_task_alone(self) -> None:
         rotation = np.linspace(0.0, 1.2, 8)
-        task = TimedPath(points=np.column_stack([rotation, 0.2 * rotation**2]), rotation=rotation)
-        solution = best(LeastTransmission(angle=radians(50), over="task"), Grashof(type="triple-rocker"), task=task)
+        task = syn.TimedPath(points=np.column_stack([rotation, 0.2 * rotation**2]), rotation=rotation)
+        solution = best(
+            syn.LeastTransmission(angle=radians(50), over="task"), syn.Grashof(type="triple-rocker"), task=task
+        )
         assert solution.linkage.transmission(rotation).min() >= radians(50) - 1e-6
         assert not solution.verdicts.full_turn
         assert solution.linkage.least_transmission == 0.0
@@ -291,32 +268,32 @@ class TestConstraints:
 
     @pytest.mark.parametrize("branch", [1, -1])
     def test_assembly(self, branch: int) -> None:
-        assert best(*USUAL, Assembly(branch=branch)).linkage.branch == branch
+        assert best(*syn.USUAL, syn.Assembly(branch=branch)).linkage.branch == branch
 
     def test_required_inequality_in_functions_of_math(self) -> None:
         # the height of D above A
-        height = Require(function=lambda p: 0.1 - p.ground_length * math.sin(p.ground_angle), name="height of D")
-        solution = best(*USUAL, SMALL, height)
+        height = syn.Require(function=lambda p: 0.1 - p.ground_length * math.sin(p.ground_angle), name="height of D")
+        solution = best(*syn.USUAL, SMALL, height)
         assert solution.linkage.pins(0.0)["D"][1] - solution.linkage.pivot_y >= 0.1 - 1e-8
         from math import sin
 
-        again = Require(function=lambda p: 0.1 - p.ground_length * sin(p.ground_angle))
-        assert best(*USUAL, SMALL, again).linkage.values() == solution.linkage.values()
+        again = syn.Require(function=lambda p: 0.1 - p.ground_length * sin(p.ground_angle))
+        assert best(*syn.USUAL, SMALL, again).linkage.values() == solution.linkage.values()
 
     def test_required_equality_in_functions_of_numpy(self) -> None:
         # the coupler point on the coupler's own line, in SI and absolute places
-        on_line = Require(function=lambda p: np.sin(p.point_angle), equal=True, name="point on the coupler")
-        at = Require(function=lambda p: p.pivot_x - p.pivot_y - 0.3, equal=True, scale=0.1)
-        solution = best(*USUAL, SMALL, on_line, at)
+        on_line = syn.Require(function=lambda p: np.sin(p.point_angle), equal=True, name="point on the coupler")
+        at = syn.Require(function=lambda p: p.pivot_x - p.pivot_y - 0.3, equal=True, scale=0.1)
+        solution = best(*syn.USUAL, SMALL, on_line, at)
         assert abs(math.sin(solution.linkage.point_angle)) < 1e-6
         assert solution.linkage.pivot_x - solution.linkage.pivot_y == pytest.approx(0.3, abs=1e-7)
 
     def test_functions_that_casadi_names_otherwise(self) -> None:
-        in_degrees = Require(function=lambda p: math.degrees(p.ground_angle) - 100.0, equal=True, scale=100.0)
-        longest = Require(
+        in_degrees = syn.Require(function=lambda p: math.degrees(p.ground_angle) - 100.0, equal=True, scale=100.0)
+        longest = syn.Require(
             function=lambda p: np.maximum(math.pow(p.coupler_length, 2.0), p.rocker_length**2) - 0.0225, scale=0.01
         )
-        solution = best(*USUAL, SMALL, in_degrees, longest).linkage
+        solution = best(*syn.USUAL, SMALL, in_degrees, longest).linkage
         assert math.degrees(solution.ground_angle) == pytest.approx(100.0, abs=1e-4)
         assert max(solution.coupler_length, solution.rocker_length) <= 0.15 + 1e-7
 
@@ -324,8 +301,8 @@ class TestConstraints:
         def height(p: Any) -> Any:
             return sum([p.ground_length * np.sin(x) for x in (p.ground_angle,)])
 
-        bound = Require(function=lambda p: 0.1 - height(p))
-        solution = best(*USUAL, SMALL, bound)
+        bound = syn.Require(function=lambda p: 0.1 - height(p))
+        solution = best(*syn.USUAL, SMALL, bound)
         assert solution.linkage.pins(0.0)["D"][1] - solution.linkage.pivot_y >= 0.1 - 1e-8
 
     def test_what_loses_the_symbol_is_refused_by_name(self) -> None:
@@ -334,23 +311,23 @@ class TestConstraints:
         losing = (lambda p: float(p.pivot_x), lambda p: 1.0, lambda p: math.gamma(p.crank_length))
         for function in (branching, *losing):
             with pytest.raises(InputError, match="my rule cannot be traced"):
-                best(*USUAL, Require(function=function, name="my rule"))
+                best(*syn.USUAL, syn.Require(function=function, name="my rule"))
 
     def test_what_cannot_be_is_said_by_name(self) -> None:
-        impossible = Require(function=lambda p: 2.0 - math.cos(p.point_angle), name="a cosine of two")
-        with pytest.raises(InfeasibleError, match=r"searches the nearest violates the a cosine of two by 1"):
-            best(*USUAL, impossible)
+        impossible = syn.Require(function=lambda p: 2.0 - math.cos(p.point_angle), name="a cosine of two")
+        with pytest.raises(syn.InfeasibleError, match=r"searches the nearest violates the a cosine of two by 1"):
+            best(*syn.USUAL, impossible)
 
 
 class TestWeights:
     def test_a_heavy_point_is_met_better(self) -> None:
-        plain = best(*USUAL, LargestLink(length=0.2))
+        plain = best(*syn.USUAL, syn.LargestLink(length=0.2))
         weights = np.ones(24)
         weights[7] = 1000.0
-        heavy = best(*USUAL, LargestLink(length=0.2), weights=weights)
+        heavy = best(*syn.USUAL, syn.LargestLink(length=0.2), weights=weights)
         assert heavy.evaluation.errors[7] < 0.2 * plain.evaluation.errors[7]
         assert heavy.error == pytest.approx(float(weights @ heavy.evaluation.errors**2))
-        same = best(*USUAL, LargestLink(length=0.2), task=TimedPath(points=ellipse(24), weights=weights))
+        same = best(*syn.USUAL, syn.LargestLink(length=0.2), task=syn.TimedPath(points=ellipse(24), weights=weights))
         assert same.error == heavy.error
 
     def test_a_weight_of_zero_leaves_a_point_out(self) -> None:
@@ -358,41 +335,43 @@ class TestWeights:
         points[5] += 0.05
         weights = np.ones(24)
         weights[5] = 0.0
-        solution = best(*USUAL, SMALL, task=TimedPath(points=points, weights=weights))
+        solution = best(*syn.USUAL, SMALL, task=syn.TimedPath(points=points, weights=weights))
         assert solution.evaluation.errors[5] > 0.05
         assert np.delete(solution.evaluation.errors, 5).max() < 0.01
 
 
 class TestMovedPivot:
     @pytest.mark.parametrize(
-        "unknown", [SliderUnknown(harmonics=2), CrankUnknown(ratio=2, length=(0.01, 0.05), harmonics=1)]
+        "unknown", [syn.SliderUnknown(harmonics=2), syn.CrankUnknown(ratio=2, length=(0.01, 0.05), harmonics=1)]
     )
     def test_starts_and_linkages_are_each_others_inverse(self, unknown: Any) -> None:
-        pivot: SliderMotion | SecondCrank
-        if isinstance(unknown, SliderUnknown):
-            pivot = SliderMotion(FourierSeries(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.4, 0.5])), 0.7)
+        pivot: syn.SliderMotion | syn.SecondCrank
+        if isinstance(unknown, syn.SliderUnknown):
+            pivot = syn.SliderMotion(FourierSeries(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.4, 0.5])), 0.7)
         else:
-            pivot = SecondCrank(0.02, 2, 0.3, FourierSeries(np.array([0.0, 0.2]), np.array([0.0, 0.4])))
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
-        normal = normal_form(TASK)
-        again = linkage_of(start_of(linkage, normal, unknown), normal, unknown)
-        np.testing.assert_allclose(again.displacement(turn(9)), linkage.displacement(turn(9)), atol=1e-14)
+            pivot = syn.SecondCrank(0.02, 2, 0.3, FourierSeries(np.array([0.0, 0.2]), np.array([0.0, 0.4])))
+        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(
+            pivot
+        )
+        normal = syn.normal_form(TASK)
+        again = make_linkage(make_start(linkage, normal, unknown), normal, unknown)
+        np.testing.assert_allclose(again.displacement(syn.turn(9)), linkage.displacement(syn.turn(9)), atol=1e-14)
         assert again.values() == pytest.approx(linkage.values())
 
     def test_the_slider_keeps_stroke_speed_and_acceleration(self) -> None:
-        fixed = best(*USUAL, LargestLink(length=0.2))
-        few: dict[str, Any] = {"search": Search(starts=1, candidates=64), "guesses": [fixed]}
-        free = best(*USUAL, LargestLink(length=0.2), pivot=SliderUnknown(harmonics=2), **few)
+        fixed = best(*syn.USUAL, syn.LargestLink(length=0.2))
+        few: dict[str, Any] = {"search": syn.Search(starts=1, candidates=64), "guesses": [fixed]}
+        free = best(*syn.USUAL, syn.LargestLink(length=0.2), pivot=syn.SliderUnknown(harmonics=2), **few)
         bounded = best(
-            *USUAL,
-            LargestLink(length=0.2),
-            pivot=SliderUnknown(harmonics=2, stroke=0.01, speed=0.005, acceleration=0.01, guide_angle=(0.2, 0.4)),
+            *syn.USUAL,
+            syn.LargestLink(length=0.2),
+            pivot=syn.SliderUnknown(harmonics=2, stroke=0.01, speed=0.005, acceleration=0.01, guide_angle=(0.2, 0.4)),
             **few,
         )
         assert free.error < bounded.error < fixed.error
         pivot = bounded.linkage.pivot
-        assert isinstance(pivot, SliderMotion)
-        phi = turn(1440)
+        assert isinstance(pivot, syn.SliderMotion)
+        phi = syn.turn(1440)
         assert 0.2 - 1e-9 <= pivot.guide_angle <= 0.4 + 1e-9
         # held at 72 places
         assert pivot.stroke <= 0.01 * 1.01
@@ -402,13 +381,13 @@ class TestMovedPivot:
 
     def test_program_and_linkage_agree_on_the_error(self) -> None:
         for unknown in (
-            SliderUnknown(harmonics=1),
-            CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5),
+            syn.SliderUnknown(harmonics=1),
+            syn.CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5),
         ):
-            solution = best(*USUAL, LargestLink(length=0.3), pivot=unknown, search=replace(FEW, starts=1))
-            normal = normal_form(TASK)
-            limits = limits_of(TASK, normal, None, (*USUAL, LargestLink(length=0.3)))
-            again = Program(normal, limits, unknown).solve(start_of(solution.linkage, normal, unknown))
+            solution = best(*syn.USUAL, syn.LargestLink(length=0.3), pivot=unknown, search=replace(FEW, starts=1))
+            normal = syn.normal_form(TASK)
+            limits = make_limits(TASK, normal, None, (*syn.USUAL, syn.LargestLink(length=0.3)))
+            again = Program(normal, limits, unknown).solve(make_start(solution.linkage, normal, unknown))
             assert again.start.quality * normal.unit**2 == pytest.approx(solution.error, rel=1e-3)
 
 
@@ -437,73 +416,77 @@ class TestBetween:
         for factor in (1.0 - 1e-5, 1.0 + 1e-5):
             cosines, sines = np.zeros(3), np.zeros(3)
             cosines[2], sines[2] = factor * size * math.cos(turned), factor * size * math.sin(turned)
-            linkage = Linkage(
+            linkage = syn.Linkage(
                 ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
-                pivot=SliderMotion(FourierSeries(cosines, sines), 0.3),
+                pivot=syn.SliderMotion(FourierSeries(cosines, sines), 0.3),
             )  # fmt: skip
-            unknown = SliderUnknown(harmonics=harmonics, **{bound: most})
-            normal = normal_form(TASK)
-            program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
+            unknown = syn.SliderUnknown(harmonics=harmonics, **{bound: most})
+            normal = syn.normal_form(TASK)
+            program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
             for first in (False, True):
-                over = violations(program, start_of(linkage, normal, unknown), first=first)[name]
+                over = violations(program, make_start(linkage, normal, unknown), first=first)[name]
                 assert (over > 0.0) == (factor > 1.0)
 
     @pytest.mark.parametrize("u", [0.39, 0.41, -0.39, -0.41])
     def test_a_slider_stays_within_the_ground_link_of_its_middle(self, u: float) -> None:
-        pivot = SliderMotion(FourierSeries(np.array([u, 0.0]), np.zeros(2)), 0.3)
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
-        normal, unknown = normal_form(TASK), SliderUnknown(harmonics=1)
-        program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
-        over = violations(program, start_of(linkage, normal, unknown))["slider position"]
+        pivot = syn.SliderMotion(FourierSeries(np.array([u, 0.0]), np.zeros(2)), 0.3)
+        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(
+            pivot
+        )
+        normal, unknown = syn.normal_form(TASK), syn.SliderUnknown(harmonics=1)
+        program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
+        over = violations(program, make_start(linkage, normal, unknown))["slider position"]
         assert (over > 0.0) == (abs(u) > linkage.ground_length)
 
     @pytest.mark.parametrize("rate", [0.4999, 0.5001, -0.4999, -0.5001])
     def test_speed_of_the_second_crank(self, rate: float) -> None:
-        pivot = SecondCrank(0.02, 1, 0.3, FourierSeries(np.zeros(2), np.array([0.0, rate])))
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
-        unknown = CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5)
-        normal = normal_form(TASK)
-        program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
-        over = violations(program, start_of(linkage, normal, unknown))["speed of the second crank"]
+        pivot = syn.SecondCrank(0.02, 1, 0.3, FourierSeries(np.zeros(2), np.array([0.0, rate])))
+        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3).with_pivot(
+            pivot
+        )
+        unknown = syn.CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5)
+        normal = syn.normal_form(TASK)
+        program = Program(normal, make_limits(TASK, normal, None, syn.USUAL), unknown)
+        over = violations(program, make_start(linkage, normal, unknown))["speed of the second crank"]
         assert (over > 0.0) == (abs(rate) > 0.5)
 
     @pytest.mark.parametrize(("share", "refused"), [(1.1e-3, False), (0.9e-3, True), (7.9, False), (8.1, True)])
     def test_rotation_from_one_untimed_station_to_the_next(self, share: float, refused: bool) -> None:
-        task = UntimedPath(path=TargetPath(points=ellipse(24), closed=True), measure="distance", samples=36)
-        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3)
-        normal = normal_form(task)
+        task = syn.UntimedPath(path=syn.TargetPath(points=ellipse(24), closed=True), measure="distance", samples=36)
+        linkage = syn.Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3)
+        normal = syn.normal_form(task)
         gaps = np.full(normal.n, (normal.n - share) / (normal.n - 1.0)) * 2.0 * math.pi / normal.n
         gaps[3] = share * 2.0 * math.pi / normal.n
-        start = replace(start_of(linkage, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
-        over = violations(Program(normal, limits_of(task, normal, None, USUAL)), start)["order of the stations"]
+        start = replace(make_start(linkage, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
+        over = violations(Program(normal, make_limits(task, normal, None, syn.USUAL)), start)["order of the stations"]
         assert (over > 0.0) == refused
 
     def test_transmission_angle_on_the_way(self) -> None:
         gap = 0.4
-        task = TimedPath(points=ellipse(24)[:3], rotation=[0.0, gap, 2.0 * gap])
+        task = syn.TimedPath(points=ellipse(24)[:3], rotation=[0.0, gap, 2.0 * gap])
         # the crank lies along the ground link in the middle between two of the quarters of a gap
-        linkage = Linkage(
+        linkage = syn.Linkage(
             ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
             crank_phase=math.pi - 0.625 * gap,
         )  # fmt: skip
         least = math.asin(math.sqrt(1.0 - ((0.35**2 + 0.3**2 - 0.5**2) / (2.0 * 0.35 * 0.3)) ** 2))
-        normal = normal_form(task)
+        normal = syn.normal_form(task)
         for off in (-1e-5, 1e-5):
-            asked = (LeastTransmission(angle=least + off, over="task"), LargestLink(length=1.0))
-            limits = limits_of(task, normal, None, asked)
-            over = violations(Program(normal, limits), start_of(linkage, normal))["transmission angle"]
+            asked = (syn.LeastTransmission(angle=least + off, over="task"), syn.LargestLink(length=1.0))
+            limits = make_limits(task, normal, None, asked)
+            over = violations(Program(normal, limits), make_start(linkage, normal))["transmission angle"]
             assert (over > 0.0) == (off > 0.0)
 
     def test_transmission_angle_over_a_turn_with_a_moved_pivot(self) -> None:
-        linkage = Linkage(
+        linkage = syn.Linkage(
             ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
-            pivot=SliderMotion(FourierSeries(np.array([0.0, 0.02]), np.zeros(2)), 0.3),
+            pivot=syn.SliderMotion(FourierSeries(np.array([0.0, 0.02]), np.zeros(2)), 0.3),
         )  # fmt: skip
-        normal, unknown = normal_form(TASK), SliderUnknown(harmonics=1)
+        normal, unknown = syn.normal_form(TASK), syn.SliderUnknown(harmonics=1)
         # what is held at 96 places is held with 2.5e-3 rad to spare
         for spare in (1e-3, 4e-3):
-            limits = limits_of(TASK, normal, None, (LeastTransmission(angle=linkage.least_transmission - spare),))
-            over = violations(Program(normal, limits, unknown), start_of(linkage, normal, unknown))[
+            limits = make_limits(TASK, normal, None, (syn.LeastTransmission(angle=linkage.least_transmission - spare),))
+            over = violations(Program(normal, limits, unknown), make_start(linkage, normal, unknown))[
                 "transmission angle"
             ]
             assert (over > 0.0) == (spare < BETWEEN)
@@ -512,30 +495,32 @@ class TestBetween:
 class TestUntimed:
     def test_area_and_distance_come_to_nothing_on_a_known_curve(self) -> None:
         known = drawn(np.random.default_rng(8), least=0.9)
-        path = TargetPath(points=known.path(turn(180)), closed=True)
+        path = syn.TargetPath(points=known.path(syn.turn(180)), closed=True)
         for measure in ("area", "distance"):
-            task = UntimedPath(path=path, measure=measure, samples=48)
-            solution = best(*USUAL, task=task)
-            normal = normal_form(task)
+            task = syn.UntimedPath(path=path, measure=measure, samples=48)
+            solution = best(*syn.USUAL, task=task)
+            normal = syn.normal_form(task)
             assert solution.error < 5e-3 * normal.unit**2
             assert solution.evaluation.worst < 5e-3 * normal.unit
             assert solution.verdicts.sound
 
     def test_the_area_is_what_evaluation_finds(self) -> None:
-        phi = turn(180)
-        task = UntimedPath(path=TargetPath(points=np.column_stack([np.cos(phi), 0.6 * np.sin(phi)]), closed=True))
-        normal = normal_form(task)
-        limits = limits_of(task, normal, None, (LeastTransmission(), LargestLink(length=1.5)))
+        phi = syn.turn(180)
+        task = syn.UntimedPath(
+            path=syn.TargetPath(points=np.column_stack([np.cos(phi), 0.6 * np.sin(phi)]), closed=True)
+        )
+        normal = syn.normal_form(task)
+        limits = make_limits(task, normal, None, (syn.LeastTransmission(), syn.LargestLink(length=1.5)))
         done = polish(normal, limits, scan(normal, limits, seed=0, candidates=4096, starts=3))
         answer = done.kept[0]
-        found = evaluate(task, linkage_of(answer.start, normal), answer.start.rotation)
+        found = syn.evaluate(task, make_linkage(answer.start, normal), answer.start.rotation)
         assert answer.start.quality * normal.unit**2 == pytest.approx(found.error, rel=0.1)
 
     def test_program_needs_rotations_to_start_from(self) -> None:
-        task = Motion(points=ellipse(6), angle=turn(6))
-        normal = normal_form(task)
-        limits = limits_of(task, normal, None, USUAL)
-        start = start_of(drawn(np.random.default_rng(0)), normal)
+        task = syn.Motion(points=ellipse(6), angle=syn.turn(6))
+        normal = syn.normal_form(task)
+        limits = make_limits(task, normal, None, syn.USUAL)
+        start = make_start(drawn(np.random.default_rng(0)), normal)
         with pytest.raises(InputError, match="needs the crank rotations of its stations"):
             Program(normal, limits).solve(start)
         with pytest.raises(InputError, match="needs the crank rotations of its stations"):
@@ -546,17 +531,17 @@ class TestBadUnknowns:
     @pytest.mark.parametrize(
         ("make", "message"),
         [
-            (lambda: SliderUnknown(harmonics=-1), "harmonics is -1"),
-            (lambda: SliderUnknown(harmonics=1, guide_angle=(1.0, 0.0)), "bounds of guide_angle"),
-            (lambda: SliderUnknown(harmonics=1, stroke=0.0), "greatest stroke is 0.0"),
-            (lambda: SliderUnknown(harmonics=1, smoothness=-1.0), "smoothness is -1.0"),
-            (lambda: CrankUnknown(ratio=1, length=(0.2, 0.1)), "bounds of the second crank"),
-            (lambda: LeastTransmission(angle=2.0), "least transmission angle is 2.0"),
-            (lambda: LeastTransmission(over="way"), "over is 'way'"),
-            (lambda: Grashof(type="rocker"), "Grashof type is 'rocker'"),
-            (lambda: LargestLink(length=0.0), "largest link is 0.0"),
-            (lambda: Assembly(branch=2), "branch is 2"),
-            (lambda: PivotRegion(pivot="B", polygon=L_SHAPE), "pivot is 'B'"),
+            (lambda: syn.SliderUnknown(harmonics=-1), "harmonics is -1"),
+            (lambda: syn.SliderUnknown(harmonics=1, guide_angle=(1.0, 0.0)), "bounds of guide_angle"),
+            (lambda: syn.SliderUnknown(harmonics=1, stroke=0.0), "greatest stroke is 0.0"),
+            (lambda: syn.SliderUnknown(harmonics=1, smoothness=-1.0), "smoothness is -1.0"),
+            (lambda: syn.CrankUnknown(ratio=1, length=(0.2, 0.1)), "bounds of the second crank"),
+            (lambda: syn.LeastTransmission(angle=2.0), "least transmission angle is 2.0"),
+            (lambda: syn.LeastTransmission(over="way"), "over is 'way'"),
+            (lambda: syn.Grashof(type="rocker"), "Grashof type is 'rocker'"),
+            (lambda: syn.LargestLink(length=0.0), "largest link is 0.0"),
+            (lambda: syn.Assembly(branch=2), "branch is 2"),
+            (lambda: syn.PivotRegion(pivot="B", polygon=L_SHAPE), "pivot is 'B'"),
         ],
     )
     def test_are_named(self, make: Any, message: str) -> None:
@@ -573,4 +558,4 @@ class TestBadUnknowns:
     )
     def test_regions(self, polygon: Sequence[Sequence[float]], message: str) -> None:
         with pytest.raises(InputError, match=message):
-            PivotRegion(pivot="A", polygon=polygon)
+            syn.PivotRegion(pivot="A", polygon=polygon)

@@ -16,6 +16,7 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 
+import analysis.synthesis as syn
 from analysis.studies.youssef.problems import (
     PACKAGING_FLATNESS,
     PACKAGING_OFFSET_CM,
@@ -25,24 +26,6 @@ from analysis.studies.youssef.problems import (
     PROBLEMS,
     packaging_path,
     rocker_function,
-)
-from analysis.synthesis import (
-    FullTurn,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    RockerFunction,
-    Search,
-    Synthesis,
-    UntimedPath,
-    area_between,
-    evaluate,
-    normal_form,
-    straightest_part,
-    straightness,
-    synthesize,
-    trade_off,
-    turn,
 )
 from tests import published
 
@@ -64,7 +47,7 @@ def read(name: str) -> tuple[float, ...]:
     return tuple(row)
 
 
-def row_of(linkage: Linkage) -> tuple[float, ...]:
+def row_of(linkage: syn.Linkage) -> tuple[float, ...]:
     """A linkage in cm and degrees."""
     return (*(100.0 * linkage.vector[:7]), *np.degrees(linkage.vector[7:]))
 
@@ -105,9 +88,9 @@ def error_of(name: str, row: tuple[float, ...], side: int = 1, offset_deg: float
 
 
 @cache
-def solved(name: str) -> Synthesis:
+def solved(name: str) -> syn.Synthesis:
     p = PROBLEMS[name]
-    return synthesize(p.task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES))
+    return syn.synthesize(p.task, p.bounds, p.constraints, search=syn.Search(starts=STARTS, candidates=CANDIDATES))
 
 
 # The printed linkages
@@ -127,7 +110,7 @@ def test_printed_data(name: str) -> None:
 @pytest.mark.parametrize("name", published.CHAPTER_6_ERRORS)
 def test_printed_linkages_evaluate_to(name: str) -> None:
     p, known = PROBLEMS[name], published.CHAPTER_6_ERRORS[name]
-    error = p.convert(evaluate(p.task, p.linkage).error)
+    error = p.convert(syn.evaluate(p.task, p.linkage).error)
     assert error == pytest.approx(known.true, abs=known.digits)
     assert error == pytest.approx(error_of(name, read(name)), rel=1e-9)
 
@@ -137,14 +120,14 @@ def test_what_the_misprints_would_give(name: str) -> None:
     """As printed the curve is far off, and the error a multiple of the stated one."""
     p = PROBLEMS[name]
     assert p.error is not None
-    assert p.convert(evaluate(p.task, p.printed).error) > 3.0 * p.error
+    assert p.convert(syn.evaluate(p.task, p.printed).error) > 3.0 * p.error
 
 
 def test_no_rounding_of_its_digits_gives_ellipse_a_its_printed_error() -> None:
     p = PROBLEMS["ellipse-a"]
     half = np.array([5e-5] * 7 + [radians(5e-3)] * 3)
     errors = [
-        p.convert(evaluate(p.task, Linkage.from_vector(p.linkage.vector + half * signs, 1)).error)
+        p.convert(syn.evaluate(p.task, syn.Linkage.from_vector(p.linkage.vector + half * signs, 1)).error)
         for signs in product((-1.0, 1.0), repeat=10)
     ]
     assert (min(errors), max(errors)) == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
@@ -153,8 +136,10 @@ def test_no_rounding_of_its_digits_gives_ellipse_a_its_printed_error() -> None:
 def test_the_rocker_functions_number_of_crank_angles_matters() -> None:
     p = PROBLEMS["rocker"]
     true, least = published.ROCKER_AT_48
-    assert p.convert(evaluate(rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
-    found = synthesize(rocker_function(48), p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best
+    assert p.convert(syn.evaluate(rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
+    found = syn.synthesize(
+        rocker_function(48), p.bounds, p.constraints, search=syn.Search(starts=4, candidates=1 << 13)
+    ).best
     assert p.convert(found.error) == pytest.approx(least, abs=0.05)
 
 
@@ -165,7 +150,7 @@ def test_the_window_includes_its_ends() -> None:
     weights = np.array(task.weights)
     assert np.flatnonzero(weights > 1.0).tolist() == list(range(4, 18))
     weights[4] = 1.0
-    assert p.convert(evaluate(replace(task, weights=weights), p.linkage).error) == pytest.approx(35.65, abs=5e-3)
+    assert p.convert(syn.evaluate(replace(task, weights=weights), p.linkage).error) == pytest.approx(35.65, abs=5e-3)
     many = rocker_function(72, weighted=True)
     assert window_sum(many, p.linkage) == pytest.approx(published.WINDOW_SUM, abs=0.05)
     # 260 is a station of these
@@ -173,22 +158,22 @@ def test_the_window_includes_its_ends() -> None:
     assert window_sum(short, p.linkage) == pytest.approx(94.2, abs=0.05)
 
 
-def window_sum(task: RockerFunction, linkage: Linkage) -> float:
+def window_sum(task: syn.RockerFunction, linkage: syn.Linkage) -> float:
     """Sum of squared errors where the weight is that of the window (deg2)."""
-    return float(np.sum(np.degrees(evaluate(task, linkage).errors[np.asarray(task.weights) > 1.0]) ** 2))
+    return float(np.sum(np.degrees(syn.evaluate(task, linkage).errors[np.asarray(task.weights) > 1.0]) ** 2))
 
 
 def test_the_printed_packaging_machine() -> None:
     p = PROBLEMS["packaging"]
     travel, flatness, area, transmission = published.PACKAGING
-    curve = p.linkage.path(turn(72))
-    part = straightest_part(curve, 25, direction=0.0, least_travel=PACKAGING_TRAVEL)
+    curve = p.linkage.path(syn.turn(72))
+    part = syn.straightest_part(curve, 25, direction=0.0, least_travel=PACKAGING_TRAVEL)
     assert 100.0 * part.travel == pytest.approx(travel, abs=0.05)
     assert 100.0 * part.flatness == pytest.approx(flatness, abs=5e-3)
-    assert 1e4 * area_between(curve, packaging_path()) == pytest.approx(area, abs=0.5)
+    assert 1e4 * syn.area_between(curve, packaging_path()) == pytest.approx(area, abs=0.5)
     # the points that the task has in place of two of the ten leave the polygon what it is
-    assert isinstance(p.task, UntimedPath)
-    assert area_between(packaging_path().points, p.task.path) == pytest.approx(0.0, abs=1e-12)
+    assert isinstance(p.task, syn.UntimedPath)
+    assert syn.area_between(packaging_path().points, p.task.path) == pytest.approx(0.0, abs=1e-12)
     assert degrees(p.linkage.least_transmission) == pytest.approx(transmission, abs=0.05)
     assert p.linkage.pivot_y < PACKAGING_OFFSET_CM[1] / 100.0
 
@@ -209,7 +194,7 @@ def test_goals(name: str) -> None:
     assert best.verdicts.full_turn
     if name not in ROCKERS:
         assert best.linkage.least_transmission >= radians(40.0) - 1e-6
-        largest = max((c.length for c in p.constraints if isinstance(c, LargestLink)), default=0.3)
+        largest = max((c.length for c in p.constraints if isinstance(c, syn.LargestLink)), default=0.3)
         assert max(*best.linkage.vector[2:7]) <= largest * (1.0 + 1e-6)
     for dimension, (low, high) in p.bounds.items():
         assert low - 1e-9 <= getattr(best.linkage, dimension) <= high + 1e-9
@@ -217,24 +202,25 @@ def test_goals(name: str) -> None:
 
 def test_the_caps_are_the_printed_longest_links() -> None:
     caps = {
-        name: [100.0 * c.length for c in p.constraints if isinstance(c, LargestLink)] for name, p in PROBLEMS.items()
+        name: [100.0 * c.length for c in p.constraints if isinstance(c, syn.LargestLink)]
+        for name, p in PROBLEMS.items()
     }
     expected = {"ellipse-a": 112.85, "ellipse-b": 216.94, "path-a": 139.25, "path-b": 184.443, "packaging": 435.15}
     assert {name: cap[0] for name, cap in caps.items() if cap} == pytest.approx(expected)
     for name, p in PROBLEMS.items():
-        asked = FullTurn if name in ROCKERS else LeastTransmission
+        asked = syn.FullTurn if name in ROCKERS else syn.LeastTransmission
         assert [c for c in p.constraints if isinstance(c, asked)]
 
 
 def test_packaging_machine_pushes_straight() -> None:
     best = solved("packaging").best
-    straight = normal_form(best.task).straight
+    straight = syn.normal_form(best.task).straight
     assert straight is not None
     assert best.evaluation.rotation is not None
     first, last = best.evaluation.rotation[[straight.start, straight.end]]
     assert abs(last - first) <= PACKAGING_ROTATION + 1e-8
     point = pins(row_of(best.linkage), np.linspace(first, last, 500), best.linkage.branch)[0]
-    part = straightness(np.column_stack([point.real, point.imag]), direction=0.0)
+    part = syn.straightness(np.column_stack([point.real, point.imag]), direction=0.0)
     assert part.travel >= 100.0 * PACKAGING_TRAVEL
     assert part.flatness < 100.0 * PACKAGING_FLATNESS
     assert np.abs(point.imag - PACKAGING_OFFSET_CM[1]).max() < 2.5
@@ -244,13 +230,15 @@ def test_packaging_machine_pushes_straight() -> None:
 def test_a_free_mounting_angle() -> None:
     p = PROBLEMS["rocker-weighted"]
     task = rocker_function(72, weighted=True, mounting=True)
-    best = synthesize(task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES)).best
+    best = syn.synthesize(task, p.bounds, p.constraints, search=syn.Search(starts=STARTS, candidates=CANDIDATES)).best
     assert window_sum(task, best.linkage) == pytest.approx(published.WINDOW_SUM_MOUNTED, abs=0.05)
     # another output angle is worse: the one found is the best for these links
     for step in (-1e-3, 1e-3):
         other = replace(best.linkage, output_angle=best.linkage.output_angle + step)
-        assert evaluate(task, other).error > best.error
-    twice = synthesize(p.task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES)).best
+        assert syn.evaluate(task, other).error > best.error
+    twice = syn.synthesize(
+        p.task, p.bounds, p.constraints, search=syn.Search(starts=STARTS, candidates=CANDIDATES)
+    ).best
     assert twice.linkage.output_angle == 0.0
 
 
@@ -258,7 +246,7 @@ def test_a_free_mounting_angle() -> None:
 def test_error_against_transmission_angle(name: str) -> None:
     p = PROBLEMS[name]
     angles = np.radians([0.0, 30.0, 40.0, 50.0])
-    found = trade_off(p.task, "transmission", angles, constraints=p.constraints, search=Search(starts=3))
+    found = syn.trade_off(p.task, "transmission", angles, constraints=p.constraints, search=syn.Search(starts=3))
     errors = p.convert(1.0) * np.asarray(found.error.filled(np.nan))
     assert errors[0] <= p.goal
     assert (np.diff(errors) > 0.0).all()
@@ -278,6 +266,6 @@ def test_what_the_thesis_bounds() -> None:
     assert bounds["crank_length"][1] == pytest.approx(0.1)
     assert bounds["point_distance"][1] == pytest.approx(0.3)
     task = PROBLEMS["packaging"].task
-    assert isinstance(task, UntimedPath)
+    assert isinstance(task, syn.UntimedPath)
     assert task.straight is not None
     assert degrees(task.straight.rotation) == pytest.approx(120.0)

@@ -9,35 +9,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.synthesis import (
-    Assembly,
-    Constraint,
-    FullTurn,
-    Grashof,
-    InfeasibleError,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    Motion,
-    PrecisionPoints,
-    RockerFunction,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    evaluate,
-    normal_form,
-    turn,
-)
-from analysis.synthesis.search.polish import quality_of
+import analysis.synthesis as syn
+from analysis.synthesis.search.polish import sum_of_squares
 from analysis.synthesis.search.scan import SHAPES, Candidates, _placed, _shapes, scan
-from analysis.synthesis.search.start import linkage_of
-from analysis.synthesis.task.limits import Limits, limits_of
+from analysis.synthesis.search.start import make_linkage
+from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
 
 FloatArray = NDArray[np.float64]
 
-KNOWN = Linkage(
+KNOWN = syn.Linkage(
     pivot_x=0.3,
     pivot_y=-0.2,
     ground_length=0.4,
@@ -52,25 +33,25 @@ KNOWN = Linkage(
 )
 
 
-def stated(task: Task, *constraints: Constraint, **bounds: tuple[float, float]) -> tuple[Normal, Limits]:
-    normal = normal_form(task)
-    return normal, limits_of(task, normal, bounds, constraints)
+def stated(task: syn.Task, *constraints: syn.Constraint, **bounds: tuple[float, float]) -> tuple[Normal, Limits]:
+    normal = syn.normal_form(task)
+    return normal, make_limits(task, normal, bounds, constraints)
 
 
-def shape(linkage: Linkage, *, phase: float = 0.0, distance: float = 0.0, direction: float = 0.0) -> FloatArray:
+def shape(linkage: syn.Linkage, *, phase: float = 0.0, distance: float = 0.0, direction: float = 0.0) -> FloatArray:
     """A row of candidates with the shape of a linkage."""
     links = np.array([linkage.crank_length, linkage.coupler_length, linkage.rocker_length]) / linkage.ground_length
     return np.array([[*links, phase, distance, direction, 0.0, 0.0, 0.0]])
 
 
-def first(candidates: Candidates, normal: Normal) -> Linkage:
+def first(candidates: Candidates, normal: Normal) -> syn.Linkage:
     """The first candidate's linkage."""
     from analysis.synthesis.search.start import Start
 
-    return linkage_of(Start(q=candidates.q[0], branch=candidates.branch), normal)
+    return make_linkage(Start(q=candidates.q[0], branch=candidates.branch), normal)
 
 
-def same(a: Linkage, b: Linkage) -> None:
+def same(a: syn.Linkage, b: syn.Linkage) -> None:
     """Make sure that they are equal to rounding, angles to whole turns."""
     for name, value in a.values().items():
         left = value - b.values()[name]
@@ -79,8 +60,8 @@ def same(a: Linkage, b: Linkage) -> None:
 
 class TestVariableProjection:
     def test_place_size_direction_and_coupler_point_follow_from_shape_and_phase(self) -> None:
-        rotation = turn(16)
-        normal, limits = stated(TimedPath(points=KNOWN.path(rotation), rotation=rotation))
+        rotation = syn.turn(16)
+        normal, limits = stated(syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation))
         found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), KNOWN)
@@ -88,20 +69,20 @@ class TestVariableProjection:
     def test_the_coupler_angle_follows_as_well(self) -> None:
         rotation = np.linspace(0.0, 4.0, 9)
         angle = KNOWN.coupler_angle(rotation) + 0.9
-        normal, limits = stated(Motion(points=KNOWN.path(rotation), angle=angle, rotation=rotation))
+        normal, limits = stated(syn.Motion(points=KNOWN.path(rotation), angle=angle, rotation=rotation))
         found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), replace(KNOWN, output_angle=0.9))
 
     def test_a_rocker_function_is_compared_at_its_mounting_angle(self) -> None:
-        rotation = turn(12)
+        rotation = syn.turn(12)
         angle = KNOWN.rocker_angle(rotation) + 0.4
         row = shape(KNOWN, phase=1.1 / (2.0 * pi))
-        normal, limits = stated(RockerFunction(angle=angle, rotation=rotation, mounting=True))
+        normal, limits = stated(syn.RockerFunction(angle=angle, rotation=rotation, mounting=True))
         found = _placed(normal, limits, row, 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-20)
         assert found.q[0, 10] == pytest.approx(0.4)
-        normal, limits = stated(RockerFunction(angle=angle, rotation=rotation))
+        normal, limits = stated(syn.RockerFunction(angle=angle, rotation=rotation))
         assert _placed(normal, limits, row, 1, 0).quality[0] == pytest.approx(12 * 0.4**2)
 
     def test_it_is_the_weighted_least_squares_optimum(self) -> None:
@@ -109,11 +90,11 @@ class TestVariableProjection:
         random = np.random.default_rng(0)
         points = random.normal(size=(10, 2))
         weights = random.uniform(0.2, 3.0, 10)
-        normal, limits = stated(TimedPath(points=points, weights=weights))
+        normal, limits = stated(syn.TimedPath(points=points, weights=weights))
         found = _placed(normal, limits, shape(KNOWN, phase=0.3), 1, 0)
         best = first(found, normal)
-        task = TimedPath(points=points, weights=weights)
-        error = evaluate(task, best).error
+        task = syn.TimedPath(points=points, weights=weights)
+        error = syn.evaluate(task, best).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-8)
         turned = best.scaled(1.01)
         others = [
@@ -125,23 +106,25 @@ class TestVariableProjection:
             replace(best, point_distance=best.point_distance + 0.01),
             replace(best, point_angle=best.point_angle + 0.01),
         ]
-        assert all(evaluate(task, other).error > error for other in others)
+        assert all(syn.evaluate(task, other).error > error for other in others)
 
     def test_bounds_on_links_hold_and_the_rest_follows_once_more(self) -> None:
-        rotation = turn(16)
+        rotation = syn.turn(16)
         normal, limits = stated(
-            TimedPath(points=KNOWN.path(rotation), rotation=rotation), LargestLink(length=0.3), Assembly(branch=1)
+            syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation),
+            syn.LargestLink(length=0.3),
+            syn.Assembly(branch=1),
         )
         found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         linkage = first(found, normal)
         assert linkage.largest_link == pytest.approx(0.3)
         assert linkage.point_distance <= 0.3
         assert found.quality[0] > 1e-4
-        error = evaluate(TimedPath(points=KNOWN.path(rotation), rotation=rotation), linkage).error
+        error = syn.evaluate(syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation), linkage).error
         assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-9)
         moved = [linkage.moved(0.01, 0.0), linkage.moved(0.0, 0.01)]
-        task = TimedPath(points=KNOWN.path(rotation), rotation=rotation)
-        assert all(evaluate(task, other).error > evaluate(task, linkage).error for other in moved)
+        task = syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation)
+        assert all(syn.evaluate(task, other).error > syn.evaluate(task, linkage).error for other in moved)
 
 
 class TestUntimed:
@@ -152,8 +135,10 @@ class TestUntimed:
     @pytest.mark.parametrize("way", [1, -1])
     @pytest.mark.parametrize("begin", [0, 17, 90])
     def test_a_closed_curve_is_laid_over_itself_whatever_its_start_and_direction(self, begin: int, way: int) -> None:
-        points = np.roll(KNOWN.path(turn(120)), -begin, axis=0)[::way]
-        normal, limits = stated(UntimedPath(path=TargetPath(points=points, closed=True)), LargestLink(length=2.0))
+        points = np.roll(KNOWN.path(syn.turn(120)), -begin, axis=0)[::way]
+        normal, limits = stated(
+            syn.UntimedPath(path=syn.TargetPath(points=points, closed=True)), syn.LargestLink(length=2.0)
+        )
         row = shape(KNOWN, distance=self.DISTANCE, direction=0.7 / (2.0 * pi))
         found = _placed(normal, limits, row, 1, 0)
         linkage = first(found, normal)
@@ -173,7 +158,9 @@ class TestUntimed:
     @pytest.mark.parametrize("way", [1, -1])
     def test_an_open_piece_is_found_on_the_curve(self, way: int) -> None:
         points = KNOWN.path(np.linspace(1.0, 3.3, 40))[::way]
-        normal, limits = stated(UntimedPath(path=TargetPath(points=points, closed=False)), LargestLink(length=2.0))
+        normal, limits = stated(
+            syn.UntimedPath(path=syn.TargetPath(points=points, closed=False)), syn.LargestLink(length=2.0)
+        )
         row = shape(KNOWN, distance=self.DISTANCE, direction=0.7 / (2.0 * pi))
         found = _placed(normal, limits, row, 1, 0)
         assert found.rotation is not None
@@ -184,7 +171,9 @@ class TestUntimed:
         assert apart.max() < 0.05 * normal.unit
 
     def test_precision_points_come_in_order(self) -> None:
-        normal, limits = stated(PrecisionPoints(points=KNOWN.path(np.linspace(0.0, 3.0, 5))), LeastTransmission())
+        normal, limits = stated(
+            syn.PrecisionPoints(points=KNOWN.path(np.linspace(0.0, 3.0, 5))), syn.LeastTransmission()
+        )
         for start in scan(normal, limits, seed=3, candidates=4096, starts=8):
             assert start.rotation is not None
             steps = np.diff(start.rotation)
@@ -195,45 +184,45 @@ class TestUntimed:
 class TestShapes:
     @pytest.mark.parametrize("type_", ["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"])
     def test_only_the_type_asked_for_is_tried(self, type_: str) -> None:
-        task = TimedPath(points=KNOWN.path(turn(8)))
-        _, limits = stated(task, Grashof(type=type_))
+        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
+        _, limits = stated(task, syn.Grashof(type=type_))
         rows = np.vstack(list(_shapes(limits, 0, 300)))
         # about one in a hundred is a drag link
         assert len(rows) > 100
         for l2, l3, l4 in rows[:, :3]:
-            linkage = Linkage(ground_length=1.0, crank_length=l2, coupler_length=l3, rocker_length=l4)
+            linkage = syn.Linkage(ground_length=1.0, crank_length=l2, coupler_length=l3, rocker_length=l4)
             assert linkage.grashof == type_
 
     def test_only_transmission_angles_asked_for_are_tried_within_the_ranges(self) -> None:
-        task = TimedPath(points=KNOWN.path(turn(8)))
-        _, limits = stated(task, LeastTransmission(angle=0.9))
+        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
+        _, limits = stated(task, syn.LeastTransmission(angle=0.9))
         rows = np.vstack(list(_shapes(limits, 0, 300)))
         for l2, l3, l4 in rows[:, :3]:
-            linkage = Linkage(ground_length=1.0, crank_length=l2, coupler_length=l3, rocker_length=l4)
+            linkage = syn.Linkage(ground_length=1.0, crank_length=l2, coupler_length=l3, rocker_length=l4)
             assert linkage.least_transmission >= 0.9 - 1e-12
         for column, (low, high) in zip(rows.T, SHAPES):
             assert low <= column.min()
             assert column.max() <= high
 
     def test_shapes_that_no_size_can_fit_are_left_out(self) -> None:
-        task = TimedPath(points=KNOWN.path(turn(8)))
+        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
         _, limits = stated(task, ground_length=(0.3, 0.5), crank_length=(0.2, 0.25))
         rows = np.vstack(list(_shapes(limits, 0, 300)))
         assert rows[:, 0].min() >= 0.4 - 1e-12
         assert rows[:, 0].max() <= 0.25 / 0.3 + 1e-12
 
     def test_where_none_is_left_it_says_so(self) -> None:
-        task = TimedPath(points=KNOWN.path(turn(8)))
+        task = syn.TimedPath(points=KNOWN.path(syn.turn(8)))
         normal, limits = stated(
             task,
-            FullTurn(),
+            syn.FullTurn(),
             ground_length=(1.0, 1.1),
             crank_length=(0.3, 0.4),
             coupler_length=(1.2, 1.3),
             rocker_length=(0.05, 0.1),
         )
         with pytest.raises(
-            InfeasibleError,
+            syn.InfeasibleError,
             match=r"no shape of four-bar is within the bounds of the links and has a crank that turns fully",
         ):
             scan(normal, limits, seed=0, candidates=256, starts=4)
@@ -241,42 +230,42 @@ class TestShapes:
 
 class TestStarts:
     def test_they_are_what_their_quality_says_and_best_first(self) -> None:
-        task = TimedPath(points=KNOWN.path(turn(18)) + 0.01 * np.random.default_rng(0).normal(size=(18, 2)))
-        normal, limits = stated(task, LeastTransmission())
+        task = syn.TimedPath(points=KNOWN.path(syn.turn(18)) + 0.01 * np.random.default_rng(0).normal(size=(18, 2)))
+        normal, limits = stated(task, syn.LeastTransmission())
         starts = scan(normal, limits, seed=1, candidates=4096, starts=10)
         assert len(starts) == 10
         qualities = [s.quality for s in starts]
         assert qualities == sorted(qualities)
         for start in starts:
-            assert quality_of(normal, start) == pytest.approx(start.quality, rel=1e-6)
-            linkage = linkage_of(start, normal)
-            assert evaluate(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
+            assert sum_of_squares(normal, start) == pytest.approx(start.quality, rel=1e-6)
+            linkage = make_linkage(start, normal)
+            assert syn.evaluate(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
 
     @pytest.mark.parametrize("closed", [True, False])
     def test_more_than_could_be_placed_are_those_that_were(self, closed: bool) -> None:
-        path = TargetPath(points=KNOWN.path(turn(36))[: None if closed else 12], closed=closed)
-        normal, limits = stated(UntimedPath(path=path), LargestLink(length=2.0))
+        path = syn.TargetPath(points=KNOWN.path(syn.turn(36))[: None if closed else 12], closed=closed)
+        normal, limits = stated(syn.UntimedPath(path=path), syn.LargestLink(length=2.0))
         starts = scan(normal, limits, seed=1, candidates=4096, starts=4096)
         assert 0 < len(starts) < 1000
         assert max(s.quality for s in starts) < 1e6
         assert all(np.isfinite(s.rotation).all() for s in starts if s.rotation is not None)
 
     def test_the_same_seed_gives_the_same_and_another_others(self) -> None:
-        normal, limits = stated(TimedPath(points=KNOWN.path(turn(18))), LeastTransmission())
+        normal, limits = stated(syn.TimedPath(points=KNOWN.path(syn.turn(18))), syn.LeastTransmission())
         a, b, c = (scan(normal, limits, seed=seed, candidates=4096, starts=5) for seed in (1, 1, 2))
         assert all((x.q == y.q).all() for x, y in zip(a, b))
         assert not all((x.q == y.q).all() for x, y in zip(a, c))
 
     def test_none_is_near_another(self) -> None:
-        normal, limits = stated(TimedPath(points=KNOWN.path(turn(18))), LeastTransmission())
+        normal, limits = stated(syn.TimedPath(points=KNOWN.path(syn.turn(18))), syn.LeastTransmission())
         starts = scan(normal, limits, seed=1, candidates=8192, starts=12)
         marks = [np.array([*np.log(s.q[3:6] / s.q[2]), np.cos(s.q[8]), np.sin(s.q[8]), 5.0 * s.branch]) for s in starts]
         apart = [np.abs(a - b).max() for i, a in enumerate(marks) for b in marks[:i]]
         assert min(apart) >= 0.08
 
     def test_both_assemblies_are_tried_or_one(self) -> None:
-        task = TimedPath(points=KNOWN.path(turn(18)))
-        normal, limits = stated(task, LeastTransmission())
+        task = syn.TimedPath(points=KNOWN.path(syn.turn(18)))
+        normal, limits = stated(task, syn.LeastTransmission())
         assert {s.branch for s in scan(normal, limits, seed=1, candidates=4096, starts=30)} == {1, -1}
-        normal, limits = stated(task, LeastTransmission(), Assembly(branch=-1))
+        normal, limits = stated(task, syn.LeastTransmission(), syn.Assembly(branch=-1))
         assert {s.branch for s in scan(normal, limits, seed=1, candidates=4096, starts=30)} == {-1}

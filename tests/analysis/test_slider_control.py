@@ -120,33 +120,33 @@ def test_the_closed_loop_has_the_poles_and_no_static_error(held) -> None:
 
 
 def test_designs_that_cannot_be(held, hanging) -> None:
-    with pytest.raises(DesignError, match="without phase lead: use design_pid"):
+    with pytest.raises(DesignError, match="design_pid"):
         design_pi(held, bandwidth=60.0)
     with pytest.raises(DesignError, match="phase margin is 4"):
         design_pi(held, bandwidth=3.0, phase_margin=4.0)
     with pytest.raises(DesignError, match="bandwidth is -1"):
         design_pi(held, bandwidth=-1.0)
-    with pytest.raises(DesignError, match="with 2 free ones use design_lqr"):
+    with pytest.raises(DesignError, match="design_lqr"):
         design_pid(hanging, bandwidth=50.0)
-    with pytest.raises(DesignError, match="either its poles or its bandwidth"):
+    with pytest.raises(DesignError, match=r"poles.*bandwidth"):
         design_pid(held)
     with pytest.raises(DesignError, match="damping is 0"):
         design_pid(held, bandwidth=1.0, damping=0.0)
     for poles in ([-1.0, -2.0], [-1.0, -2.0 + 1.0j, -2.0], [1.0, -2.0, -3.0]):
-        with pytest.raises(DesignError, match="left of the imaginary axis"):
+        with pytest.raises(DesignError, match="poles"):
             design_pid(held, poles=poles)
     with pytest.raises(UnknownNameError, match=r"crank\.speed"):
         design_lqr(held, {"crank.speed": 1.0})
     with pytest.raises(DesignError, match="shape"):
         design_lqr(held, [1.0, 2.0, 3.0])
-    with pytest.raises(DesignError, match="none below zero"):
+    with pytest.raises(DesignError, match="weights"):
         design_lqr(held, [1.0, -2.0])
-    with pytest.raises(DesignError, match="weight of the force is 0"):
+    with pytest.raises(DesignError, match="force is 0"):
         design_lqr(held, WEIGHTS, 0.0)
     turning = linearise(TABLE_3_1, (0.0, 0.0, 40.0, 0.0))
     with pytest.raises(DesignError, match=r"crank\.angle is free and turns at 40 rad/s"):
         design_lqr(turning, {"slider.position": 1e6, "crank.angle": 1.0})
-    with pytest.raises(DesignError, match="weight of the integral is -1"):
+    with pytest.raises(DesignError, match="integral is -1"):
         design_lqr(held, WEIGHTS, integral=-1.0)
 
 
@@ -160,7 +160,7 @@ def test_a_crank_that_no_slider_force_holds_is_reported() -> None:
 
 @pytest.mark.parametrize(
     ("damping", "bandwidth", "reason"),
-    [(30.0, 35.0, r"comes back to 1 at .* near the resonance"), (5.5, 6.0, "closed loop is not stable")],
+    [(30.0, 35.0, "design_pid"), (5.5, 6.0, "closed loop is not stable")],
 )
 def test_a_pi_near_a_light_resonance_is_refused(damping, bandwidth, reason) -> None:
     p = replace(SETS["rig-2-spring-c"].parameters, slider_damping=damping)
@@ -294,7 +294,7 @@ def test_a_loop_that_loses_the_assembly_ends_there() -> None:
     assert loop.status == loop.trajectory.status == 3
     assert "limit of assembly" in loop.message
     assert 10 < len(loop.time) == len(loop.states) == len(loop.trajectory) < 100
-    with pytest.raises(InputError, match="did not reach its end: in the step"):
+    with pytest.raises(InputError, match="reach its end"):
         loop.metrics(band=1e-3)
 
 
@@ -347,21 +347,21 @@ def test_the_fmu_runs_the_same_loop(fmu, held) -> None:
 def test_bad_loops_are_reported(held) -> None:
     design = design_lqr(held, WEIGHTS)
     for period in (0.0, float("nan")):
-        with pytest.raises(InputError, match="sampling period is"):
+        with pytest.raises(InputError, match="sampling period"):
             SampledController(design, period)
     with pytest.raises(InputError, match="limit of the force"):
         SampledController(design, 1e-3, limit=0.0)
     controller = SampledController(design, 1e-2)
-    with pytest.raises(InputError, match="force is among the inputs, but it is the controller's"):
+    with pytest.raises(InputError, match="force is among the inputs"):
         control_loop(TABLE_3_1, controller, 0.0, Inputs(force=1.0), initial=InitialState(), stop_time=0.1)
     with pytest.raises(InputError, match=r"reference is nan m at t = 0\.05 s"):
         control_loop(
             TABLE_3_1, controller, lambda t: 0.0 if t < 0.045 else float("nan"), initial=InitialState(), stop_time=0.1
         )
-    with pytest.raises(InputError, match="must be 2 finite numbers"):
+    with pytest.raises(InputError, match="2 finite"):
         predict_loop(held, controller, 0.0, stop_time=0.1, deviation=[1.0])
     moving = linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.5), HELD)
-    with pytest.raises(InputError, match="a state that moves"):
+    with pytest.raises(InputError, match="PeriodicModel"):
         predict_loop(moving, controller, 0.0, stop_time=0.1)
 
 
@@ -401,11 +401,11 @@ def test_metrics_of_a_known_run() -> None:
 
 def test_bad_metrics_are_reported() -> None:
     run = result([0.0, 0.5, 1.0])
-    with pytest.raises(InputError, match="band of settling"):
+    with pytest.raises(InputError, match="band"):
         run.metrics(band=0.0)
-    with pytest.raises(InputError, match="within the run"):
+    with pytest.raises(InputError, match=r"window of 5\.0"):
         run.metrics(band=0.1, window=5.0)
-    with pytest.raises(InputError, match="within the run"):
+    with pytest.raises(InputError, match=r"start at 0\.2"):
         run.metrics(band=0.1, start=0.2)
-    with pytest.raises(InputError, match="as many in both"):
+    with pytest.raises(InputError, match="3 and 2 samples"):
         largest_difference(run, result([0.0, 1.0]))

@@ -219,14 +219,6 @@ def test_next_to_a_dead_centre_there_is_no_estimate_to_draw() -> None:
     assert "linear estimate: no spread" not in [x.get_label() for x in histogram.lines]
 
 
-def test_where_the_linear_estimate_has_no_spread() -> None:
-    turn = force_turn(parameters(0.0), crank_speed=CRANK_SPEED, angles=ANGLES)
-    figure = plot(monte_carlo(turn, [Tolerance(SHIFT, 5e-3)], samples=3000), angle=0.5 * pi)
-    assert "linear estimate: no spread" in texts(figure)
-    assert "linear 0 mm" in texts(figure)
-    assert "its first derivatives vanish" in texts(figure)
-
-
 def test_other_units() -> None:
     figure = plot(made(), units="inch")
     band, histogram, _ = panels(figure)

@@ -53,12 +53,6 @@ class TestProjection:
         # the slider pin is on the guide, at its position
         assert scene.at(pose.slide) == pytest.approx(pose.slider_pin, abs=1e-6)
 
-    def test_nearer_is_in_front(self) -> None:
-        """From azimuth -90 deg the eye is at -z of the ground: the first faces painted are those furthest along z."""
-        scene, _ = scene_of(OFFSET, 0.5, 0.0, (0.0, -90.0))
-        assert scene.view[2] == pytest.approx([0.0, 0.0, -1.0], abs=1e-12)
-        assert scene.page([0.0, 1.0, 0.0]) == pytest.approx([1.0, 0.0], abs=1e-12)
-
     def test_azimuth_turns_from_j_to_k(self) -> None:
         scene, _ = scene_of(OFFSET, 0.5, 0.0, (0.0, 0.0))
         assert scene.view[2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
@@ -172,11 +166,11 @@ class TestMechanism:
             (
                 (SHORT, 0.0, 0.0),
                 AssemblyError,
-                r"1\.0668 m from the guide, the rod is 0\.9 m long, 0\.1668 m too short",
+                r"1\.0668 m .* 0\.9 m .* 0\.1668 m",
             ),
             ((OFFSET, 0.0, 1.5), AssemblyError, "m too short"),
-            ((OFFSET, np.nan, 0.0), InputError, "the crank angle is nan: it must be a finite number"),
-            ((OFFSET, 0.0, np.inf), InputError, "the shift is inf: it must be a finite number"),
+            ((OFFSET, np.nan, 0.0), InputError, "crank angle is nan"),
+            ((OFFSET, 0.0, np.inf), InputError, "shift is inf"),
         ],
     )
     def test_what_cannot_be_drawn(self, arguments, error, words) -> None:
@@ -184,7 +178,7 @@ class TestMechanism:
             plot_mechanism(*arguments)
 
     def test_units_there_are(self) -> None:
-        with pytest.raises(InputError, match="unit of a picture is 'ft': it must be one of mm, cm, m, in"):
+        with pytest.raises(InputError, match=r"'ft'.* mm, cm, m, in"):
             plot_mechanism(OFFSET, 0.0, unit="ft")
 
 

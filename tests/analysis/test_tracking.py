@@ -193,7 +193,7 @@ def test_a_run_that_loses_the_assembly_ends_there() -> None:
     result = run(TABLE_3_1, MOTION, crank_speed=44.0, plant=soft)
     assert result.loop.status == 3
     assert len(result.error) == len(result.power) == len(result.point_error) == len(result.loop.time) < 1400
-    with pytest.raises(InputError, match="did not reach its end: in the step"):
+    with pytest.raises(InputError, match="reach its end"):
         result.metrics()
 
 
@@ -208,9 +208,9 @@ def test_bad_runs_are_told(pid) -> None:
         run(revolutions=-1)
     with pytest.raises(InputError, match="crank speed is 0"):
         run(crank_speed=0.0)
-    with pytest.raises(AssemblyError, match="cannot be followed beyond"):
+    with pytest.raises(AssemblyError, match="deg of the turn"):
         run(RIG, MOTION * 100.0)
     rest = find_equilibrium(TABLE_3_1)
     free = design_lqr(linearise(TABLE_3_1, rest.state, rest.inputs), {"slider.position": 1e6, "crank.angle": 1.0})
-    with pytest.raises(InputError, match="designed for a free crank"):
+    with pytest.raises(InputError, match="free crank"):
         TrackingController(RIG, MOTION, PERIOD, design=free)

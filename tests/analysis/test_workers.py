@@ -379,7 +379,7 @@ def test_a_cluster_gives_what_one_process_does(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("work", WORK)
+@pytest.mark.parametrize("work", [kept_ensemble, timed_path, samples])
 def test_so_does_one_whose_worker_is_killed(work: Callable[[Path], list[Any]], serial: Any, tmp_path: Path) -> None:
     with new_cluster() as local, joblib.parallel_config("dask"), killing(local) as killed:
         found = work(tmp_path)
@@ -388,8 +388,7 @@ def test_so_does_one_whose_worker_is_killed(work: Callable[[Path], list[Any]], s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", ["threading", "loky"])
-@pytest.mark.parametrize("work", WORK)
+@pytest.mark.parametrize(("backend", "work"), [("threading", ensemble), ("threading", samples), ("loky", chart)])
 def test_so_do_other_backends(backend: str, work: Callable[[Path], list[Any]], serial: Any, tmp_path: Path) -> None:
     with joblib.parallel_config(backend, n_jobs=2):
         assert_same(work(tmp_path), serial(work))

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import LinkworkError
 
 from ...numerics.boundaries import Test, lowest
-from ...numerics.continuation import ContinuationError, Curve, End, Evaluate, Evaluation, Follower, Settings
+from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
 from ..motion.discretisation import OrbitError, operating_point
 from ..motion.floquet import Crossing, crossing_test
 from ..motion.orbit import PeriodicOrbit, orbit_of, orbit_through
@@ -96,22 +96,14 @@ def follow_crossing(
     unknowns = np.append(orbit.scale, x[1] - x[0])
     follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)
     begin = follower.start(np.append(orbit.start, place[0]), place[1], 1)
-
-    up = follower.follow(begin, leave=reason_to_leave)
-    down = up if up.closed else follower.follow(begin.turned(), leave=reason_to_leave)
-    points = [*up.points] if up.closed else [*reversed(down.points[1:]), *up.points]
+    points, *curves = follower.follow_both(begin, leave=reason_to_leave)
+    first_end, last_end = (curve.plane_end("" if curve.reached else curve.reason) for curve in curves)
     return CrossingCurve(
         kind=kind,
         points=np.array([[p.y[-1], p.parameter] for p in points]),
         orbits=tuple(p.data for p in points),
-        ends=(_end(down), _end(up)),
+        ends=(first_end, last_end),
     )
-
-
-def _end(curve: Curve) -> End:
-    last = curve.points[-1]
-    message = "" if curve.reached else curve.reason
-    return End(reason=curve.end, point=(float(last.y[-1]), last.parameter), message=message)
 
 
 def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:

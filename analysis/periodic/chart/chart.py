@@ -229,10 +229,8 @@ def stability_chart(
         plane to their monodromy matrix over it.
     coexisting : bool
         Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
-    n_jobs : int, optional
-        Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
-    progress : bool
-        Show a progress bar.
+    n_jobs, progress
+        See `grid`.
 
     Returns
     -------
@@ -268,32 +266,8 @@ def stability_chart(
     survey = _Survey(
         operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
     )
-    survey.note_missing_orbits()
     around = coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None
-    true = orbit_monodromy(operation, start=start, near=found)
-    # at a fold the true orbit ends, and its test function with it: folds are found on branches
-    survey.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
-    for motion, of in (beside or {}).items():
-        matrix = of(operation)
-        for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
-            survey.trace(motion, matrix, kind)
-    survey.follow_lines(np.linspace(*box.y, LINES[1]).tolist(), progress)
-    if around is not None:
-        true_ones = [traced.points for traced in survey.traced if traced.motion in _MOTION]
-        survey.follow_lines(unmet(around, survey.lines, true_ones), progress)
-        survey.most = max(survey.most, int(around.stable.max()))
-    survey.run_three_points()
-    return StabilityChart(
-        axes=survey.axes,
-        box=box,
-        grid=found,
-        boundaries=tuple(survey.traced),
-        removals=survey.removals(true),
-        runs=tuple(survey.runs),
-        most=survey.most,
-        beside=around,
-        problems=tuple(survey.problems),
-    )
+    return survey.chart({name: of(operation) for name, of in (beside or {}).items()}, around, progress)
 
 
 @dataclass(slots=True)
@@ -312,6 +286,33 @@ class _Survey:
     #: Lines y = const that were searched.
     lines: list[float] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
+
+    def chart(self, beside: Mapping[str, Monodromy], around: Coexistence | None, progress: bool) -> StabilityChart:
+        """Find the boundaries of the true orbit, of the motions ``beside``, and of others; make the long runs."""
+        self.note_missing_orbits()
+        true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
+        # at a fold the true orbit ends, and its test function with it: folds are found on branches
+        self.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
+        for motion, matrix in beside.items():
+            for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
+                self.trace(motion, matrix, kind)
+        self.follow_lines(np.linspace(*self.box.y, LINES[1]).tolist(), progress)
+        if around is not None:
+            true_ones = [traced.points for traced in self.traced if traced.motion in _MOTION]
+            self.follow_lines(unmet(around, self.lines, true_ones), progress)
+            self.most = max(self.most, int(around.stable.max()))
+        self.run_three_points()
+        return StabilityChart(
+            axes=self.axes,
+            box=self.box,
+            grid=self.grid,
+            boundaries=tuple(self.traced),
+            removals=self.removals(true),
+            runs=tuple(self.runs),
+            most=self.most,
+            beside=around,
+            problems=tuple(self.problems),
+        )
 
     def place(self, x: float, y: float) -> str:
         """Return a point of the chart in words."""

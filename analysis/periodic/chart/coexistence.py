@@ -128,15 +128,10 @@ def coexistence(
     operation : callable
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
-        Values of the axes.
     start : array_like, shape (n,), optional
         A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
-    folder : path, optional
-        Of the cache; see `grid`.
-    n_jobs : int, optional
-        Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
-    progress : bool
-        Show a progress bar.
+    folder, n_jobs, progress
+        See `grid`.
 
     Raises
     ------
@@ -281,12 +276,8 @@ def basins(
         assembled.
     start : array_like, shape (n,), optional
         Under a torque a guess of y with the crank speed; see `find_orbits`.
-    folder : path, optional
-        Of the cache; see `grid`.
-    n_jobs : int, optional
-        Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
-    progress : bool
-        Show a progress bar.
+    folder, n_jobs, progress
+        See `grid`.
 
     Raises
     ------

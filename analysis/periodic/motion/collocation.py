@@ -376,6 +376,26 @@ def spread(section, angles, start, y, w, room):
     return DONE
 
 
+@inner
+def solve_element(section, angle, h, unit, y, w, bench, into):
+    """Solve the slopes of an element from its beginning by Newton's method; return whether they were found."""
+    f = w.shape[1]
+    before = 0.0
+    for count in range(_CORRECTIONS):
+        if not condense(section, angle, h, unit, y, w, bench, into):
+            return False
+        size = 0.0
+        for row in range(into.moves.shape[0]):
+            w[row // f, row % f] += into.moves[row, 0]
+            size = max(size, abs(h * into.moves[row, 0]) / section.scale[f + row % f])
+        if not size <= (0.5 * before if count else _FAR):
+            return False
+        before = size
+        if size <= 100.0 * section.tolerance:
+            return True
+    return False
+
+
 class Neighbour(NamedTuple):
     """What is known of a neighbouring motion, by elements.
 
@@ -477,20 +497,7 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
                     ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
                 w[e, row // f, row % f] += ahead
             copy(start, y[e])
-            before = 0.0
-            for count in range(_CORRECTIONS):
-                if not condense(section, angles[e], h, unit, y[e], w[e], bench, Element(end, matrix, slope, moves[e])):
-                    return DIVERGED
-                size = 0.0
-                for row in range(moves.shape[1]):
-                    w[e, row // f, row % f] += moves[e, row, 0]
-                    size = max(size, abs(h * moves[e, row, 0]) / scale[f + row % f])
-                if not size <= (0.5 * before if count else _FAR):
-                    return DIVERGED
-                before = size
-                if size <= 100.0 * section.tolerance:
-                    break
-            else:
+            if not solve_element(section, angles[e], h, unit, y[e], w[e], bench, Element(end, matrix, slope, moves[e])):
                 return DIVERGED
             tails[e] = tail(h, scale, section.along, w[e], moves[e])
             _chain(matrix, whole, column)

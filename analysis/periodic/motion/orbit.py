@@ -540,8 +540,12 @@ class OrbitEquations:
         self.family, self.turns, self.low, self.high = family, turns, low, high
         self._bounds = [family.at(value) for value in (low, high)]
         (mechanism, drive), (other, last) = self._bounds
-        whole = np.array([0.0, drive.flow(mechanism_of(mechanism)).period * turns])
-        self.angles = whole if angles is None else angles
+        flow = drive.flow(mechanism_of(mechanism))
+        self.angles = np.array([0.0, flow.period * turns]) if angles is None else angles
+        # each piece with the next one, shape (k, n, k, n): the part of the Jacobian that stays the same
+        k, n = len(self.angles) - 1, flow.size
+        self._joined: FloatArray = np.zeros((k, n, k, n))
+        self._joined[np.arange(k), :, (np.arange(k) + 1) % k] = -np.eye(n)
         self._discretised = Discretisation(self.angles, collocation_serves((drive, last), (mechanism, other)))
         # a number of the drive varies: the equations' numbers are linear in it
         self._direction = family.direction(high, low, high) if mechanism is other else None
@@ -556,16 +560,14 @@ class OrbitEquations:
     def __call__(self, unknowns: FloatArray, value: float) -> Evaluation:
         """Evaluate the residual with its exact derivatives; raises OrbitError if a piece cannot be followed."""
         point = operating_point(*self.family.at(value))
-        k = len(self.angles) - 1
-        starts = unknowns.reshape(k, -1).copy()
-        n = starts.shape[1]
+        k, n = self._joined.shape[:2]
+        starts = unknowns.reshape(k, n).copy()
         direction = self._direction or self.family.direction(value, self.low, self.high)
         ends = self._discretised.ends(point, starts, value, direction, self.high - self.low)
-        gaps = ends.y - np.roll(starts, -1, axis=0)
-        jacobian = np.zeros((k, n, k, n))
         pieces = np.arange(k)
-        jacobian[pieces, :, pieces] = ends.matrices
-        jacobian[pieces, :, (pieces + 1) % k] -= np.eye(n)
+        gaps = ends.y - starts[(pieces + 1) % k]
+        jacobian = self._joined.copy()
+        jacobian[pieces, :, pieces] += ends.matrices
         scale = point.scale(starts[0])
         stations = None
         if k > 1:

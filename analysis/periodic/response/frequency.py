@@ -238,7 +238,6 @@ def frequency_response(
     greatest_step : float
         Greatest step of the parameter, relative to the range. Narrow resonances need small ones.
     progress : bool
-        Show a progress bar.
 
     Returns
     -------

@@ -58,9 +58,9 @@ from ..task.constraint import (
 )
 from ..task.formula import requirement
 from ..task.limit_position import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
-from ..task.limits import GEARS, limits_of_kinds
+from ..task.limits import GEARS, limits_by_kind
 from ..task.task import Task, normal_form
-from .tables import points_of, task_from
+from .tables import read_plane_points, read_task
 
 FloatArray = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class SearchTable:
     jobs: int = entry(_cores, 1)
 
     def search(self, **changes: Any) -> Search:
-        """The same as the argument of `synthesize`, with some of it changed."""
+        """Return the `Search` of the table, with some of its values changed."""
         own = {name: value for name, value in asdict(self).items() if name not in ("kinds", "gears")}
         return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
 
@@ -98,7 +98,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 
 def _error(value: Any, name: str) -> Any:
-    """The pins are to carry least, with no greater error than this."""
+    """Check the greatest error allowed for the least pin force: a length, or an angle of a rocker function."""
     try:
         quantity(value, "m", name)
     except ParameterError:
@@ -139,8 +139,8 @@ class Constraints:
     stroke: tuple[float, float] | None = entry(Range(Quantity("m", least=0.0)), None)
     largest_link: float | None = entry(Quantity("m"), None)
     assembly: int | None = entry(Whole(), None)
-    pivot_A: FloatArray | None = entry(points_of, None)
-    pivot_D: FloatArray | None = entry(points_of, None)
+    pivot_A: FloatArray | None = entry(read_plane_points, None)
+    pivot_D: FloatArray | None = entry(read_plane_points, None)
     least_mechanical_advantage: float | None = entry(Quantity("1", least=0.0), None)
     greatest_mechanical_advantage: float | None = entry(Quantity("1", above=0.0), None)
     mechanical_advantage_at: tuple[float, ...] | None = entry(Many(Quantity("rad"), single=True), None)
@@ -155,7 +155,7 @@ class Constraints:
     require: tuple[Constraint, ...] = entry(Many(requirement), ())
 
     def constraints(self) -> tuple[Constraint | Stroke, ...]:
-        """The constraints; a crank that cannot turn fully is looked at where it works."""
+        """Return the constraints; the transmission angle of a crank that cannot turn fully holds over the task alone."""
         swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
         over: Any = self.over or ("task" if swings else "turn")
         made: tuple[tuple[Any, Callable[[Any], Constraint | Stroke]], ...] = (
@@ -180,7 +180,7 @@ class Constraints:
         return (*(make(value) for value, make in made if value is not None), *self.require)
 
     def _advantage(self) -> dict[str, Any] | None:
-        """Arguments of `MechanicalAdvantage`, if it is asked for."""
+        """Return the arguments of `MechanicalAdvantage`; None if it is not asked for."""
         ends = {"least": self.least_mechanical_advantage, "greatest": self.greatest_mechanical_advantage}
         given = {name: end for name, end in ends.items() if end is not None}
         if self.mechanical_advantage_at is not None and not given:
@@ -240,26 +240,23 @@ class SynthesisCase:
         object.__setattr__(self, "constraints", tuple(made))
         # contradictions are reported before anything is searched
         if not isinstance(self.task, QuickReturn | QuickSwing):
-            limits_of_kinds(
+            limits_by_kind(
                 self.task, normal_form(self.task), self.bounds, self.constraints, self.search.kinds, self.search.gears
             )
 
     def solve(self, *, progress: bool = False) -> Synthesis:
-        """Search; see `synthesize`."""
+        """Search for linkages; see `synthesize`."""
         search, (kinds, gears) = self.search.search(progress=progress), (self.search.kinds, self.search.gears)
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
-        """The forces on the pins of solutions, by runs of the plant; None where no constraint is about them."""
+        """Run the plant for the pin forces of solutions; None where no constraint is about them."""
         if not any(isinstance(c, FORCES) for c in self.constraints):
             return None
-        return [
-            pin_forces(s.linkage, self.make, None if s.verdicts.full_turn else (s.rotation.min(), s.rotation.max()))
-            for s in solutions
-        ]
+        return [pin_forces(s.linkage, self.make, s.way) for s in solutions]
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
-        """The trade-off that is asked for, if any; see `trade_off`."""
+        """Compute the trade-off that is asked for; None if there is none. See `trade_off`."""
         wanted = self.trade_off
         if wanted is None:
             return None
@@ -301,6 +298,6 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
 def synthesis_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SynthesisCase:
-    """A synthesis from the tables of a case file; ``folder`` is where its files are looked for."""
+    """Read a synthesis from the tables of a case file; ``folder`` is where its files are looked for."""
     tables = {"title": title} | overridden(data, overrides or {})
-    return read(SynthesisCase, tables, "", readers={"task": partial(task_from, folder=folder)})
+    return read(SynthesisCase, tables, "", readers={"task": partial(read_task, folder=folder)})

@@ -39,13 +39,13 @@ FloatArray = NDArray[np.float64]
 # Readers
 
 
-def points_of(value: Any, name: str, bare: str | None = None) -> FloatArray:
-    """Points, shape (n, 2) in m; numbers without a unit are in ``bare``, by default m."""
+def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatArray:
+    """Read points, shape (n, 2) in m; numbers without a unit are in ``bare``, by default m."""
     return np.array(Many(Many(Quantity("m", bare=bare), length=2))(value, name)).reshape(-1, 2)
 
 
 def _unit(value: Any, name: str, kind: str, si: str, example: str) -> str:
-    """Unit of the numbers that have none."""
+    """Read the unit of numbers that have none."""
     try:
         quantity(f"1 {value}", si, name)
     except ParameterError:
@@ -58,7 +58,7 @@ _angle_unit = partial(_unit, kind="angle", si="rad", example="'deg'")
 
 
 def _end(value: Any, name: str) -> float | str:
-    """An end of the range of a formula's parameter; "360 deg" is an angle, "2*pi" a formula."""
+    """Read an end of the range of a formula's parameter; "360 deg" is an angle, "2*pi" a formula."""
     angle = r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z]+\s*"
     if isinstance(value, str) and not re.fullmatch(angle, value):
         return value
@@ -118,14 +118,14 @@ def _steps_or_list(value: Any, name: str) -> Any:
 
 
 def _rotation(value: Any, n: int) -> FloatArray | None:
-    """Crank rotations of n targets."""
+    """Return the crank rotations of n targets."""
     if value is None:
         return None
     return np.linspace(value.begin, value.end, n) if isinstance(value, Steps) else np.array(value)
 
 
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
-    """Weights as a list, or as windows of crank rotation, of an untimed task of point numbers, their ends included."""
+    """Read weights, as a list or as windows of crank rotation; of an untimed task windows count points, both ends included."""
     if value is None:
         return None
     name = "task.weights"
@@ -148,7 +148,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
 
 
 def _source(table: Any, sources: tuple[str, ...]) -> str:
-    """Which of the ways of giving a target is there."""
+    """Return which of the ways of giving a target is used."""
     there = [name for name in sources if getattr(table, name) is not None]
     if len(there) != 1:
         ways = " or ".join(f"task.{name}" for name in sources)
@@ -195,14 +195,14 @@ class _Curve(_Formula):
     shift: Any = entry(as_it_is, None)
 
     def _placed(self, folder: Path) -> tuple[FloatArray, bool]:
-        """Points in m, and whether they are of a closed curve."""
+        """Return the points in m, and whether their curve is closed."""
         source = _source(self, ("points", "file", "x"))
         if source != "x":
             _only_with(self, ("y", "n", "start", "end"), "x")
         if source != "file":
             _only_with(self, ("name",), "file")
         if source == "points":
-            found, closed = points_of(self.points, "task.points", self.unit), True
+            found, closed = read_plane_points(self.points, "task.points", self.unit), True
         elif source == "file":
             found, closed = read_points(folder / str(self.file), unit=self.unit, name=self.name)
         elif self.y is None:
@@ -210,7 +210,7 @@ class _Curve(_Formula):
         else:
             path = path_from_formula(str(self.x), self.y, unit=self.unit or "m", **self._range())
             found, closed = path.points, path.closed
-        shift = np.zeros(2) if self.shift is None else points_of([self.shift], "task.shift", self.unit)[0]
+        shift = np.zeros(2) if self.shift is None else read_plane_points([self.shift], "task.shift", self.unit)[0]
         if not (self.scale is None and self.turn is None and self.shift is None):
             scale, turned = 1.0 if self.scale is None else self.scale, self.turn or 0.0
             c, s = scale * cos(turned), scale * sin(turned)
@@ -271,7 +271,7 @@ class PrecisionPointsTable(_Curve):
     length: float | None = entry(Quantity("m"), None)
 
     def _body(self, folder: Path) -> dict[str, Any]:
-        """Points and directions of a body, turned with its points."""
+        """Return the points and directions of a body, turned with its points."""
         points, _ = self._placed(folder)
         rotation = _rotation(self.rotation, len(points))
         angle = None
@@ -383,7 +383,7 @@ KINDS: Mapping[str, type] = {
 }
 
 
-def task_from(value: Any, name: str, *, folder: Path) -> Task:
-    """The task of a table ``[task]``; ``folder`` is where its files are looked for."""
+def read_task(value: Any, name: str, *, folder: Path) -> Task:
+    """Read the task of a table ``[task]``; ``folder`` is where its files are looked for."""
     task: Task = Kinds({kind: Table(table) for kind, table in KINDS.items()})(value, name).task(folder)
     return task

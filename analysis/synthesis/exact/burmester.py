@@ -58,7 +58,7 @@ class Dyad:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Return its length (m)."""
         return abs(self.point - self.pivot)
 
 
@@ -88,11 +88,11 @@ class Guidance(Shown):
 
     @property
     def sound(self) -> tuple[Solution, ...]:
-        """Those without circuit, branch or order defect."""
+        """Return the solutions without circuit, branch or order defect."""
         return tuple(s for s in self.solutions if s.verdicts.sound)
 
     def describe(self) -> str:
-        """What there is, and what there is not, in a sentence."""
+        """Say in a sentence how many linkages there are."""
         there = f"{format_count(len(self.dyads), 'real dyad')} of {len(self.dyads) + self.complex_dyads}"
         if not self.solutions:
             return f"{there}: no four-bar carries a body through these poses"
@@ -132,7 +132,7 @@ class GuidanceMap(Shown):
     solutions: tuple[Solution, ...]
 
     def describe(self) -> str:
-        """How many of the pairs of dyads are sound."""
+        """Say in a sentence how many linkages there are."""
         n = len(self.points)
         return (
             f"{n} dyads on the curve of four poses: {int(self.sound.sum())} of {n * (n - 1)} pairs make a sound four-bar with "
@@ -144,7 +144,7 @@ class GuidanceMap(Shown):
 
 
 def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
-    """All four-bars that carry a body exactly through four or five poses, with their defects.
+    """Find all four-bars that carry a body exactly through four or five poses, with their defects.
 
     Parameters
     ----------
@@ -173,11 +173,11 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
     4 real dyads of 4, 6 four-bars, driven from either side: 7 of 12 sound
     """
     task, p, angle = _poses(task)
-    return _of_five(task, p, angle) if len(p) == 5 else _of_four(task, p, angle, count)
+    return _guide_five_poses(task, p, angle) if len(p) == 5 else _guide_four_poses(task, p, angle, count)
 
 
 def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
-    """Places and angles, of which there must be four or five; raises InputError as `guidance`."""
+    """Return the places and angles, four or five of each; raises InputError as `guidance`."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
         raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
     if task.rotation is not None:
@@ -194,7 +194,7 @@ def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
 
 
 def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """The four dyads of five poses, complex ones too.
+    """Compute the four dyads of five poses, complex ones too.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
-    """The linear conditions of the second and later poses on (1, zx, zy, mx, my, wx, wy), shape (n - 1, 7)."""
+    """Return the linear conditions of the second and later poses on (1, zx, zy, mx, my, wx, wy), shape (n - 1, 7)."""
     p, e = p[1:] - p[0], np.exp(1j * (angle[1:] - angle[0]))
     seen = np.conj(p) * e
     return np.column_stack(
@@ -234,7 +234,7 @@ def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
 
 
 def _forms() -> tuple[FloatArray, FloatArray]:
-    """The quadratic forms by which w = conj(m) z, of (1, zx, zy, mx, my, wx, wy)."""
+    """Return the quadratic forms by which w = conj(m) z, of (1, zx, zy, mx, my, wx, wy)."""
     real, imaginary = np.zeros((7, 7)), np.zeros((7, 7))
     real[0, 5], real[3, 1], real[4, 2] = -1.0, 1.0, 1.0
     imaginary[0, 6], imaginary[3, 2], imaginary[4, 1] = -1.0, 1.0, -1.0
@@ -245,7 +245,7 @@ _FORMS = _forms()
 
 
 def _kernel(rows: FloatArray, size: int) -> FloatArray:
-    """A basis of the vectors for which all rows are zero, in columns.
+    """Return a basis of the null space of the rows, in columns.
 
     Raises InputError if there are more than ``size`` of them.
     """
@@ -259,7 +259,7 @@ def _kernel(rows: FloatArray, size: int) -> FloatArray:
 
 
 def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
-    """Where two conics meet, (x, y, 1) in rows, shape (4, 3): roots of the resultant of their quadratics in x."""
+    """Intersect two conics: (x, y, 1) in rows, shape (4, 3), from the resultant of their quadratics in x."""
 
     def quadratics(y: complex) -> list[tuple[complex, complex, complex]]:
         return [
@@ -285,7 +285,7 @@ def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
 
 
 def _polished(rows: FloatArray, v: ComplexArray) -> ComplexArray:
-    """A solution (zx, zy, mx, my) of the conditions of five poses, after some steps of Newton's method."""
+    """Polish a solution (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
     for _ in range(8):
         zx, zy, mx, my = v
         full = np.array([1.0, zx, zy, mx, my, mx * zx + my * zy, mx * zy - my * zx])
@@ -300,7 +300,7 @@ def _polished(rows: FloatArray, v: ComplexArray) -> ComplexArray:
     return v
 
 
-def _of_five(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidance:
+def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidance:
     unit = normal_form(task).unit
     z, m = dyads_of_five(p / unit, angle)
     off = np.abs(np.column_stack([z, m]).imag).max(axis=1)
@@ -328,7 +328,7 @@ def _of_five(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidance:
 
 
 def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
-    """The four-bar of two dyads, judged as it goes from the first pose to the last."""
+    """Make the four-bar of two dyads, and judge it from the first pose to the last."""
     points, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
     turned = np.exp(1j * (angle - angle[0]))
     b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
@@ -353,7 +353,7 @@ def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
 
 
 def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: FloatArray) -> Solution:
-    """A linkage that can be joined at all targets, judged; ``sides`` is the assembly at each, +1 with C to the left of B -> D.
+    """Judge a linkage that meets all targets; ``sides`` is the assembly at each, +1 with C to the left of B -> D.
 
     Where the targets lie on both assemblies there is a branch defect; and a circuit defect if, by Grashof's criterion, one
     cannot be reached from the other.
@@ -366,7 +366,7 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
 
 
 def in_order(turned: FloatArray) -> FloatArray:
-    """Angles from the first, each to within whole turns, as rotations that go one way within a turn if they can."""
+    """Return angles, known to within whole turns, as rotations from the first that go one way if they can."""
     forward = turned % (2.0 * pi)
     # the first is 0, also where rounding made it a whole turn
     forward[0] = 0.0
@@ -377,7 +377,7 @@ def in_order(turned: FloatArray) -> FloatArray:
 
 
 def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Points of the circle-point curve of four poses, from the first place, and their pivots, where both are finite.
+    """Compute the circle-point curve of four poses, from the first place, and the pivots, where both are finite.
 
     The condition that three lines in m meet is a cubic in z that vanishes at the pole of two poses: a line through it meets the
     curve twice more.
@@ -413,13 +413,13 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _lines(row: FloatArray, z: complex) -> FloatArray:
-    """The condition of a pose on the pivot of a point z: a mx + b my + c = 0, in which a, b, c are linear in z."""
+    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot of a point z; all are linear in z."""
     turned = complex(-row[5], row[6]) * z
     constant = row[0] + row[1] * z.real + row[2] * z.imag
     return np.array([row[3] - turned.real, row[4] - turned.imag, constant])
 
 
-def _of_four(task: Poses, p: ComplexArray, angle: FloatArray, count: int) -> GuidanceMap:
+def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: int) -> GuidanceMap:
     unit = normal_form(task).unit
     z, m = dyads_of_four(p / unit, angle)
     sound, transmission = _pairs(p / unit - p[0] / unit, np.exp(1j * (angle - angle[0])), z, m)
@@ -444,7 +444,7 @@ def _of_four(task: Poses, p: ComplexArray, angle: FloatArray, count: int) -> Gui
 
 
 def _pairs(p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Of each crank, in rows, with each rocker: soundness and transmission angle of `GuidanceMap`; lengths in units."""
+    """Judge every pair of crank (row) and rocker (column): soundness and transmission angle of `GuidanceMap`."""
     places = p[:, None] + e[:, None] * z
     arms = places - m
     turned = np.array([in_order(np.angle(column / column[0])) for column in arms.T])

@@ -54,11 +54,11 @@ class Generators(Shown):
 
     @property
     def sound(self) -> tuple[Solution, ...]:
-        """Those without circuit, branch or order defect."""
+        """Return the solutions without circuit, branch or order defect."""
         return tuple(s for s in self.solutions if s.verdicts.sound)
 
     def describe(self) -> str:
-        """What there is, and what there is not, in a sentence."""
+        """Say in a sentence how many linkages there are."""
         points = format_count(len(np.asarray(self.task.angle)), "point")
         if not self.solutions:
             return f"no four-bar does the function exactly at these {points}"
@@ -75,7 +75,7 @@ class Generators(Shown):
 def function_generators(
     task: RockerFunction, *, crank_phase: Amount | None = None, ground_length: Amount = GROUND
 ) -> Generators:
-    """All four-bars whose rocker is exactly at the given angles.
+    """Find all four-bars whose rocker is exactly at the given angles.
 
     Parameters
     ----------
@@ -103,22 +103,22 @@ def function_generators(
     phi, psi = np.asarray(task.rotation), np.asarray(task.angle)
     free = 3 + task.mounting + (crank_phase is None)
     if len(phi) != free:
-        raise InputError(_count(len(phi), free, task.mounting, crank_phase))
+        raise InputError(_count_message(len(phi), free, task.mounting, crank_phase))
     phase = None if crank_phase is None else float(crank_phase)
     if phase is None and task.mounting:
-        found = _of_five(phi, psi)
+        found = _five_point_links(phi, psi)
     elif phase is None:
         found = [_links(phi + at, psi, at, 0.0) for at in _roots(lambda at: _rows(phi + at, psi))]
     elif task.mounting:
         found = [_links(phi + phase, psi - at, phase, at) for at in _roots(lambda at: _rows(phi + phase, psi - at))]
     else:
         found = [_links(phi + phase, psi, phase, 0.0)]
-    made = [_generator(task, float(ground_length), *links) for links in found if links is not None]
+    made = [_make_generator(task, float(ground_length), *links) for links in found if links is not None]
     return Generators(task=task, solutions=ranked(made))
 
 
-def _count(n: int, free: int, mounting: bool, crank_phase: object) -> str:
-    """What to say where there are not as many points as unknowns."""
+def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> str:
+    """Return the message for a number of points other than that of the unknowns."""
     unknown = ["three ratios of lengths"]
     unknown += ["the crank's phase"] if crank_phase is None else []
     unknown += ["the output's mounting"] if mounting else []
@@ -127,12 +127,12 @@ def _count(n: int, free: int, mounting: bool, crank_phase: object) -> str:
 
 
 def _rows(th2: FloatArray, th4: FloatArray) -> FloatArray:
-    """Freudenstein's equation at each point on (R1, R2, R3, 1), shape (n, 4)."""
+    """Return the coefficients (R1, R2, R3, 1) of Freudenstein's equation at each point, shape (n, 4)."""
     return np.column_stack([np.cos(th4), -np.cos(th2), np.ones(len(th2)), -np.cos(th2 - th4)])
 
 
 def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
-    """Angles at which the determinant of four equations is zero: a trigonometric polynomial of second degree."""
+    """Return the angles at which the determinant of four equations is zero: a trigonometric polynomial of second degree."""
     terms = np.fft.fft([np.linalg.det(rows(at)) for at in turn(5)]) / 5.0
     # the powers -2 ... 2 of exp(i angle), the highest first
     found = np.roots(terms[[2, 1, 0, 4, 3]])
@@ -140,7 +140,7 @@ def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
 
 
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:
-    """Links from points that agree in R1, R2, R3, in units of the ground link; None if the coupler's length is not real.
+    """Compute the links, in units of the ground link, from points that agree in R1, R2, R3; None if no coupler is real.
 
     A link of negative length is one that points the other way.
 
@@ -169,8 +169,8 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
     )
 
 
-def _of_five(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
-    """Links of five points: dyads of the rocker's poses as they are seen from the crank, B their pivot and C their point."""
+def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
+    """Compute the links of five points: dyads of the rocker's poses seen from the crank, B the pivot and C the point."""
     places = np.exp(-1j * phi)
     parts = dyads_of_five(places, psi - phi)
     real = np.abs(np.hstack(parts).imag).max(axis=1) <= REAL
@@ -183,7 +183,7 @@ def _of_five(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
     ]
 
 
-def _generator(
+def _make_generator(
     task: RockerFunction,
     ground: float,
     crank: float,
@@ -192,7 +192,7 @@ def _generator(
     crank_phase: float,
     mounting: float,
 ) -> Solution:
-    """The four-bar with these links, in units of the ground link, judged from the first point to the last."""
+    """Make the four-bar with these links, in units of the ground link, and judge it from the first point to the last."""
     th2 = np.asarray(task.rotation) + crank_phase
     th4 = np.asarray(task.angle) - mounting
     b, c = crank * np.exp(1j * th2), 1.0 + rocker * np.exp(1j * th4)
@@ -214,7 +214,7 @@ BETWEEN = 90
 
 
 def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Linkage, Linkage]:
-    """The Roberts-Chebyshev cognates of a four-bar.
+    """Compute the Roberts-Chebyshev cognates of a four-bar.
 
     Parameters
     ----------
@@ -250,13 +250,17 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     pins = {name: complex(*place) for name, place in linkage.pins(float(np.asarray(rotation))).items()}
     a, b, c, d, p = (pins[name] for name in "ABCDP")
     g = a + k * (d - a)
-    same = _between(g, g + (1.0 - k) * (b - a), d + (1.0 - k) * (b - c), d, p)
+    same = _pinned_four_bar(g, g + (1.0 - k) * (b - a), d + (1.0 - k) * (b - c), d, p)
     pin, other = a + k * (c - b), g + k * (c - d)
-    return replace(same, crank_phase=linkage.crank_phase), _between(a, pin, other, g, p), _between(g, other, pin, a, p)
+    return (
+        replace(same, crank_phase=linkage.crank_phase),
+        _pinned_four_bar(a, pin, other, g, p),
+        _pinned_four_bar(g, other, pin, a, p),
+    )
 
 
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
-    """The cognates of a solution as solutions of its task: the same curve from other pivots.
+    """Return the cognates of a solution as solutions of its task: the same curve from other pivots.
 
     A task with crank rotations keeps the one that turns with the crank; a closed path those that can turn fully.
 
@@ -293,7 +297,7 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
 
 
 def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Assemblies along the way of the cognate on A and G, driven at A and at G: +1 with its C to the left of its B -> D."""
+    """Return the assemblies along the way of the cognates on A and G, driven at A and at G: +1 with C to the left of B -> D."""
     k = _place_on_coupler(linkage)
     g = linkage.directions(rotation)
     # from A, the ground link along the real axis
@@ -309,9 +313,9 @@ def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def has_cognates(solution: Solution) -> bool:
-    """Whether `alternatives` has any: of a path, traced by a four-bar whose coupler point is neither B nor C."""
+    """Return whether `alternatives` has any: for a path traced by a four-bar whose coupler point is neither B nor C."""
     linkage = solution.linkage
-    return _is_path(solution.task) and linkage.pivot is None and not linkage.slides and _off_pins(linkage)
+    return _is_path(solution.task) and linkage.kind == "four-bar" and linkage.pivot is None and _off_pins(linkage)
 
 
 def _is_path(task: Task) -> bool:
@@ -323,13 +327,13 @@ def _off_pins(linkage: Linkage) -> bool:
 
 
 def _ratio(linkage: Linkage) -> complex:
-    """(P - B)/(C - B)."""
+    """Return (P - B)/(C - B)."""
     return linkage.point_distance / linkage.coupler_length * complex(np.exp(1j * linkage.point_angle))
 
 
 def _place_on_coupler(linkage: Linkage) -> complex:
-    """(P - B)/(C - B); raises ParameterError as `cognates`."""
-    if linkage.pivot is not None or linkage.slides:
+    """Return (P - B)/(C - B); raises ParameterError as `cognates`."""
+    if linkage.kind != "four-bar" or linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: only a four-bar has cognates")
     if not _off_pins(linkage):
         raise ParameterError(
@@ -340,8 +344,8 @@ def _place_on_coupler(linkage: Linkage) -> complex:
     return _ratio(linkage)
 
 
-def _between(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
-    """The four-bar with these pins at a crank rotation of 0."""
+def _pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
+    """Make the four-bar with these pins at a crank rotation of 0."""
     ground, arm, coupler, to_point = d - a, b - a, c - b, p - b
     return Linkage(
         pivot_x=a.real,

@@ -26,7 +26,7 @@ from scipy.optimize import minimize_scalar
 from linkwork.errors import InputError, ParameterError
 
 from ...units import Amount, in_si
-from ..linkage.linkage import LINKS, Linkage
+from ..linkage.linkage import LINKS, Linkage, SliderCrank
 from ..result.solution import Solution, ranked
 from ..task.constraint import Assembly, FullTurn, InfeasibleError, LargestLink, LeastTransmission
 from ..task.limit_position import dead_centres
@@ -71,7 +71,7 @@ class QuickReturn(SliderFunction):
 
     @property
     def advance(self) -> float:
-        """By how much the slow part of a turn is more than half of one (rad)."""
+        """Return the crank's rotation in the slow part beyond half a turn (rad)."""
         return _advance(self.time_ratio)
 
 
@@ -107,7 +107,7 @@ class QuickSwing(RockerFunction):
 
 
 def _advance(time_ratio: float) -> float:
-    """By how much the slow part of a turn is more than half of one (rad).
+    """Return the crank's rotation in the slow part beyond half a turn (rad).
 
     Raises ParameterError if the time ratio is not a finite number of 1 or more.
     """
@@ -119,7 +119,7 @@ def _advance(time_ratio: float) -> float:
 def quick_returns(
     task: QuickReturn | QuickSwing, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Any]
 ) -> tuple[Solution, ...]:
-    """The linkage with the greatest least transmission angle, in either assembly.
+    """Find the linkage with the greatest least transmission angle, in either assembly.
 
     Raises InputError if a bound or a constraint is none that this can keep; InfeasibleError if there is none; it says what
     transmission angle can be had.
@@ -162,7 +162,7 @@ def _least_angle(constraints: Sequence[Any]) -> float:
 
 
 def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -> float:
-    """The coupler between two lengths with the least cosine of the transmission angle."""
+    """Find the coupler between two lengths that has the least cosine of the transmission angle."""
     couplers = np.linspace(*ends, COUPLERS)
     cosines = np.array([cosine(float(l3)) for l3 in couplers])
     best = int(np.argmin(cosines))
@@ -188,7 +188,7 @@ class _Swing:
         self.chord = chord
 
     def links(self, l3: float) -> tuple[float, float, float, float] | None:
-        """l1 ... l4 (m); None where the dead centres are not of one assembly, or a bound is not kept."""
+        """Return l1 ... l4 (m); None where the dead centres are not of one assembly, or a bound is not kept."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
         side = 1.0 if float(self.task.swing) > 0.0 else -1.0
@@ -208,7 +208,7 @@ class _Swing:
         return made if kept else None  # type: ignore[return-value]
 
     def cosine(self, l3: float) -> float:
-        """Cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
+        """Return the cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
         links = self.links(l3)
         if links is None:
             return 1.0
@@ -217,7 +217,7 @@ class _Swing:
         return min(1.0, max(both))
 
     def linkage(self, l3: float, branch: int) -> Linkage:
-        """The crank-rocker, from the dead centre at which the slow part begins."""
+        """Make the crank-rocker, starting from the dead centre at which the slow part begins."""
         links = self.links(l3)
         assert links is not None
         l1, l2, l3, l4 = links
@@ -233,7 +233,7 @@ class _Swing:
 
 
 def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
-    """Least and greatest offset, crank and coupler (m)."""
+    """Return the least and greatest offset, crank and coupler (m)."""
     cap = min(
         (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
     )
@@ -257,13 +257,13 @@ def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[st
 
 
 def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
-    """Offset and crank for a coupler, an advance and a stroke (m)."""
+    """Return the offset and crank for a coupler, an advance and a stroke (m)."""
     l2 = sqrt(max(0.5 * h * h - l3 * l3 * (1.0 - cos(turned)), 0.0) / (1.0 + cos(turned)))
     return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
 
 
 def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
-    """Cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
+    """Return the cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     for name, value in (("ground_length", l1), ("crank_length", l2)):
         low, high = ends[name]
@@ -272,19 +272,18 @@ def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]
     return min(1.0, (l1 + l2) / l3)
 
 
-def _linkage(task: QuickReturn, l3: float, branch: int) -> Linkage:
-    """The slider-crank, its guide below the shaft: a crank that turns to the left goes slowly to the right."""
+def _linkage(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
+    """Make the slider-crank, its guide below the shaft: a crank that turns to the left goes slowly to the right."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
     # crank angle where the slider is at 0: folded, or on the other side of the shaft in line
     phase = pi + acos(l1 / (l3 - l2)) if branch > 0 else -acos(l1 / (l3 + l2))
-    return Linkage(
+    return SliderCrank(
         pivot_x=-near if branch > 0 else far,
         pivot_y=l1,
         ground_length=l1,
         crank_length=l2,
         coupler_length=l3,
-        rocker_length=0.0,
         point_distance=l3,
         ground_angle=-0.5 * pi,
         crank_phase=phase,

@@ -24,7 +24,7 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel, part
 
 
 def guided(c2, s2, dx, dy, l3, l4, branch):
-    """C on a guide at right angles to the ground link, dx beyond B, as of a rocker from a pivot at infinity; as `joined`.
+    """Close the loop with C on a guide at right angles to the ground link, a distance dx from B; see `joined`.
 
     Of CasADi's symbols too. For branch +1 C lies to the left of the way from B to the guide.
     """
@@ -39,7 +39,7 @@ joined, _guided = inner(kinematics.joined), inner(guided)
 
 @inner
 def closed(c2, s2, dx, dy, l3, l4, branch):
-    """Loop closure of a four-bar, or of a slider-crank, which has no rocker."""
+    """Close the loop of a four-bar, or of a slider-crank where there is no rocker."""
     if l4 > 0.0:
         return joined(c2, s2, dx, dy, l3, l4, branch)
     return _guided(c2, s2, dx, dy, l3, l4, branch)
@@ -64,7 +64,7 @@ COLUMNS = (*PLACES, "dx", "dy")
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
 def coupler_path(c, s, dx, dy, q, branch, out):
-    """Coupler point in the plane: out[0] = x, out[1] = y, shape (2, n)."""
+    """Compute the coupler point in the plane: out[0] = x, out[1] = y, shape (2, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
     ca, sa = cos(q[7]), sin(q[7])
@@ -83,7 +83,7 @@ def coupler_path(c, s, dx, dy, q, branch, out):
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
 def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
-    """The same, and its derivatives: jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n)."""
+    """Compute the coupler point and jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
     ca, sa = cos(q[7]), sin(q[7])
@@ -133,7 +133,7 @@ def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
 def link_directions(c, s, dx, dy, q, branch, out):
-    """Directions of coupler and rocker: out = c3, s3, c4, s4, c43, s43, shape (6, n)."""
+    """Compute the directions of coupler and rocker: out = c3, s3, c4, s4, c43, s43, shape (6, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
     for j in range(c.shape[0]):
@@ -150,7 +150,7 @@ def link_directions(c, s, dx, dy, q, branch, out):
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
 def link_jacobian(c, s, dx, dy, q, branch, out, jac):
-    """Angles of coupler and rocker from the ground link, out = th3, th4 in (-pi, pi], shape (2, n), and their derivatives.
+    """Compute the angles of coupler and rocker, out = th3, th4 in (-pi, pi], shape (2, n), and their derivatives.
 
     jac[k, 0] = dth3/d(k), jac[k, 1] = dth4/d(k) for k in `COLUMNS`, shape (12, 2, n): loop closure differentiated, projected on
     the rocker for the coupler and on the coupler for the rocker.
@@ -187,7 +187,7 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):
     purpose="the curves of linkages",
 )
 def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
-    """Directions of coupler and rocker, from the ground link, of many linkages at the same crank rotations.
+    """Compute the directions of coupler and rocker of many linkages at the same crank rotations.
 
     ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7), with l5 = 0 where there is
     no second crank; ``c, s`` are of the crank's rotations, ``cg, sg`` of the second crank's. The directions come as complex
@@ -209,7 +209,7 @@ def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
 
 @kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX), purpose="the curves of linkages")
 def match_windows(curves, target, starts, spans, best):
-    """The piece of each curve that a target looks most alike, up to a similarity: for open targets.
+    """Find the piece of each curve that is most like an open target, up to a similarity.
 
     Each curve is given at even steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and goes over
     one of ``spans`` steps. It is compared at even arc length with the target, given at even arc length about its mean, shape
@@ -275,7 +275,7 @@ STRETCH = 12
 
 @part
 def _segments(curve, target):
-    """Ends of all segments of two closed polygons, rows xa, ya, xb, yb, and their boxes, rows least and greatest x, then y."""
+    """Return the ends of all segments of two closed polygons, rows xa, ya, xb, yb, and their boxes: x, then y."""
     n, m = curve.shape[1], target.shape[1]
     ends, box = np.empty((4, n + m)), np.empty((4, n + m))
     for i in range(n + m):
@@ -291,7 +291,7 @@ def _segments(curve, target):
 
 @part
 def _banded(box, floor, scale):
-    """The first and the last band of each segment, and the segments of each band, one band after the other, from where."""
+    """Sort segments into horizontal bands: the first and last band of each, and the segments of each band."""
     total = box.shape[1]
     first, last = np.empty(total, np.int64), np.empty(total, np.int64)
     begin = np.zeros(BANDS + 1, np.int64)
@@ -313,7 +313,7 @@ def _banded(box, floor, scale):
 
 @inner
 def _cut(i, ends, box, bands, near, cuts, twins, spans):
-    """Where a segment is cut by others, from 0 to 1, and the segments that lie on it, with the spans of it.
+    """Cut a segment where others cross it, from 0 to 1; list the segments that lie on it and where.
 
     Returns the number of pieces and that of these segments.
     """
@@ -354,7 +354,7 @@ def _cut(i, ends, box, bands, near, cuts, twins, spans):
 
 @kernel(float64(MATRIX, MATRIX, MATRIX), purpose="the curves of linkages")
 def symmetric_difference(curve, target, gradient):
-    """Area between two closed polygons by the even-odd rule; its gradient with respect to the curve's vertices.
+    """Compute the area between two closed polygons by the even-odd rule, and its gradient by the curve's vertices.
 
     ``curve`` and ``target`` have the rows x, y, shape (2, n) and (2, m); ``gradient`` takes the derivatives, shape (2, n).
     """
@@ -417,7 +417,7 @@ def symmetric_difference(curve, target, gradient):
 
 @kernel(void(MATRIX, MATRIX, boolean, VECTOR, int64[::1], VECTOR), purpose="the curves of linkages")
 def nearest(points, line, closed, distance, segment, share):
-    """The nearest place of a polyline to each point: distance, number of the segment, share of it, shape (k,).
+    """Find the nearest place of a polyline to each point: distance, number of the segment, share of it, shape (k,).
 
     ``points`` and ``line`` have the rows x, y, shape (2, k) and (2, m); a closed line goes on from its last point to its first.
     """

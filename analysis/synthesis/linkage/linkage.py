@@ -1,5 +1,6 @@
-"""A linkage in the plane: the four-bar of the thesis's chapter VI, its rocker pivot fixed, sliding, on a second crank, or at
-infinity, which is a slider-crank.
+"""Linkages in the plane: the four-bar of the thesis's chapter VI, the slider-crank, and the five-bar with two cranks.
+
+Each is a type that answers what the search, the report and the drawing ask of it.
 
 The coupler point is, with the thesis's symbols (appendix 5),
 
@@ -7,18 +8,17 @@ The coupler point is, with the thesis's symbols (appendix 5),
 
 where phi is the crank's rotation from the start of the motion. Equation (6.17) as printed drops a1 in the second term.
 Angles th2, th3, th4 are those of the plant, from the ground link; a1 turns the whole linkage. Loop closure and derivatives are
-evaluated by `kernels`. Of a slider-crank the ground link is the perpendicular from the crank shaft to the
-guide of C, l1 the offset, and there is no rocker.
+evaluated by `kernels`. A slider-crank is the four-bar whose rocker pivot lies at infinity: its ground link is the
+perpendicular from the crank shaft to the guide of C, l1 the offset, and it has no rocker.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from math import atan2, cos, hypot, isfinite, pi, sin
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,496 +26,40 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ...numerics.fourier import FourierSeries
+from ...mechanisms import FIVE_BAR
+from ...run import traced
 from ...units import in_si
-from .kernels import PLACES, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
+from .kernels import PLACES, coupler_path, coupler_path_jacobian, guided, link_directions, link_jacobian
+from .kind import Kind
+from .pivot import SecondCrank, SliderMotion, format_ratio, geared
 
 FloatArray = NDArray[np.float64]
 #: Of a linkage: what must be greater than zero, what is a length of any sign, what is an angle.
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
-#: Links that need not be longer than zero of a slider-crank: its rocker, as it has none, and the offset, of either sign.
-ABSENT = ("rocker_length", "ground_length")
 #: Their units.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
 #: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations at which a full turn is evaluated.
 TURN = 360
-#: Greatest number of turns of either crank until a geared five-bar is as it was.
-TEETH = 6
 
 
 def wrapped(angle: FloatArray) -> FloatArray:
-    """Angles within half a turn of zero, in [-pi, pi)."""
+    """Wrap angles to within half a turn of zero, [-pi, pi)."""
     value: FloatArray = (angle + pi) % (2.0 * pi) - pi
     return value
 
 
-def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-    """Left sides of g <= 0 by which |cos mu| at C is at most a cosine, without division; of numbers, arrays and symbols.
-
-    ``nearest`` and ``farthest`` are the squares of the least and the greatest distance from B to D; of a slider-crank, whose l4
-    is None, to the guide.
-    """
-    if l4 is None:
-        return (farthest - (l3 * cosine) ** 2,)
-    joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
-    return joint - nearest - product, farthest - joint - product
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SliderMotion:
-    """The rocker pivot D moves along a guide as a Fourier series of the crank's rotation.
-
-    Attributes
-    ----------
-    series : FourierSeries
-        u(phi) in m: its order is the number of harmonics.
-    guide_angle : float
-        alpha, the guide's direction from the ground link (rad).
-
-    Raises
-    ------
-    ParameterError
-        If the guide's angle is not finite.
-    """
-
-    series: FourierSeries
-    guide_angle: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not isfinite(self.guide_angle):
-            raise ParameterError("guide_angle", self.guide_angle, "be a finite number")
-
-    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Displacement of D in the frame of the ground link (m)."""
-        u = self.series(rotation)
-        return u * cos(self.guide_angle), u * sin(self.guide_angle)
-
-    @property
-    def stroke(self) -> float:
-        """Distance between the ends of the slider's travel (m)."""
-        return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
-
-    def scaled(self, factor: float) -> SliderMotion:
-        """The motion of a linkage that is larger by the factor."""
-        return replace(self, series=self.series * factor)
-
-
-def geared(ratio: float) -> tuple[int, int]:
-    """Turns k of the first crank and m of the second until both are where they were: the ratio is m/k.
-
-    Raises ParameterError if it is not zero and no ratio of whole numbers up to six.
-    """
-    if isfinite(ratio):
-        near = Fraction(ratio).limit_denominator(TEETH)
-        if abs(near - Fraction(ratio)) <= 1e-9 and abs(near.numerator) <= TEETH:
-            return near.denominator, near.numerator
-    raise ParameterError("ratio of the second crank", ratio, f"be a ratio of whole numbers up to {TEETH}")
-
-
-def format_ratio(ratio: float) -> str:
-    """A ratio of gears, such as "2", "-1" or "1/2"."""
-    return str(Fraction(ratio).limit_denominator(TEETH))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SecondCrank:
-    """The rocker pivot D sits on a second crank, geared to the first or turned independently: a five-bar.
-
-    D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio and
-    the first crank turns k times as fast as phi: phi is the rotation of the shaft that turns once until all is as it was.
-
-    Attributes
-    ----------
-    length : float
-        l5 (m).
-    ratio : float
-        Turns of the second crank for one of the first: a ratio of whole numbers up to six.
-    phase : float
-        psi at the start (rad).
-    series : FourierSeries
-        What is added to the geared rotation (rad): zero with gears.
-
-    Raises
-    ------
-    ParameterError
-        If the length is not greater than zero, the ratio none of small whole numbers, or the phase not finite.
-    """
-
-    length: float
-    ratio: float = 1.0
-    phase: float = 0.0
-    series: FourierSeries = field(default_factory=lambda: FourierSeries.constant(0.0))
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.length) and self.length > 0.0):
-            raise ParameterError("second_crank_length", self.length, "be a finite number greater than zero")
-        geared(self.ratio)
-        if not isfinite(self.phase):
-            raise ParameterError("second_crank_phase", self.phase, "be a finite number")
-
-    def angle(self, rotation: ArrayLike) -> FloatArray:
-        """psi (rad)."""
-        phi = np.asarray(rotation, dtype=float)
-        value: FloatArray = geared(self.ratio)[1] * phi + self.phase + self.series(phi)
-        return value
-
-    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Displacement of D in the frame of the ground link (m)."""
-        psi = self.angle(rotation)
-        return self.length * np.cos(psi), self.length * np.sin(psi)
-
-    def scaled(self, factor: float) -> SecondCrank:
-        """The motion of a linkage that is larger by the factor."""
-        return replace(self, length=self.length * factor)
-
-
-@in_si(**UNITS)
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Linkage:
-    """A four-bar with a coupler point, placed in the plane. Lengths in m, angles in rad.
-
-    Attributes
-    ----------
-    pivot_x, pivot_y : float
-        X0, Y0: the crank shaft A.
-    ground_length, crank_length, coupler_length, rocker_length : float
-        l1 ... l4. A slider-crank has a rocker of length 0, and l1 is its offset: the distance of the guide of C from A.
-    point_distance, point_angle : float
-        r and a2: the coupler point from the crank pin B, and its direction from the coupler's.
-    ground_angle : float
-        a1: direction of the ground link, from A to the rocker pivot; of a slider-crank from A to the guide, at right angles.
-    crank_phase : float
-        th20: crank angle from the ground link at the start of the motion.
-    output_angle : float
-        Mounting angle of what is read on the rocker, or carried by the coupler, from the link's own direction.
-    branch : int
-        Assembly: +1 with C to the left of B -> D, -1 to the right.
-    pivot : SliderMotion or SecondCrank, optional
-        What moves the rocker pivot; it is fixed without.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not finite, a link not longer than zero, the branch neither +1 nor -1, or a slider-crank's pivot moved.
-    """
-
-    pivot_x: float = 0.0
-    pivot_y: float = 0.0
-    ground_length: float
-    crank_length: float
-    coupler_length: float
-    rocker_length: float
-    point_distance: float = 0.0
-    ground_angle: float = 0.0
-    crank_phase: float = 0.0
-    point_angle: float = 0.0
-    output_angle: float = 0.0
-    branch: int = 1
-    pivot: SliderMotion | SecondCrank | None = None
-
-    def __post_init__(self) -> None:
-        for name in (*LENGTHS, *ANGLES):
-            value = float(getattr(self, name))
-            if not isfinite(value):
-                raise ParameterError(name, value, "be a finite number")
-            if name in LINKS and value <= 0.0 and not (self.slides and name in ABSENT):
-                raise ParameterError(name, value, "be greater than zero")
-            object.__setattr__(self, name, value)
-        if self.slides and self.pivot is not None:
-            raise ParameterError("pivot", self.pivot, "be fixed: a slider-crank, whose rocker has no length, has none")
-        if self.branch not in (1, -1):
-            raise ParameterError("branch", self.branch, "be +1 or -1")
-
-    @property
-    def slides(self) -> bool:
-        """Whether it is a slider-crank: C is on a guide instead of a rocker."""
-        return self.rocker_length == 0.0
-
-    @property
-    def slider_is_point(self) -> bool:
-        """Whether the coupler point is the slider's pin C of a slider-crank."""
-        return self.slides and self.point_angle == 0.0 and self.point_distance == self.coupler_length
-
-    @property
-    def turns(self) -> int:
-        """Turns of the crank for one of the shaft whose rotation is given: 1, but with gears of a ratio such as 1/2."""
-        return geared(self.pivot.ratio)[0] if isinstance(self.pivot, SecondCrank) else 1
-
-    def crank_angle(self, rotation: ArrayLike) -> FloatArray:
-        """th2 from the ground link (rad)."""
-        value: FloatArray = self.turns * np.asarray(rotation, dtype=float) + self.crank_phase
-        return value
-
-    @classmethod
-    def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
-        """From the vector of `kernels.PLACES` (and the output angle as an eleventh, if it is there)."""
-        values = np.asarray(q, dtype=float)
-        return cls(**dict(zip((*PLACES, "output_angle"), values.tolist())), branch=branch, **more)
-
-    @property
-    def vector(self) -> FloatArray:
-        """The ten parameters in the order of `kernels.PLACES`."""
-        return np.array([getattr(self, name) for name in PLACES])
-
-    def values(self) -> dict[str, float]:
-        """Dimensions by name, without the pivot's motion (m, rad)."""
-        return {name: getattr(self, name) for name in (*LENGTHS, *ANGLES)} | {"branch": self.branch}
-
-    @property
-    def largest_link(self) -> float:
-        """The longest of the four links, and of a second crank (m)."""
-        second = self.pivot.length if isinstance(self.pivot, SecondCrank) else 0.0
-        return max(abs(self.ground_length), self.crank_length, self.coupler_length, self.rocker_length, second)
-
-    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Displacement of the rocker pivot from the end of the ground link, in the frame of that link (m)."""
-        if self.pivot is None:
-            zero = np.zeros(np.shape(rotation))
-            return zero, zero
-        return self.pivot.displacement(rotation)
-
-    def _arguments(
-        self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
-        phi = np.ascontiguousarray(rotation, dtype=float)
-        dx, dy = (np.ascontiguousarray(d, dtype=float) for d in displacement or self.displacement(phi))
-        turned = self.turns * phi
-        return np.cos(turned), np.sin(turned), dx, dy, self.vector, float(self.branch)
-
-    def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
-        """Coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined.
-
-        ``displacement`` of the rocker pivot takes the place of what its own motion is, as in `directions`.
-        """
-        out = np.empty((2, np.size(rotation)))
-        coupler_path(*self._arguments(rotation, displacement), out)
-        return out.T
-
-    def path_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Coupler point (n, 2), and its derivatives with respect to `kernels.COLUMNS`, shape (12, 2, n)."""
-        n = np.size(rotation)
-        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
-        coupler_path_jacobian(*self._arguments(rotation), out, jacobian)
-        return out.T, jacobian
-
-    def link_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Angles of coupler and rocker from the ground link (2, n), and their derivatives as in `path_jacobian`, (12, 2, n)."""
-        n = np.size(rotation)
-        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
-        link_jacobian(*self._arguments(rotation), out, jacobian)
-        return out, jacobian
-
-    def directions(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
-        """(c3, s3, c4, s4, c43, s43) of `kinematics.Position`, shape (6, n), in the frame of the ground link."""
-        out = np.empty((6, np.size(rotation)))
-        link_directions(*self._arguments(rotation, displacement), out)
-        return out
-
-    def coupler_angle(self, rotation: ArrayLike) -> FloatArray:
-        """Direction of the coupler in the plane, with the output angle (rad), continuous over the rotations."""
-        g = self.directions(rotation)
-        turned: FloatArray = np.unwrap(np.arctan2(g[1], g[0])) + self.ground_angle + self.output_angle
-        return turned
-
-    def rocker_angle(self, rotation: ArrayLike) -> FloatArray:
-        """th4 from the ground link, with the output angle (rad), continuous over the rotations (the thesis's th4)."""
-        g = self.directions(rotation)
-        turned: FloatArray = np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
-        return turned
-
-    def slider_position(self, rotation: ArrayLike) -> FloatArray:
-        """Place of C along the guide of a slider-crank from the foot E of the offset, to the left of A -> E (m)."""
-        of_b = self.crank_length * np.sin(self.crank_angle(rotation))
-        value: FloatArray = of_b + self.coupler_length * self.directions(rotation)[1]
-        return value
-
-    def transmission(self, rotation: ArrayLike) -> FloatArray:
-        """Acute angle between coupler and rocker (rad), 0 at the limit of assembly; NaN where there is no joining."""
-        g = self.directions(rotation)
-        angle: FloatArray = np.arctan2(np.abs(g[5]), np.abs(g[4]))
-        return angle
-
-    def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
-        """A, B, C, D, the end E of the ground link, and P in the plane (m) at one rotation of the crank.
-
-        Of a slider-crank D, the slider, is where C is.
-
-        Raises
-        ------
-        AssemblyError
-            If the links cannot be joined there.
-        """
-        g = self.directions([rotation])[:, 0]
-        if not np.isfinite(g).all():
-            raise AssemblyError(f"the links cannot be joined at a crank rotation of {rotation:.6g} rad")
-        turn = np.exp(1j * self.ground_angle)
-        a = complex(self.pivot_x, self.pivot_y)
-        dx, dy = (float(d[0]) for d in self.displacement([rotation]))
-        b = a + turn * self.crank_length * np.exp(1j * self.crank_angle(rotation))
-        coupler = turn * complex(g[0], g[1])
-        places = {
-            "A": a,
-            "B": b,
-            "C": b + self.coupler_length * coupler,
-            "D": a + turn * complex(self.ground_length + dx, dy),
-            "E": a + turn * self.ground_length,
-            "P": b + self.point_distance * np.exp(1j * self.point_angle) * coupler,
-        }
-        if self.slides:
-            places["D"] = places["C"]
-        return {name: (float(z.real), float(z.imag)) for name, z in places.items()}
-
-    def moved(self, x: float, y: float) -> Linkage:
-        """The same linkage elsewhere (m)."""
-        return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
-
-    def scaled(self, factor: float) -> Linkage:
-        """The linkage with every length, and the place of A, multiplied by the factor."""
-        lengths = {name: factor * getattr(self, name) for name in LENGTHS}
-        return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scaled(factor))
-
-    @property
-    def grashof(self) -> str:
-        """Type of the four-bar by Grashof's criterion, the rocker pivot at the end of the ground link; or slider-crank.
-
-        One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
-        does not), triple-rocker, change-point.
-        """
-        if self.slides:
-            return "slider-crank"
-        lengths = [getattr(self, name) for name in LINKS]
-        excess = 2.0 * (min(lengths) + max(lengths)) - sum(lengths)
-        if abs(excess) <= 1e-12 * sum(lengths):
-            return "change-point"
-        return "triple-rocker" if excess > 0.0 else BY_SHORTEST[lengths.index(min(lengths))]
-
-    def reach(self, rotation: ArrayLike) -> FloatArray:
-        """Distance from B to D, or along the ground link from B to the guide of a slider-crank (m)."""
-        dx, dy = self.displacement(rotation)
-        th2 = self.crank_angle(rotation)
-        distance: FloatArray = self.ground_length + dx - self.crank_length * np.cos(th2)
-        if not self.slides:
-            distance = np.hypot(distance, dy - self.crank_length * np.sin(th2))
-        return distance
-
-    def cosine_at_c(self, reach: FloatArray) -> FloatArray:
-        """Cosine of the angle between coupler and rocker, or the normal of the guide, for what `reach` is.
-
-        It is beyond -1 and 1 where the links cannot be joined.
-        """
-        l3, l4 = self.coupler_length, self.rocker_length
-        cosine: FloatArray = -reach / l3 if self.slides else (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
-        return cosine
-
-    def transmission_range(self) -> tuple[float, float]:
-        """Least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
-
-        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is found over `TURN`
-        rotations. Where the crank cannot turn fully the extremes are 0 or pi.
-        """
-        if self.pivot is None:
-            d = np.array([self.ground_length - self.crank_length, self.ground_length + self.crank_length])
-        else:
-            d = self.reach(np.linspace(0.0, 2.0 * pi, TURN, endpoint=False))
-        cosine = np.clip(self.cosine_at_c(d), -1.0, 1.0)
-        angle = np.arccos(cosine)
-        return float(angle.min()), float(angle.max())
-
-    @property
-    def least_transmission(self) -> float:
-        """Least deviation of the transmission angle from 0 and pi over a turn (rad); 0 where the crank cannot turn fully."""
-        low, high = self.transmission_range()
-        return min(low, pi - high)
-
-    @property
-    def turns_fully(self) -> bool:
-        """Whether the crank can turn fully, the pivot moving as it does."""
-        return self.least_transmission > 0.0
-
-    def to_five_bar(
-        self,
-        *,
-        density: float = 7850.0,
-        section: tuple[float, float] = (0.02, 0.005),
-        slider_mass: float | None = None,
-        slider_stiffness: float = 0.0,
-        slider_damping: float = 0.0,
-        slider_coulomb_friction: float = 0.0,
-        gravity: float = 9.81,
-    ) -> FiveBarParameters:
-        """Parameters of the plant and its FMU, with masses from density and section.
-
-        Crank and rocker are bars of a rectangular section between their pins; the coupler is one from B to C and, where the
-        coupler point is off that line, a second from B to P. The plant's x axis is the ground link: gravity comes at the
-        linkage's own inclination. A fixed rocker pivot becomes a slider held by a spring: give it one, or hold it by force.
-
-        Parameters
-        ----------
-        density : float
-            kg/m3; steel by default.
-        section : (float, float)
-            Width in the plane and thickness of every bar (m).
-        slider_mass : float, optional
-            kg; by default that of a block of four widths by two widths by four thicknesses.
-        slider_stiffness, slider_damping, slider_coulomb_friction, gravity : float
-            As in `FiveBarParameters`.
-
-        Raises
-        ------
-        ParameterError
-            If density or section are not greater than zero, it is a slider-crank, or the pivot is on a second crank.
-        """
-        width, thickness = section
-        for name, value in (("density", density), ("section width", width), ("section thickness", thickness)):
-            if not (isfinite(value) and value > 0.0):
-                raise ParameterError(name, value, "be a finite number greater than zero")
-        if self.slides:
-            raise ParameterError("rocker_length", 0.0, "be greater than zero: the five-bar slider is no slider-crank")
-        if isinstance(self.pivot, SecondCrank):
-            raise ParameterError("pivot", self.pivot, "be fixed or a slider: the plant has no second crank")
-        r, a2 = self.point_distance, self.point_angle
-        straight = on_line(self.coupler_length, r, a2)
-        made = bodies(
-            self.crank_length,
-            self.coupler_length,
-            self.rocker_length,
-            r,
-            a2,
-            density * width * thickness,
-            width,
-            straight,
-        )
-        return FiveBarParameters(
-            ground_length=self.ground_length,
-            crank_length=self.crank_length,
-            coupler_length=self.coupler_length,
-            rocker_length=self.rocker_length,
-            slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
-            **made,
-            slider_guide_angle=0.0 if self.pivot is None else self.pivot.guide_angle,
-            slider_stiffness=slider_stiffness,
-            slider_damping=slider_damping,
-            slider_coulomb_friction=slider_coulomb_friction,
-            coupler_point_distance=r,
-            coupler_point_angle=a2,
-            gravity=gravity,
-            ground_inclination=self.ground_angle,
-            assembly_branch=self.branch,
-        )
-
-
 def bar(length: Any, line: float, width: float) -> tuple[Any, Any]:
-    """Mass of a rectangular bar between its pins (kg), and its moment of inertia about its centre (kg.m2)."""
+    """Return the mass of a rectangular bar between its pins (kg), and its moment of inertia about its centre (kg.m2)."""
     mass = line * length
     return mass, mass * (length * length + width * width) / 12.0
 
 
 def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool) -> dict[str, Any]:
-    """Masses, moments of inertia and centres of mass, by their names in `FiveBarParameters`.
+    """Return the masses, moments of inertia and centres of mass, by their names in `FiveBarParameters`.
 
     Crank and rocker are bars between their pins. The coupler is one from B to C and a second from B to P; where P is on the
     line of B and C, ``straight``, one over all of it.
@@ -558,5 +102,519 @@ def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float
 
 
 def on_line(l3: float, r: float, a2: float) -> bool:
-    """Whether the coupler point lies on the line of B and C."""
+    """Return whether the coupler point lies on the line of B and C."""
     return abs(sin(a2)) * r <= 1e-9 * l3
+
+
+@in_si(**UNITS)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linkage:
+    """A four-bar with a coupler point, placed in the plane; see also `SliderCrank` and `FiveBar`.
+
+    Lengths in m, angles in rad.
+
+    Attributes
+    ----------
+    pivot_x, pivot_y : float
+        X0, Y0: the crank shaft A.
+    ground_length, crank_length, coupler_length, rocker_length : float
+        l1 ... l4.
+    point_distance, point_angle : float
+        r and a2: the coupler point from the crank pin B, and its direction from the coupler's.
+    ground_angle : float
+        a1: direction of the ground link, from A to the rocker pivot.
+    crank_phase : float
+        th20: crank angle from the ground link at the start of the motion.
+    output_angle : float
+        Mounting angle of what is read on the rocker, or carried by the coupler, from the link's own direction.
+    branch : int
+        Assembly: +1 with C to the left of B -> D, -1 to the right.
+    pivot : SliderMotion, optional
+        Motion of the rocker pivot; without it the pivot is fixed.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not finite, a link not longer than zero, the branch neither +1 nor -1, or the pivot is moved by something
+        else.
+    """
+
+    kind: ClassVar[Kind] = "four-bar"
+    #: Links that must be longer than zero.
+    links: ClassVar[tuple[str, ...]] = LINKS
+    #: Types of the motion of the rocker pivot.
+    pivots: ClassVar[tuple[type, ...]] = (SliderMotion, type(None))
+    #: The driven link, its motions, and its mechanical advantage, in words.
+    driven: ClassVar[tuple[str, str, str]] = ("rocker", "swings", "torque of the rocker for one of the crank")
+    #: Bars by the layers on which they are drawn, as pairs of pins; pins that are drawn with their letters.
+    bars: ClassVar[tuple[tuple[str, str], ...]] = (("ground", "AE"), ("crank", "AB"), ("rocker", "DC"))
+    letters: ClassVar[str] = "ABCD"
+
+    pivot_x: float = 0.0
+    pivot_y: float = 0.0
+    ground_length: float
+    crank_length: float
+    coupler_length: float
+    rocker_length: float
+    point_distance: float = 0.0
+    ground_angle: float = 0.0
+    crank_phase: float = 0.0
+    point_angle: float = 0.0
+    output_angle: float = 0.0
+    branch: int = 1
+    pivot: SliderMotion | SecondCrank | None = None
+
+    def __post_init__(self) -> None:
+        for name in (*LENGTHS, *ANGLES):
+            value = float(getattr(self, name))
+            if not isfinite(value):
+                raise ParameterError(name, value, "be a finite number")
+            if name in self.links and value <= 0.0:
+                raise ParameterError(name, value, "be greater than zero")
+            object.__setattr__(self, name, value)
+        if not isinstance(self.pivot, self.pivots):
+            raise ParameterError("pivot", self.pivot, f"be fixed, or what moves that of a {self.kind}")
+        if self.branch not in (1, -1):
+            raise ParameterError("branch", self.branch, "be +1 or -1")
+
+    @property
+    def point_is_pin(self) -> bool:
+        """Return whether the coupler point is a slider's pin C."""
+        return False
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Return the names of the dimensions that this type of linkage does not have."""
+        return ()
+
+    @property
+    def turns(self) -> int:
+        """Return the turns of the crank for one of the shaft whose rotation is given, more than 1 with gears such as 1/2."""
+        return 1
+
+    def crank_angle(self, rotation: ArrayLike) -> FloatArray:
+        """Return th2, the crank angle from the ground link (rad)."""
+        value: FloatArray = self.turns * np.asarray(rotation, dtype=float) + self.crank_phase
+        return value
+
+    @classmethod
+    def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
+        """Make a linkage from the vector of `kernels.PLACES`, the output angle as an eleventh if it is there."""
+        values = dict(zip((*PLACES, "output_angle"), np.asarray(q, dtype=float).tolist()))
+        own = {f.name for f in fields(cls) if f.init}
+        return cls(**{name: value for name, value in values.items() if name in own}, branch=branch, **more)
+
+    @property
+    def vector(self) -> FloatArray:
+        """Return the ten parameters in the order of `kernels.PLACES`."""
+        return np.array([getattr(self, name) for name in PLACES])
+
+    def values(self) -> dict[str, float]:
+        """Return the dimensions by name, without the pivot's motion (m, rad)."""
+        return {name: getattr(self, name) for name in (*LENGTHS, *ANGLES)} | {"branch": self.branch}
+
+    @property
+    def largest_link(self) -> float:
+        """Return the length of the longest link (m)."""
+        return max(abs(self.ground_length), self.crank_length, self.coupler_length, self.rocker_length)
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the displacement of the rocker pivot from the end of the ground link, in the frame of that link (m)."""
+        if self.pivot is None:
+            zero = np.zeros(np.shape(rotation))
+            return zero, zero
+        return self.pivot.displacement(rotation)
+
+    def _arguments(
+        self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
+        phi = np.ascontiguousarray(rotation, dtype=float)
+        dx, dy = (np.ascontiguousarray(d, dtype=float) for d in displacement or self.displacement(phi))
+        turned = self.turns * phi
+        return np.cos(turned), np.sin(turned), dx, dy, self.vector, float(self.branch)
+
+    def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
+        """Return the coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined.
+
+        ``displacement`` of the rocker pivot takes the place of what its own motion is, as in `directions`.
+        """
+        out = np.empty((2, np.size(rotation)))
+        coupler_path(*self._arguments(rotation, displacement), out)
+        return out.T
+
+    def path_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the coupler point (n, 2), and its derivatives with respect to `kernels.COLUMNS`, shape (12, 2, n)."""
+        n = np.size(rotation)
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        coupler_path_jacobian(*self._arguments(rotation), out, jacobian)
+        return out.T, jacobian
+
+    def link_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the angles of coupler and rocker from the ground link (2, n), and their derivatives, (12, 2, n)."""
+        n = np.size(rotation)
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        link_jacobian(*self._arguments(rotation), out, jacobian)
+        return out, jacobian
+
+    def directions(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
+        """Return (c3, s3, c4, s4, c43, s43) of `kinematics.Position`, shape (6, n), in the frame of the ground link."""
+        out = np.empty((6, np.size(rotation)))
+        link_directions(*self._arguments(rotation, displacement), out)
+        return out
+
+    def coupler_angle(self, rotation: ArrayLike) -> FloatArray:
+        """Return the direction of the coupler in the plane, with the output angle (rad), continuous over the rotations."""
+        g = self.directions(rotation)
+        turned: FloatArray = np.unwrap(np.arctan2(g[1], g[0])) + self.ground_angle + self.output_angle
+        return turned
+
+    def rocker_angle(self, rotation: ArrayLike) -> FloatArray:
+        """Return th4 from the ground link, with the output angle (rad), continuous over the rotations (the thesis's th4)."""
+        g = self.directions(rotation)
+        turned: FloatArray = np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
+        return turned
+
+    def slider(self, rotation: ArrayLike) -> tuple[FloatArray, float] | None:
+        """Return the position of the slider on its guide from E (m), and the guide's direction from the ground link (rad).
+
+        None of a linkage without a slider.
+        """
+        return (self.pivot.series(rotation), self.pivot.guide_angle) if isinstance(self.pivot, SliderMotion) else None
+
+    def transmission(self, rotation: ArrayLike) -> FloatArray:
+        """Return the acute angle between coupler and rocker (rad), 0 at the limit of assembly, NaN beyond."""
+        g = self.directions(rotation)
+        angle: FloatArray = np.arctan2(np.abs(g[5]), np.abs(g[4]))
+        return angle
+
+    def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
+        """Return the places of A, B, C, D, the end E of the ground link, and P in the plane (m) at one rotation of the crank.
+
+        D of a slider-crank is the slider, where C is.
+
+        Raises
+        ------
+        AssemblyError
+            If the links cannot be joined there.
+        """
+        g = self.directions([rotation])[:, 0]
+        if not np.isfinite(g).all():
+            raise AssemblyError(f"the links cannot be joined at a crank rotation of {rotation:.6g} rad")
+        turn = np.exp(1j * self.ground_angle)
+        a = complex(self.pivot_x, self.pivot_y)
+        dx, dy = (float(d[0]) for d in self.displacement([rotation]))
+        b = a + turn * self.crank_length * np.exp(1j * self.crank_angle(rotation))
+        coupler = turn * complex(g[0], g[1])
+        places = {
+            "A": a,
+            "B": b,
+            "C": b + self.coupler_length * coupler,
+            "D": a + turn * complex(self.ground_length + dx, dy),
+            "E": a + turn * self.ground_length,
+            "P": b + self.point_distance * np.exp(1j * self.point_angle) * coupler,
+        }
+        return {name: (float(z.real), float(z.imag)) for name, z in places.items()}
+
+    def with_pivot(self, pivot: SliderMotion | SecondCrank | None) -> Linkage:
+        """Return the linkage with another motion of its rocker pivot: a five-bar with a second crank, else a four-bar."""
+        made: Callable[..., Linkage] = FiveBar if isinstance(pivot, SecondCrank) else Linkage
+        return made(**self.values(), pivot=pivot)
+
+    def moved(self, x: float, y: float) -> Linkage:
+        """Return the same linkage elsewhere (m)."""
+        return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
+
+    def scaled(self, factor: float) -> Linkage:
+        """Return the linkage with every length, and the place of A, multiplied by the factor."""
+        lengths = {f.name: factor * getattr(self, f.name) for f in fields(self) if f.init and f.name in LENGTHS}
+        return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scaled(factor))
+
+    @property
+    def grashof(self) -> str:
+        """Return the type of the four-bar by Grashof's criterion, the rocker pivot at the end of the ground link.
+
+        One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
+        does not), triple-rocker, change-point.
+        """
+        lengths = [getattr(self, name) for name in LINKS]
+        excess = 2.0 * (min(lengths) + max(lengths)) - sum(lengths)
+        if abs(excess) <= 1e-12 * sum(lengths):
+            return "change-point"
+        return "triple-rocker" if excess > 0.0 else BY_SHORTEST[lengths.index(min(lengths))]
+
+    @property
+    def title(self) -> str:
+        """Return Grashof's type, or what moves the pivot: the four lengths then say nothing of who can turn."""
+        return self.grashof if self.pivot is None else "four-bar with a moved pivot"
+
+    def reach(self, rotation: ArrayLike) -> FloatArray:
+        """Return the distance from B to D, of a slider-crank along the ground link from B to the guide (m)."""
+        dx, dy = self.displacement(rotation)
+        th2 = self.crank_angle(rotation)
+        along = self.ground_length + dx - self.crank_length * np.cos(th2)
+        reach: FloatArray = self.distance(along, dy - self.crank_length * np.sin(th2))
+        return reach
+
+    @staticmethod
+    def distance(along: Any, across: Any) -> Any:
+        """Return `reach` from the components of B -> D along the ground link and across it."""
+        return np.hypot(along, across)
+
+    @staticmethod
+    def closure() -> Callable[..., Any]:
+        """Return the plant's closure of the loop for CasADi's symbols, see `kernels.guided`."""
+        joined: Callable[..., Any] = traced(FIVE_BAR).joined
+        return joined
+
+    @staticmethod
+    def square(along: Any, across: Any) -> Any:
+        """Return the square of `distance`, of symbols too."""
+        return along * along + across * across
+
+    @staticmethod
+    def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
+        """Return the left sides of g <= 0 that keep |cos mu| at C below a cosine, without division.
+
+        Of numbers, arrays and symbols; ``nearest`` and ``farthest`` are the squares of the least and the greatest `reach`.
+        """
+        joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
+        return joint - nearest - product, farthest - joint - product
+
+    @staticmethod
+    def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
+        """Return the derivative of `transmission_excess` by the cosine."""
+        return 2.0 * l3 * l4
+
+    @staticmethod
+    def slack(l1: Any, l2: Any, cosine: Any) -> Any:
+        """Return how far an extreme of `square` may be off its value half a step away, a rotation of that cosine."""
+        return 2.0 * l1 * l2 * (1.0 - cosine)
+
+    def cosine_at_c(self, reach: FloatArray) -> FloatArray:
+        """Return the cosine of the angle between coupler and rocker, from `reach`.
+
+        It is beyond -1 and 1 where the links cannot be joined.
+        """
+        l3, l4 = self.coupler_length, self.rocker_length
+        cosine: FloatArray = (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
+        return cosine
+
+    def transmission_range(self) -> tuple[float, float]:
+        """Return the least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
+
+        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is found over `TURN`
+        rotations. Where the crank cannot turn fully the extremes are 0 or pi.
+        """
+        if self.pivot is None:
+            d = np.array([self.ground_length - self.crank_length, self.ground_length + self.crank_length])
+        else:
+            d = self.reach(np.linspace(0.0, 2.0 * pi, TURN, endpoint=False))
+        cosine = np.clip(self.cosine_at_c(d), -1.0, 1.0)
+        angle = np.arccos(cosine)
+        return float(angle.min()), float(angle.max())
+
+    @property
+    def least_transmission(self) -> float:
+        """Return the least deviation of the transmission angle from 0 and pi over a turn (rad); 0 without a full turn."""
+        low, high = self.transmission_range()
+        return min(low, pi - high)
+
+    @property
+    def turns_fully(self) -> bool:
+        """Return whether the crank can turn fully, with the pivot's own motion."""
+        return self.least_transmission > 0.0
+
+    def to_five_bar(
+        self,
+        *,
+        density: float = 7850.0,
+        section: tuple[float, float] = (0.02, 0.005),
+        slider_mass: float | None = None,
+        slider_stiffness: float = 0.0,
+        slider_damping: float = 0.0,
+        slider_coulomb_friction: float = 0.0,
+        gravity: float = 9.81,
+    ) -> FiveBarParameters:
+        """Return the parameters of the plant and its FMU, with masses from density and section.
+
+        Crank and rocker are bars of a rectangular section between their pins; the coupler is one from B to C and, where the
+        coupler point is off that line, a second from B to P. The plant's x axis is the ground link: gravity comes at the
+        linkage's own inclination. A fixed rocker pivot becomes a slider held by a spring: give it one, or hold it by force.
+
+        Parameters
+        ----------
+        density : float
+            kg/m3; steel by default.
+        section : (float, float)
+            Width in the plane and thickness of every bar (m).
+        slider_mass : float, optional
+            kg; by default that of a block of four widths by two widths by four thicknesses.
+        slider_stiffness, slider_damping, slider_coulomb_friction, gravity : float
+            As in `FiveBarParameters`.
+
+        Raises
+        ------
+        ParameterError
+            If density or section are not greater than zero, it is a slider-crank, or the pivot is on a second crank.
+        """
+        width, thickness = section
+        for name, value in (("density", density), ("section width", width), ("section thickness", thickness)):
+            if not (isfinite(value) and value > 0.0):
+                raise ParameterError(name, value, "be a finite number greater than zero")
+        if self.kind != "four-bar":
+            raise ParameterError(
+                "kind", self.kind, "be 'four-bar': the plant of the five-bar slider has no other linkage"
+            )
+        r, a2 = self.point_distance, self.point_angle
+        straight = on_line(self.coupler_length, r, a2)
+        made = bodies(
+            self.crank_length,
+            self.coupler_length,
+            self.rocker_length,
+            r,
+            a2,
+            density * width * thickness,
+            width,
+            straight,
+        )
+        return FiveBarParameters(
+            ground_length=self.ground_length,
+            crank_length=self.crank_length,
+            coupler_length=self.coupler_length,
+            rocker_length=self.rocker_length,
+            slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
+            **made,
+            slider_guide_angle=self.pivot.guide_angle if isinstance(self.pivot, SliderMotion) else 0.0,
+            slider_stiffness=slider_stiffness,
+            slider_damping=slider_damping,
+            slider_coulomb_friction=slider_coulomb_friction,
+            coupler_point_distance=r,
+            coupler_point_angle=a2,
+            gravity=gravity,
+            ground_inclination=self.ground_angle,
+            assembly_branch=self.branch,
+        )
+
+
+@in_si(**UNITS)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SliderCrank(Linkage):
+    """A slider-crank with a coupler point, placed in the plane: C runs on a guide instead of a rocker.
+
+    Attributes
+    ----------
+    ground_length : float
+        l1, the offset: the distance of the guide from A, of either sign (m).
+    rocker_length : float
+        Always 0.
+    ground_angle : float
+        a1: from A to the guide, at right angles to it (rad).
+    """
+
+    kind: ClassVar[Kind] = "slider-crank"
+    links: ClassVar[tuple[str, ...]] = ("crank_length", "coupler_length")
+    pivots: ClassVar[tuple[type, ...]] = (type(None),)
+    driven: ClassVar[tuple[str, str, str]] = ("slider", "strokes", "force of the slider for one at the crank pin")
+    bars: ClassVar[tuple[tuple[str, str], ...]] = (("ground", "AE"), ("crank", "AB"))
+    letters: ClassVar[str] = "ABC"
+
+    rocker_length: float = field(init=False, default=0.0)
+
+    @property
+    def point_is_pin(self) -> bool:
+        """Return whether the coupler point is the slider's pin C."""
+        return self.point_angle == 0.0 and self.point_distance == self.coupler_length
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Return the names of the dimensions that it does not have: a rocker, and a coupler point if that is the pin."""
+        return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
+
+    @property
+    def grashof(self) -> str:
+        """Return its type: slider-crank."""
+        return self.kind
+
+    def slider_position(self, rotation: ArrayLike) -> FloatArray:
+        """Return the position of C on its guide from the foot E of the offset, to the left of A -> E (m)."""
+        position: FloatArray = self.crank_length * np.sin(self.crank_angle(rotation))
+        position += self.coupler_length * self.directions(rotation)[1]
+        return position
+
+    def slider(self, rotation: ArrayLike) -> tuple[FloatArray, float]:
+        """Return the position of C on its guide (m), and the guide's direction from the ground link (rad)."""
+        return self.slider_position(rotation), 0.5 * pi
+
+    def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
+        """Return the places of `Linkage.pins`, D being the slider."""
+        places = Linkage.pins(self, rotation)
+        return places | {"D": places["C"]}
+
+    @staticmethod
+    def distance(along: Any, across: Any) -> Any:
+        """Return the distance from B to the guide, along the ground link."""
+        return along
+
+    @staticmethod
+    def closure() -> Callable[..., Any]:
+        """Return the closure of the loop with C on its guide."""
+        return guided
+
+    @staticmethod
+    def square(along: Any, across: Any) -> Any:
+        """Return the square of `distance`."""
+        return along * along
+
+    @staticmethod
+    def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
+        """Return the left side of g <= 0 as of a four-bar; the angle is that between coupler and the normal of the guide."""
+        return (farthest - (l3 * cosine) ** 2,)
+
+    @staticmethod
+    def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
+        """Return the derivative of `transmission_excess` by the cosine."""
+        return 2.0 * l3 * l3 * cosine
+
+    @staticmethod
+    def slack(l1: Any, l2: Any, cosine: Any) -> Any:
+        """Return how far an extreme of `square` may be off its value half a step away."""
+        return 2.0 * (l1 + l2) * l2 * (1.0 - cosine)
+
+    def cosine_at_c(self, reach: FloatArray) -> FloatArray:
+        """Return the cosine of the angle between coupler and the normal of the guide, from `reach`."""
+        cosine: FloatArray = -reach / self.coupler_length
+        return cosine
+
+
+@in_si(**UNITS)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FiveBar(Linkage):
+    """A five-bar with two cranks: a four-bar whose rocker pivot D is on a second crank about the end E of the ground link.
+
+    Attributes
+    ----------
+    pivot : SecondCrank
+        Geared to the first crank, or turned independently.
+    """
+
+    kind: ClassVar[Kind] = "geared-five-bar"
+    pivots: ClassVar[tuple[type, ...]] = (SecondCrank,)
+    bars: ClassVar[tuple[tuple[str, str], ...]] = (*Linkage.bars, ("crank", "ED"))
+    letters: ClassVar[str] = "ABCDE"
+
+    pivot: SecondCrank
+
+    @property
+    def title(self) -> str:
+        """Return its type with its gears."""
+        return "five-bar" if self.pivot.series.order else f"five-bar, gears {format_ratio(self.pivot.ratio)}"
+
+    @property
+    def turns(self) -> int:
+        """Return the turns of the first crank for one of the shaft whose rotation is given."""
+        return geared(self.pivot.ratio)[0]
+
+    @property
+    def largest_link(self) -> float:
+        """Return the length of the longest link, the second crank's too (m)."""
+        return max(self.ground_length, self.crank_length, self.coupler_length, self.rocker_length, self.pivot.length)

@@ -23,7 +23,7 @@ from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
 from ...run import Inputs, of_parameters, simulate
 from . import linkage as geometry
-from .linkage import Linkage, on_line
+from .linkage import Linkage, SliderCrank, on_line
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
@@ -84,11 +84,11 @@ class Make:
 
     @property
     def hole(self) -> float:
-        """Diameter of the pins' holes (m)."""
+        """Return the diameter of the pins' holes (m)."""
         return 0.4 * self.width if self.pin is None else self.pin
 
     def describe(self, *, forces: bool = True) -> str:
-        """Bars and, of forces, the speed in a line, for a sheet."""
+        """Describe the bars and, with forces, the speed in a line, for a sheet."""
         bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
         if not forces:
             return bars
@@ -97,7 +97,7 @@ class Make:
         )
 
     def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Masses and moments of inertia of `masses.bodies`, of links with a mass of their own by that."""
+        """Replace the masses of `bodies` by those that are given; moments of inertia in proportion."""
         own: dict[str, Any] = {}
         for link in WEIGHED:
             mass, inertia, given = made[f"{link}_mass"], made[f"{link}_inertia"], getattr(self, f"{link}_mass")
@@ -106,17 +106,17 @@ class Make:
         return own
 
     def load_along(self, c: Any, s: Any) -> tuple[Any, Any]:
-        """The load at P along and across a ground link of this cosine and sine of its direction (N)."""
+        """Return the components of the load along and across the ground link, from cosine and sine of its direction (N)."""
         x, y = self.load
         return c * x + s * y, c * y - s * x
 
     @property
     def block(self) -> float:
-        """Mass of a slider (kg): as given, or of a block of four widths by two widths by four thicknesses."""
+        """Return the mass of the slider (kg): as given, or of a block of four widths by two widths by four thicknesses."""
         return 32.0 * self.density * self.width**2 * self.thickness if self.slider_mass is None else self.slider_mass
 
     def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:
-        """Parameters of the slider-crank's plant, its guide at right angles to the crank shaft.
+        """Return the parameters of the slider-crank's plant, its guide at right angles to the crank shaft.
 
         Its rod has its mass on the line of its joints: an arm to a coupler point off that line counts where it projects to.
         """
@@ -144,14 +144,14 @@ class Make:
         )
 
     def moving(self, linkage: Linkage) -> FiveBarParameters:
-        """Parameters of the plant for a linkage, its slider free to be moved.
+        """Return the parameters of the plant for a linkage, its slider free to move.
 
         A slider-crank is a four-bar whose rocker pivot is `FAR` away, its slider the mass at the rocker's end.
         """
-        far = FAR * linkage.coupler_length
-        four_bar = linkage
-        if linkage.slides:
-            four_bar = replace(linkage, rocker_length=far, ground_length=linkage.ground_length + far)
+        far, sliding, four_bar = FAR * linkage.coupler_length, isinstance(linkage, SliderCrank), linkage
+        if sliding:
+            away: Any = {"rocker_length": far, "ground_length": linkage.ground_length + far}
+            four_bar = Linkage(**linkage.values() | away)
         made = four_bar.to_five_bar(
             density=self.density,
             section=(self.width, self.thickness),
@@ -161,11 +161,15 @@ class Make:
             slider_coulomb_friction=self.slider_coulomb_friction,
             gravity=self.gravity,
         )
-        return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if linkage.slides else {}))
+        return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if sliding else {}))
 
     def sliding(self, far: Any) -> dict[str, Any]:
-        """What stands for the rocker of a slider-crank in the plant, its pivot so far away (m): the slider at its end."""
+        """Return the mass of the slider as that of a rocker whose pivot is so far away (m), see `moving`."""
         return {"rocker_mass": self.block, "rocker_inertia": 0.0, "rocker_cog_distance": far}
+
+    def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
+        """Return the parameters of the plant that a linkage runs as: the slider-crank, or the five-bar with its slider held."""
+        return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
         """Return the parameters of the plant for a linkage, its slider held."""
@@ -191,9 +195,9 @@ HEAVY = 1e8
 
 
 def pin_functions(
-    d: Any, make: Make, crank_angle: Any, *, straight: bool = False, sliding: bool = False
+    d: Any, make: Make, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
 ) -> dict[str, tuple[Any, Any]]:
-    """Components of the force in each pin along and across the ground link (N), of CasADi's symbols and numbers.
+    """Compute the force in each pin along and across the ground link (N), for CasADi's symbols and numbers.
 
     Parameters
     ----------
@@ -204,14 +208,15 @@ def pin_functions(
         th2 (rad).
     straight : bool
         Whether the coupler point is on the line of B and C, see `masses.bodies`.
-    sliding : bool
-        Whether it is a slider-crank: D is then the force of the guide on its slider.
+    linkage : type
+        Of a slider-crank D is the force of the guide on its slider.
     """
     casadi = symbolic.library()
     kind, plant, law = _traced()
     line = make.density * make.width * make.thickness
     links = {name: getattr(d, name) for name in ("ground_length", "crank_length", "coupler_length", "rocker_length")}
     far = FAR * d.coupler_length
+    sliding = linkage is SliderCrank
     if sliding:
         links |= {"ground_length": d.ground_length + far, "rocker_length": far}
     made = law(
@@ -254,7 +259,7 @@ def pin_functions(
 
 @cache
 def _traced() -> tuple[Any, Any, Any]:
-    """The plant's parameters and functions, and the law of the masses, for CasADi's symbols."""
+    """Trace the plant's parameters and functions, and the law of the masses, for CasADi's symbols."""
     casadi = symbolic.library()
     plant = of_parameters(FIVE_BAR)
     law = symbolic.traced((geometry,), min=casadi.fmin, max=casadi.fmax)
@@ -288,28 +293,28 @@ class PinForces:
 
     @property
     def greatest(self) -> float:
-        """The greatest force on any pin (N)."""
+        """Return the greatest force on any pin (N)."""
         return float(self.force.max())
 
     @property
     def pin(self) -> str:
-        """The pin that it is on."""
+        """Return the pin with the greatest force."""
         return PINS[int(self.force.max(axis=0).argmax())]
 
     @property
     def at(self) -> float:
-        """The crank's rotation there (rad)."""
+        """Return the crank's rotation at the greatest force (rad)."""
         return float(self.rotation[int(self.force.max(axis=1).argmax())])
 
     def of(self, pins: str) -> float:
-        """The greatest force on some of the pins (N)."""
+        """Return the greatest force on some of the pins (N)."""
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
 
 def pin_forces(
     linkage: Linkage, make: Make, rotation: tuple[float, float] | None = None, *, run: bool = True
 ) -> PinForces:
-    """Forces on the pins of a linkage at constant speed.
+    """Compute the forces on the pins of a linkage at constant speed.
 
     They are of a run of the compiled plant, its slider so heavy that it stays where it is, its weight carried by the control
     force; or of the plant's equations alone.
@@ -355,11 +360,11 @@ def pin_forces(
 
 
 def _held(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
-    """By the plant's equations, its slider held."""
+    """Compute the pin forces by the plant's equations, its slider held."""
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
     th2 = casadi.DM(linkage.crank_angle(rotation))
-    found = pin_functions(d, make, th2, straight=straight, sliding=linkage.slides)
+    found = pin_functions(d, make, th2, straight=straight, linkage=type(linkage))
     force = np.column_stack([np.hypot(*(np.array(f).ravel() for f in found[pin])) for pin in PINS])
     if not np.isfinite(force).all():
         at = float(rotation[np.argmin(np.isfinite(force).all(axis=1))])

@@ -1,6 +1,7 @@
 from .drawing import LinkageScene as LinkageScene
 from .drawing import plates as plates
-from .report import dimension_rows as dimension_rows
+from .report import Assessment as Assessment
+from .report import assess as assess
 from .report import sensitivities as sensitivities
 from .solution import Solution as Solution
 from .solution import Verdicts as Verdicts

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from linkwork.errors import AssemblyError, ParameterError
 
 from ...files import Circle, Dimension, Drawing, Layer, Line, Polyline, Text
-from ..linkage.linkage import Linkage, SecondCrank, SliderMotion, format_ratio
+from ..linkage.linkage import FiveBar, Linkage, SliderCrank
+from ..linkage.pivot import format_ratio
 from ..task.task import UntimedPath
 from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
 
@@ -47,11 +48,11 @@ class LinkageScene:
 
     @property
     def linkage(self) -> Linkage:
-        """The linkage that was found."""
+        """Return the linkage of the solution."""
         return self.solution.linkage
 
     def pins(self, rotation: float) -> Mapping[str, tuple[float, float]] | None:
-        """Places of A, B, C, D, E and, where the task has target points, P; None where the links cannot be joined."""
+        """Return the places of A to E and, for target points, of P; None where the links cannot be joined."""
         try:
             pins = self.linkage.pins(rotation)
         except AssemblyError:
@@ -66,13 +67,13 @@ class LinkageScene:
 
     @cached_property
     def turn(self) -> FloatArray:
-        """Crank rotations over a whole turn, from the least at which the task is done, shape (n,)."""
+        """Return the crank rotations over a whole turn, from the least at which the task is done, shape (n,)."""
         begin = 0.0 if self._closed else float(self.solution.rotation.min())
         return begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
 
     @cached_property
     def way(self) -> FloatArray:
-        """Crank rotations over which the task is done, close to one another, shape (n,)."""
+        """Return crank rotations over which the task is done, densely spaced, shape (n,)."""
         at = self.solution.rotation
         if self._closed or whole_turn(at):
             return self.turn
@@ -80,34 +81,34 @@ class LinkageScene:
 
     @property
     def rotation(self) -> FloatArray:
-        """Crank rotations over which the task is done, in their order: its stations, or a turn."""
+        """Return the crank rotations over which the task is done, in their order: its stations, or a turn."""
         return self.turn if self.way is self.turn else self.solution.rotation
 
     @cached_property
     def target(self) -> FloatArray | None:
-        """Points that are asked for, shape (n, 2); None of a rocker function."""
+        """Return the target points, shape (n, 2); None of a rocker function."""
         return target_points(self.solution.task)
 
     @property
     def target_closed(self) -> bool | None:
-        """Whether the target is a closed line (True), an open one (False), or only points (None)."""
+        """Return whether the target is a closed line (True), an open one (False), or only points (None)."""
         task = self.solution.task
         return task.path.closed if isinstance(task, UntimedPath) else None
 
     @property
     def timed(self) -> bool:
-        """Whether the task gives the crank rotations of its targets."""
+        """Return whether the task gives the crank rotations of its targets."""
         task = self.solution.task
         return not isinstance(task, UntimedPath) and task.rotation is not None
 
     @cached_property
     def stations(self) -> dict[str, FloatArray]:
-        """Columns by name with unit, such as ``error [m]``; see `Solution.columns`."""
+        """Return the columns by name with unit, such as ``error [m]``; see `Solution.columns`."""
         return self.solution.columns()
 
     @cached_property
     def curves(self) -> tuple[FloatArray, ...]:
-        """The coupler curve over all that the crank can turn, in pieces of shape (n, 2); none without target points."""
+        """Return the coupler curve over a whole turn in pieces, each shape (n, 2); none without target points."""
         if self.target is None:
             return ()
         points = self.linkage.path(self.turn)
@@ -117,24 +118,21 @@ class LinkageScene:
 
     @cached_property
     def traced(self) -> FloatArray | None:
-        """The part of the coupler curve that does the task, shape (n, 2); None of a rocker function."""
+        """Return the part of the coupler curve that does the task, shape (n, 2); None of a rocker function."""
         return None if self.target is None else self.linkage.path(self.way)
 
     @cached_property
     def function(self) -> FloatArray | None:
-        """Of a rocker function, crank rotation and angle of the rocker over the task, shape (2, n)."""
+        """Return crank rotation and rocker angle over the task of a rocker function, shape (2, n); None of another."""
         return np.vstack([self.way, self.linkage.rocker_angle(self.way)]) if self.target is None else None
 
     @cached_property
     def guide(self) -> FloatArray | None:
-        """Ends of the travel of the slider that carries D, or C of a slider-crank, shape (2, 2); None without a slider."""
-        linkage, pivot = self.linkage, self.linkage.pivot
-        if linkage.slides:
-            u, direction = linkage.slider_position(self.turn), 1j
-        elif isinstance(pivot, SliderMotion):
-            u, direction = pivot.series(self.turn), np.exp(1j * pivot.guide_angle)
-        else:
+        """Return the ends of the slider's travel, shape (2, 2); None without a slider."""
+        linkage, slider = self.linkage, self.linkage.slider(self.turn)
+        if slider is None:
             return None
+        u, direction = slider[0], np.exp(1j * slider[1])
         ends = complex(linkage.pivot_x, linkage.pivot_y) + np.exp(1j * linkage.ground_angle) * (
             linkage.ground_length + np.array([np.nanmin(u), np.nanmax(u)]) * direction
         )
@@ -142,32 +140,29 @@ class LinkageScene:
 
     @property
     def second_crank(self) -> bool:
-        """Whether D is on a second crank about E."""
-        return isinstance(self.linkage.pivot, SecondCrank)
+        """Return whether D is on a second crank about E."""
+        return isinstance(self.linkage, FiveBar)
 
     @property
     def lettered(self) -> str:
-        """Pins that are drawn with their letters: E only of a second crank, D and P not where they are C."""
-        own = ("" if self.linkage.slides else "D") + ("E" if self.second_crank else "")
-        return "ABC" + own + ("" if self.linkage.slider_is_point else "P")
+        """Return the pins that are drawn with their letters."""
+        return self.linkage.letters + ("" if self.linkage.point_is_pin else "P")
 
     @cached_property
     def transmission(self) -> FloatArray:
-        """Crank rotation over a turn and the angle between coupler and rocker, NaN where they are not joined, (2, n)."""
+        """Return crank rotations over a turn and the angle between coupler and rocker, NaN where not joined, shape (2, n)."""
         return np.vstack([self.turn, angle_at_c(self.linkage, self.turn)])
 
     @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """How the rocker pivot moves over a turn: ``slider position [m]`` or ``second crank [rad]``; None if it is fixed.
+        """Return heading and values of the pivot's motion over a turn, also of a slider-crank's slider; None if it is fixed.
 
         Of a slider-crank the slider's position.
         """
-        pivot = self.linkage.pivot
-        if self.linkage.slides:
-            return "slider position [m]", self.linkage.slider_position(self.turn)
-        if isinstance(pivot, SliderMotion):
-            return "slider position [m]", pivot.series(self.turn)
-        return None if pivot is None else ("second crank [rad]", pivot.angle(self.turn))
+        if isinstance(self.linkage, FiveBar):
+            return "second crank [rad]", self.linkage.pivot.angle(self.turn)
+        slider = self.linkage.slider(self.turn)
+        return None if slider is None else ("slider position [m]", slider[0])
 
 
 Point = tuple[float, float]
@@ -176,7 +171,7 @@ PIN, LETTER = 0.008, 0.022
 
 
 def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
-    """Links with their lengths, pins, guide, coupler curve and target in the plane's own coordinates (m).
+    """Draw links with their lengths, pins, guide, coupler curve and target in the plane's own coordinates (m).
 
     Parameters
     ----------
@@ -203,15 +198,15 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     drawn = [np.array(list(pins.values())), *(q for q in (*scene.curves, scene.target) if q is not None)]
     size = float(np.ptp(np.vstack(drawn), axis=0).max())
     radius, height = PIN * size, LETTER * size
-    bar = {"ground": (a, e), "crank": (a, b)} | ({} if solution.linkage.slides else {"rocker": (d, c)})
-    lines = [Line(layer=layer, start=start, end=end) for layer, (start, end) in bar.items()]
+    bars = solution.linkage.bars
+    lines = [Line(layer=layer, start=pins[ends[0]], end=pins[ends[1]]) for layer, ends in bars]
     held = "ground" if scene.guide is None else "slider"
     circles = [
         Circle(layer=layer, centre=pin, radius=radius)
         for layer, pin in (
             ("ground", a),
             ("crank", b),
-            *([] if solution.linkage.slides else [("rocker", c)]),
+            *([("rocker", c)] if ("rocker", "DC") in bars else []),
             (held, d),
         )
     ]
@@ -223,7 +218,6 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
         for names in (("ABCDE" if scene.second_crank else "ABCD"), *(["BPC"] if "P" in there else []))
     ]
     if scene.second_crank:
-        lines.append(Line(layer="crank", start=e, end=d))
         circles.append(Circle(layer="ground", centre=e, radius=radius))
     if p is None or abs((c[0] - b[0]) * (p[1] - b[1]) - (c[1] - b[1]) * (p[0] - b[0])) < 1e-9 * size * size:
         lines.append(Line(layer="coupler", start=b, end=c))
@@ -259,10 +253,10 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
 
 
 def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterator[Dimension]:
-    """The lengths of the links, each beside its own; of a slider-crank the offset of its guide."""
-    names = ["AE", "AB", "BC", *(["ED"] if isinstance(linkage.pivot, SecondCrank) else [])]
-    names += [] if linkage.slides else ["DC"]
-    names += ["BP"] if "P" in pins and not linkage.slider_is_point else []
+    """Yield the dimension of each link, beside it; of a slider-crank the offset of its guide."""
+    named = [ends for _, ends in linkage.bars]
+    names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
+    names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
     for name in names:
         start, end = name[0], name[1]
         if hypot(pins[end][0] - pins[start][0], pins[end][1] - pins[start][1]) > height:
@@ -272,7 +266,7 @@ def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterat
 
 
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
-    """The links as plates with round ends and holes for the pins, one above the other, dimensioned.
+    """Draw the links as plates with round ends and holes for the pins, one above the other, with dimensions.
 
     The ground link is among them where both its ends are pivots; a slider's guide is not. The coupler reaches to the coupler
     point where the task has one.
@@ -297,17 +291,19 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
         raise ParameterError("pin", pin, f"be below the width of the plates, {width:g} m")
     linkage = solution.linkage
     coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
-    if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.slider_is_point:
+    if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.point_is_pin:
         coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
     made: dict[str, dict[str, complex]] = {
         "crank": {"A": 0j, "B": complex(linkage.crank_length)},
         "coupler": coupler,
     }
-    if not linkage.slides:
+    if not isinstance(linkage, SliderCrank):
         made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
-    if not (linkage.slides or isinstance(linkage.pivot, SliderMotion)):
-        made = {"ground": {"A": 0j, "E" if linkage.pivot else "D": complex(linkage.ground_length)}} | made
-    if isinstance(linkage.pivot, SecondCrank):
+    if linkage.slider(0.0) is None:
+        made = {
+            "ground": {"A": 0j, "E" if isinstance(linkage, FiveBar) else "D": complex(linkage.ground_length)}
+        } | made
+    if isinstance(linkage, FiveBar):
         made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}
     height = 0.2 * width
     polylines, circles, dimensions, texts = [], [], [], []
@@ -328,7 +324,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
             for here, there, offset in _beside(places, width)
         ]
         label = f"{name}: {1e3 * width:g} x {1e3 * thickness:g} mm, holes {1e3 * pin:g} mm"
-        if name == "second crank" and isinstance(linkage.pivot, SecondCrank):
+        if name == "second crank" and isinstance(linkage, FiveBar):
             label += f", geared {format_ratio(linkage.pivot.ratio)} : 1 to the first"
         right = float(places.real.max()) + 1.2 * width
         texts.append(Text(layer="text", position=(right, float(places.imag.max())), height=height, text=label))
@@ -344,7 +340,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
 
 
 def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
-    """Each pair of holes that are apart, with the offset of its dimension: outside the plate, none over another."""
+    """Yield each pair of holes that are apart, with the offset of its dimension: outside the plate, none over another."""
     for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
         way = places[k] - places[i]
         if abs(way) <= 1e-9:
@@ -357,7 +353,7 @@ def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Poin
 
 
 def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
-    """Outline about two or three points at a distance, of edges and arcs: points, and bulges as of `files.Polyline`."""
+    """Return the outline of edges and arcs around two or three points: points, and bulges as of `files.Polyline`."""
     farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
     ends = places[list(farthest)]
     if len(places) == 3:
@@ -376,7 +372,7 @@ def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatAr
 
 
 def _curve(layer: str, points: FloatArray) -> Polyline:
-    """A curve, closed where it ends at its first point."""
+    """Make the polyline of a curve, closed where it ends at its first point."""
     closed = len(points) > 3 and hypot(*(points[-1] - points[0])) <= 1e-9 * float(np.ptp(points, axis=0).max())
     return Polyline(layer=layer, points=points[:-1] if closed else points, closed=closed)
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import ABSENT, ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion, format_ratio, wrapped
+from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCrank, wrapped
+from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
 from ..task.constraint import SECOND_LENGTH, stroke
 from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.task import Normal, RockerFunction, Task, UntimedPath, normal_form
@@ -74,13 +75,13 @@ class Rounding:
 
 
 def length_step(linkage: Linkage) -> float:
-    """Step to which lengths are rounded (m): 0.1 mm; of a linkage with a link below 1 mm a power of ten below a tenth of it."""
+    """Return the step to which lengths are rounded (m): 0.1 mm, or less for a link below 1 mm."""
     least = min(getattr(linkage, name) for name in LINKS if _is_link(linkage, name))
     return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
 
 
 def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-    """Names, derivatives (m, k) of the residuals with respect to them, residuals (m,), and weights (m,).
+    """Compute names, derivatives (m, k) of the residuals by the dimensions, residuals (m,), and weights (m,).
 
     The residuals are those of the quality function; of an untimed path, the distances along the target's normals.
     """
@@ -97,7 +98,7 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
 
 
 def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (m, k) of the residuals, and residuals (m,): of points, ``across`` the curve or x and y; of angles."""
+    """Compute derivatives (m, k) and values (m,) of the residuals: of points, ``across`` the curve or x and y; of angles."""
     columns = [column for _, _, column in _pivot(linkage, at)]
     angular = normal.angle is not None
     parts, blocks = [], []
@@ -108,7 +109,7 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
         still = [np.zeros(len(at), dtype=complex)] if angular else []
         whole = np.vstack([both[: len(PLACES)], *still, *[bx * both[10] + by * both[11] for bx, by in columns]]).T
-        if linkage.slider_is_point:
+        if linkage.point_is_pin:
             # the pin and the point are one
             whole[:, PLACES.index("coupler_length")] += whole[:, PLACES.index("point_distance")]
         if across:
@@ -138,7 +139,7 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
 
 
 def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
-    """What each dimension does to the error, by exact derivatives.
+    """Compute by exact derivatives how each dimension changes the error.
 
     Of an untimed path, the squared distances to the curve at its stations, the crank rotations following.
     """
@@ -151,7 +152,7 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     idle = (
         set(PLACES) - {*LINKS, "crank_phase"}
         if isinstance(solution.task, RockerFunction)
-        else _absent(solution.linkage)
+        else set(solution.linkage.absent)
     )
     return tuple(
         Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
@@ -161,7 +162,7 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
 
 
 def rounded(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
-    """What rounding lengths and angles to whole steps costs.
+    """Compute the cost of rounding lengths and angles to whole steps.
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def rounded(solution: Solution, length: float | None = None, angle: float = ANGL
 
 
 def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
-    """Mean quality function of dimensions that are off by even random amounts of a variance of a twelfth of a step squared."""
+    """Return the mean quality function of dimensions that are off by random amounts, evenly within half a step."""
     task, linkage = solution.task, solution.linkage
     area = isinstance(task, UntimedPath) and task.measure == "area"
     if isinstance(task, UntimedPath) and area:
@@ -234,7 +235,7 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
-    """What it costs if one dimension is off by a step: the greater growth of the quality function of the two directions.
+    """Compute how much the quality function grows if one dimension is off by a step, in the worse direction.
 
     By evaluating the linkages, so that it holds of steps of any size; infinite where the links cannot be joined.
 
@@ -263,18 +264,12 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
 
 
 def _is_link(linkage: Linkage, name: str) -> bool:
-    """Whether a dimension is a length above zero; an offset may be none."""
-    return name in (*LINKS, SECOND_LENGTH) and not (linkage.slides and name in ABSENT)
-
-
-def _absent(linkage: Linkage) -> set[str]:
-    """Dimensions that a slider-crank does not have: a rocker, and where the slider is the coupler point, another point."""
-    point = {"point_distance", "point_angle"} if linkage.slider_is_point else set()
-    return {"rocker_length", *point} if linkage.slides else set()
+    """Return whether a dimension is a length that must be above zero."""
+    return name in (*linkage.links, SECOND_LENGTH)
 
 
 def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
-    """Mean of |x| of a normal variable."""
+    """Return the mean of |x| of a normal variable."""
     from scipy.special import erf
 
     safe = np.maximum(spread, 1e-300)
@@ -284,13 +279,13 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 
 
 def _names(linkage: Linkage, normal: Normal) -> list[str]:
-    """Dimensions that there are derivatives with respect to, in their order."""
+    """Return the dimensions that there are derivatives with respect to, in their order."""
     mounted = [] if normal.angle is None else ["output_angle"]
     return [*PLACES, *mounted, *(name for name, _, _ in _pivot(linkage, np.zeros(1)))]
 
 
 def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
-    """Dimensions of a moved pivot: name, value, and the derivatives of its displacement at crank rotations."""
+    """List the dimensions of a moved pivot: name, value, and derivatives of its displacement at crank rotations."""
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
         c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
@@ -315,17 +310,17 @@ def _values(linkage: Linkage) -> dict[str, float]:
 
 
 def _made(linkage: Linkage) -> dict[str, float]:
-    """Dimensions that are made, and so are off by something: a commanded motion is not among them."""
+    """Return the dimensions that are manufactured, and so have errors: a commanded motion is not among them."""
     values = _values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
-    return {name: values[name] for name in made if name in values and name not in _absent(linkage)}
+    return {name: values[name] for name in made if name in values and name not in linkage.absent}
 
 
 def _with(linkage: Linkage, name: str, value: float) -> Linkage:
-    """The linkage with another value of one of the dimensions that are made."""
+    """Return the linkage with another value of one dimension."""
     if name in (*LENGTHS, *ANGLES):
         changed: dict[str, Any] = {name: value}
-        if name == "coupler_length" and linkage.slider_is_point:
+        if name == "coupler_length" and linkage.point_is_pin:
             changed["point_distance"] = value
         return replace(linkage, **changed)
     assert linkage.pivot is not None
@@ -334,17 +329,17 @@ def _with(linkage: Linkage, name: str, value: float) -> Linkage:
 
 
 def quality_unit(task: Task) -> tuple[float, str]:
-    """Factor from SI, and unit, in which a task's quality function is written."""
+    """Return the factor from SI, and the unit, in which a task's quality function is written."""
     return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
 
 
 def error_unit(task: Task) -> tuple[float, str]:
-    """Factor from SI, and unit, in which a task's errors are written."""
+    """Return the factor from SI, and the unit, in which a task's errors are written."""
     return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
 
 
 def quality_name(task: Task) -> str:
-    """What a task's quality function is."""
+    """Return the name of a task's quality function."""
     if isinstance(task, UntimedPath) and task.measure == "area":
         return "area between the curves"
     weighted = not np.all(np.asarray(getattr(task, "weights", 1.0)) == 1.0)
@@ -353,7 +348,7 @@ def quality_name(task: Task) -> str:
 
 
 def format_dimension(name: str, value: float) -> str:
-    """A dimension with its unit."""
+    """Format a dimension with its unit."""
     if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
         # + 0.0: no minus before a zero
         return f"{round(degrees(value), 3) + 0.0:.3f} deg"
@@ -361,7 +356,7 @@ def format_dimension(name: str, value: float) -> str:
 
 
 def headline(solution: Solution) -> str:
-    """Error, size and transmission angle, and what is wrong, in two or three lines."""
+    """Return error, size, transmission angle and defects in two or three lines."""
     factor, unit = quality_unit(solution.task)
     scale, length = error_unit(solution.task)
     v = solution.verdicts
@@ -375,7 +370,7 @@ def headline(solution: Solution) -> str:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Rows in columns, the first to the left, the others to the right."""
+    """Format rows in columns, the first to the left, the others to the right."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = [
         "  ".join(cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths)))
@@ -384,67 +379,109 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Assessment:
+    """A solution with what errors in its dimensions cost, computed once for the shell, the report and the sheet.
+
+    Attributes
+    ----------
+    solution : Solution
+    dimensions : list of tuple
+        Headings, then a row for each dimension: name, value, error, and what that does to output and quality function.
+    rounding : str
+        What rounding the dimensions costs, in a line.
+    """
+
+    solution: Solution
+    dimensions: list[tuple[str, str, str, str, str]]
+    rounding: str
+
+    @property
+    def report(self) -> str:
+        """Return verdicts, dimensions with what an error in each costs, rounding, errors target by target."""
+        solution, linkage = self.solution, self.solution.linkage
+        task, pivot = solution.task, linkage.pivot
+        error, rms, worst = quality_cells(solution, digits=6)
+        head = (
+            f"{solution.verdicts}\n"
+            f"{quality_name(task)}: {error} {quality_unit(task)[1]}; "
+            f"rms error {rms} {error_unit(task)[1]}, worst {worst} {error_unit(task)[1]}\n"
+            f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
+            f"largest link {1e3 * linkage.largest_link:.6g} mm"
+        )
+        if pivot is None:
+            head += _slider_line(linkage) + _limits(linkage, solution.rotation)
+        elif isinstance(pivot, SliderMotion):
+            head += f"\nslider at D: stroke {1e3 * pivot.stroke:.6g} mm"
+        else:
+            head += f"\nsecond crank at D: {format_ratio(pivot.ratio)} turns for one of the first"
+        if pivot is not None:
+            head += _places("toggles", toggles(linkage))
+        if straight := solution.straight():
+            head += f"\n{straight}"
+        return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
+
+
+def assess(solution: Solution) -> Assessment:
+    """Compute what errors in the dimensions of a solution cost."""
+    factor, unit = quality_unit(solution.task)
+    step = length_step(solution.linkage)
+    rounding = rounded(solution, step)
+    words = (
+        f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
+        f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
+    )
+    return Assessment(solution=solution, dimensions=_dimension_rows(solution, step), rounding=words)
+
+
 def report(solution: Solution) -> str:
-    """Verdicts, dimensions with what an error in each costs, rounding, errors target by target."""
-    task, linkage, evaluation = solution.task, solution.linkage, solution.evaluation
-    factor, unit = quality_unit(task)
-    scale, length = error_unit(task)
-    parts = [
-        f"{solution.verdicts}\n"
-        f"{quality_name(task)}: {factor * solution.error:.6g} {unit}; "
-        f"rms error {scale * evaluation.rms:.4g} {length}, worst {scale * evaluation.worst:.4g} {length}\n"
-        f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
-        f"largest link {1e3 * linkage.largest_link:.6g} mm"
-    ]
-    if linkage.pivot is None:
-        parts[0] += (f"\n{slider_line(linkage)}" if linkage.slides else "") + _limits(linkage, solution.rotation)
-    elif isinstance(linkage.pivot, SliderMotion):
-        parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
-    elif isinstance(linkage.pivot, SecondCrank):
-        parts[0] += f"\nsecond crank at D: {format_ratio(linkage.pivot.ratio)} turns for one of the first"
-    if linkage.pivot is not None:
-        parts[0] += _places("toggles", toggles(linkage))
-    if straight := solution.straight():
-        parts[0] += f"\n{straight}"
-    parts += [table(dimension_rows(solution)), rounding_line(solution)]
-    parts.append(table(_stations(solution)))
-    return "\n\n".join(parts) + "\n"
+    """Return the text report of a solution, in mm and degrees; see `Assessment`."""
+    return assess(solution).report
 
 
-def slider_line(linkage: Linkage) -> str:
-    """Offset and stroke of a slider-crank."""
-    line = f"slider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
+def quality_headings(task: Task) -> tuple[str, str, str]:
+    """Return the headings of `quality_cells`, with their units."""
+    length = error_unit(task)[1]
+    return f"{quality_name(task)} [{quality_unit(task)[1]}]", f"rms error [{length}]", f"worst [{length}]"
+
+
+def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
+    """Return quality function, rms error and greatest error of a solution as they are written."""
+    factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
+    found = solution.evaluation
+    return f"{factor * solution.error:.{digits}g}", f"{scale * found.rms:.4g}", f"{scale * found.worst:.4g}"
+
+
+def _slider_line(linkage: Linkage) -> str:
+    """Return a line with the offset and the stroke of a slider-crank; of another linkage none."""
+    if not isinstance(linkage, SliderCrank):
+        return ""
+    line = f"\nslider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
     return line + (f": stroke {1e3 * float(stroke(linkage)):.6g} mm" if linkage.turns_fully else "")
 
 
 def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
-    """Dead centres, toggles, time ratio and mechanical advantage of a four-bar or a slider-crank, a line each."""
-    lines, last = "", "slider" if linkage.slides else "rocker"
-    lines += _places(f"{last} at rest", dead_centres(linkage)) + _places("toggles", toggles(linkage))
+    """Return the dead centres, toggles, time ratio and mechanical advantage of a four-bar or a slider-crank, a line each."""
+    last, motions, what = linkage.driven
+    lines = _places(f"{last} at rest", dead_centres(linkage)) + _places("toggles", toggles(linkage))
     ratio = time_ratio(linkage)
     if ratio is not None:
-        lines += f"\ntime ratio of the {last}'s {'strokes' if linkage.slides else 'swings'} {ratio:.4g}"
+        lines += f"\ntime ratio of the {last}'s {motions} {ratio:.4g}"
     gained = np.abs(mechanical_advantage(linkage, rotation))
     if np.isfinite(gained).any():
-        what = (
-            "force of the slider for one at the crank pin"
-            if linkage.slides
-            else "torque of the rocker for one of the crank"
-        )
         lines += f"\n{what}: {np.nanmin(gained):.3g} at least on the way"
     return lines
 
 
 def _places(what: str, places: Sequence[float]) -> str:
-    """A line of crank rotations, if there are any."""
+    """Format crank rotations as a line, if there are any."""
     return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
 
 
-def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
-    """Dimensions with their values, and what it does if one is off by 0.1 mm or 0.1 degrees; a heading first."""
+def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str, str, str]]:
+    """Return the rows of `Assessment.dimensions`: what happens if a dimension is off by a step, or by 0.1 degrees."""
     factor, unit = quality_unit(solution.task)
     scale, length = error_unit(solution.task)
-    step = length_step(solution.linkage)
     dear = costs(solution, step, ANGLE_STEP)
     rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
     # where the crank's rotation is free, so is where it starts
@@ -463,24 +500,13 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
     return rows
 
 
-def rounding_line(solution: Solution) -> str:
-    """What rounding costs."""
-    factor, unit = quality_unit(solution.task)
-    step = length_step(solution.linkage)
-    rounding = rounded(solution, step)
-    return (
-        f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
-        f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
-    )
-
-
 def format_transmission(verdicts: Verdicts) -> str:
-    """Range of the transmission angle."""
+    """Format the range of the transmission angle."""
     return f"{degrees(verdicts.least_transmission):.1f} to {degrees(verdicts.greatest_transmission):.1f}"
 
 
 def _stations(solution: Solution) -> list[list[str]]:
-    """Errors target by target, in mm and degrees."""
+    """Return the errors target by target, in mm and degrees."""
     columns = solution.columns()
     heads = [name.replace("[m]", "[mm]").replace("[rad]", "[deg]") for name in columns]
     factors = [1e3 if name.endswith("[m]") else 180.0 / pi for name in columns]
@@ -489,8 +515,8 @@ def _stations(solution: Solution) -> list[list[str]]:
     return [["target", *heads], *rows]
 
 
-def columns_of(solutions: Sequence[Solution]) -> dict[str, list[float]]:
-    """What `Synthesis.columns` tells, of any solutions; a linkage has no rocker, or no second crank, where its length is 0."""
+def solution_columns(solutions: Sequence[Solution]) -> dict[str, list[float]]:
+    """Return the columns of `Synthesis.columns` for any solutions; a length of 0 stands for a missing link."""
     columns: dict[str, list[float]] = {}
 
     def put(name: str, value: float) -> None:
@@ -509,8 +535,8 @@ def columns_of(solutions: Sequence[Solution]) -> dict[str, list[float]]:
         put("greatest transmission angle [rad]", s.verdicts.greatest_transmission)
         for name, value in s.linkage.values().items():
             put(name if name == "branch" else f"{name} [{'rad' if name in ANGLES else 'm'}]", value)
-        if any(isinstance(other.linkage.pivot, SecondCrank) for other in solutions):
-            second = s.linkage.pivot if isinstance(s.linkage.pivot, SecondCrank) else None
+        if any(isinstance(other.linkage, FiveBar) for other in solutions):
+            second = s.linkage.pivot if isinstance(s.linkage, FiveBar) else None
             put(f"{SECOND_LENGTH} [m]", 0.0 if second is None else second.length)
             put("second_crank_phase [rad]", 0.0 if second is None else second.phase)
             put("second_crank_ratio", 0.0 if second is None else second.ratio)

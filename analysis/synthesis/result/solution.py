@@ -19,7 +19,7 @@ from ...files import write_csv
 from ...run import parameters_to
 from ...units import with_unit
 from ..linkage.kernels import PLACES
-from ..linkage.linkage import Linkage, SecondCrank, format_ratio, wrapped
+from ..linkage.linkage import Linkage, SliderCrank, wrapped
 from ..linkage.machine import Make
 from ..task.target import area_between, distance_to, halves, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
@@ -61,7 +61,7 @@ class Evaluation:
 
     @property
     def combined(self) -> FloatArray:
-        """Errors of place and angle together, as they count in the quality function (m or rad), shape (n,)."""
+        """Return the errors of place and angle together, as they count in the quality function (m or rad), shape (n,)."""
         if self.angle_errors is None:
             return np.abs(self.errors)
         both: FloatArray = np.hypot(self.errors, self.length * self.angle_errors)
@@ -69,17 +69,17 @@ class Evaluation:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the combined errors (m or rad)."""
+        """Return the root mean square of the combined errors (m or rad)."""
         return float(np.sqrt(np.mean(self.combined**2)))
 
     @property
     def worst(self) -> float:
-        """Largest of the combined errors (m or rad)."""
+        """Return the largest of the combined errors (m or rad)."""
         return float(self.combined.max())
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
-    """How well a linkage does a task, by the task's own measure.
+    """Compare a linkage with its task, by the task's own measure.
 
     Nothing of a search is used: an untimed path is compared as a polygon of `CURVE` points with the target's.
 
@@ -96,14 +96,14 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
         If rotations are needed and not given.
     """
     if isinstance(task, UntimedPath):
-        return _of_path(task, linkage, rotation)
+        return _evaluate_path(task, linkage, rotation)
     given = task.rotation if task.rotation is not None else rotation
     if given is None:
         raise InputError("the task gives no crank rotations: say at which ones the linkage is to be compared")
     at = np.asarray(given, dtype=float)
     if isinstance(task, RockerFunction):
         left = wrapped(linkage.rocker_angle(at) - np.asarray(task.angle))
-        error, value = _of_stations(task, np.asarray(task.weights) * left**2)
+        error, value = _objective_values(task, np.asarray(task.weights) * left**2)
         return Evaluation(error=error, value=value, errors=left, angle_errors=None, rotation=at)
     points = np.asarray(task.points)
     distance = np.hypot(*(linkage.path(at) - points).T)
@@ -113,19 +113,19 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     if not isinstance(task, TimedPath) and task.angle is not None:
         turned, length = wrapped(linkage.coupler_angle(at) - np.asarray(task.angle)), float(task.length or 0.0)
         squares = squares + (length * turned) ** 2
-    error, value = _of_stations(task, weights * squares)
+    error, value = _objective_values(task, weights * squares)
     return Evaluation(error=error, value=value, errors=distance, angle_errors=turned, rotation=at, length=length)
 
 
-def _of_stations(task: Task, squares: FloatArray) -> tuple[float, float]:
-    """Quality function, and what the objective makes small, from the weighted squared errors."""
+def _objective_values(task: Task, squares: FloatArray) -> tuple[float, float]:
+    """Return quality function and objective from the weighted squared errors."""
     error = float(squares.sum())
     if not np.isfinite(error):
         return inf, inf
     return error, error if task.objective == "error" else float(squares.max()) ** 0.5
 
 
-def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -> Evaluation:
+def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -> Evaluation:
     path = task.path
     if path.closed:
         phi = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
@@ -187,12 +187,12 @@ class Verdicts:
 
     @property
     def defects(self) -> tuple[str, ...]:
-        """What is wrong, such as "circuit defect"."""
+        """Return the defects, such as "circuit defect"."""
         return tuple(f"{name} defect" for name in ("circuit", "branch", "order") if not getattr(self, name))
 
     @property
     def sound(self) -> bool:
-        """No circuit, branch or order defect."""
+        """Return whether there is no circuit, branch or order defect."""
         return not self.defects
 
     def __str__(self) -> str:
@@ -202,7 +202,7 @@ class Verdicts:
 
 
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
-    """Verdicts over the crank rotations from the first to the last of ``rotation``, or over a turn.
+    """Judge a linkage over the crank rotations from the first to the last of ``rotation``, or over a turn.
 
     The distance from crank pin to rocker pivot, on which everything depends, is evaluated densely and, with a fixed pivot,
     where the crank lies along the ground link.
@@ -220,7 +220,7 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     joined = bool((np.abs(cosine) <= 1.0).all())
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     return Verdicts(
-        grashof=_kind(linkage),
+        grashof=linkage.title,
         full_turn=linkage.turns_fully,
         circuit=joined,
         branch=joined and bool((np.abs(cosine) < 1.0).all()),
@@ -228,15 +228,6 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
         least_transmission=float(angle.min()),
         greatest_transmission=float(angle.max()),
     )
-
-
-def _kind(linkage: Linkage) -> str:
-    """Grashof's type, or what moves the pivot: the four lengths then say nothing of who can turn."""
-    if linkage.pivot is None:
-        return linkage.grashof
-    if not isinstance(linkage.pivot, SecondCrank):
-        return "four-bar with a moved pivot"
-    return "five-bar" if linkage.pivot.series.order else f"five-bar, gears {format_ratio(linkage.pivot.ratio)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -258,7 +249,7 @@ class StraightPart:
 
     @property
     def rotation(self) -> float:
-        """Crank rotation that it takes (rad)."""
+        """Return the crank rotations over which the task is done: its stations, or a turn."""
         return abs(self.end - self.begin)
 
     def __str__(self) -> str:
@@ -287,7 +278,7 @@ class Solution(Shown):
         return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
 
     def describe(self) -> str:
-        """Error and verdicts in one line."""
+        """Return error and verdicts in one line."""
         unit = "rad" if isinstance(self.task, RockerFunction) else "m"
         found = self.evaluation
         return (
@@ -306,23 +297,28 @@ class Solution(Shown):
 
     @property
     def error(self) -> float:
-        """The quality function (m2; of a rocker function, rad2)."""
+        """Return the quality function (m2; of a rocker function, rad2)."""
         return self.evaluation.error
 
     @property
     def value(self) -> float:
-        """What the task's objective makes small: `error`, or the greatest error (m; of a rocker function, rad)."""
+        """Return the objective of the task: `error`, or the greatest error (m; of a rocker function, rad)."""
         return self.evaluation.value
 
     @property
     def rotation(self) -> FloatArray:
-        """Crank rotations over which the task is done: its stations, or a turn."""
+        """Return the crank rotations over which the task is done: its stations, or a turn."""
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
             return self.evaluation.rotation
         return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
 
+    @property
+    def way(self) -> tuple[float, float] | None:
+        """Return the crank rotations between which the task is done; None where the crank turns fully."""
+        return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
+
     def straight(self) -> StraightPart | None:
-        """The straight part that the task asks for, as it is traced; None where none is asked."""
+        """Return the straight part of the task as it is traced; None where none is asked."""
         asked = normal_form(self.task).straight
         rotation = self.evaluation.rotation
         if asked is None or rotation is None or not isinstance(self.task, UntimedPath):
@@ -337,19 +333,19 @@ class Solution(Shown):
         return StraightPart(travel=part.travel, flatness=part.flatness, begin=begin, end=end)
 
     def curve(self, n: int = CURVE) -> FloatArray:
-        """The traced path, shape (n, 2) in m: over a turn, or from the first station to the last."""
+        """Return the traced path, shape (n, 2) in m: over a turn, or from the first station to the last."""
         at = self.rotation
         if isinstance(self.task, UntimedPath) and not self.task.path.closed:
             return self.linkage.path(np.linspace(at[0], at[-1], n))
         return self.linkage.path(np.linspace(0.0, 2.0 * pi, n, endpoint=False))
 
     def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
-        """Parameters of the plant and its FMU, masses from density and section; see `Linkage.to_five_bar`."""
+        """Return the parameters of the plant and its FMU; see `Linkage.to_five_bar`."""
         return self.linkage.to_five_bar(**made_of)
 
     @property
     def direction(self) -> float:
-        """The way in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
+        """Return the direction in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
         at = self.evaluation.rotation
         return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
 
@@ -366,12 +362,12 @@ class Solution(Shown):
             run = {"stop_time": with_unit(float(np.ptp(at)) / make.speed, "s")}
         across, along = make.load_along(cos(linkage.ground_angle), sin(linkage.ground_angle))
         load: Any = {"fx": with_unit(across, "N"), "fy": with_unit(along, "N")}
-        if linkage.slides:
+        if isinstance(linkage, SliderCrank):
             # at the slider alone, which the plant loads along its guide
-            load = with_unit(along if linkage.slider_is_point else 0.0, "N")
+            load = with_unit(along if linkage.point_is_pin else 0.0, "N")
         return {
             "title": title,
-            **parameters_to(make.slider_crank(linkage) if linkage.slides else make.five_bar(linkage)),
+            **parameters_to(make.plant(linkage)),
             "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
             "drive": {"speed": with_unit(self.direction * make.speed, "rad/s")},
             **({"load": load} if any(make.load) else {}),
@@ -379,7 +375,7 @@ class Solution(Shown):
         }
 
     def columns(self) -> dict[str, FloatArray]:
-        """Target by target: crank rotation, target, what is done, error, transmission angle; SI, units in the names.
+        """Return crank rotation, target, traced point or angle, error and transmission angle at each target; SI.
 
         Of an untimed path the point of it that is nearest to each of the target's points.
         """
@@ -418,27 +414,27 @@ class Solution(Shown):
 
 
 def whole_turn(rotation: FloatArray) -> bool:
-    """Whether stations are over a whole turn: as far apart over its end as elsewhere."""
+    """Return whether stations cover a whole turn: as far apart across its end as elsewhere."""
     gap = 2.0 * pi - float(np.ptp(rotation))
     return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
 
 
 def target_points(task: Task) -> FloatArray | None:
-    """Points that a task asks for (m), shape (n, 2); None of a rocker function."""
+    """Return the points that a task asks for (m), shape (n, 2); None of a rocker function."""
     if isinstance(task, RockerFunction):
         return None
     return np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
 
 
 def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
-    """Angle between coupler and rocker at C (rad), from 0 to pi, NaN where the links cannot be joined."""
+    """Return the angle between coupler and rocker at C (rad), from 0 to pi, NaN where the links cannot be joined."""
     g = linkage.directions(rotation)
     angle: FloatArray = np.arctan2(np.abs(g[5]), g[4])
     return angle
 
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """dP/dphi: by the crank's phase, and by the pivot's own motion."""
+    """Return dP/dphi, by the crank's phase and by the pivot's own motion."""
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
     vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
@@ -449,7 +445,7 @@ def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) ->
 def nearest_rotations(
     linkage: Linkage, points: NDArray[np.complex128], begin: float = 0.0, end: float = 2.0 * pi
 ) -> FloatArray:
-    """Crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
+    """Find the crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
 
     Looked for from ``begin`` to ``end``: the whole turn by default.
     """
@@ -471,7 +467,7 @@ def nearest_rotations(
 
 
 def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Sound ones first, then by what the objective makes small.
+    """Rank solutions: sound ones first, then by the task's objective.
 
     Those that are exact but for rounding come in the order of their transmission angles.
     """

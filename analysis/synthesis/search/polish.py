@@ -23,8 +23,9 @@ from threadpoolctl import threadpool_limits
 from linkwork.errors import InputError
 
 from ..linkage.kernels import coupler_path_jacobian, link_jacobian
-from ..linkage.linkage import geared, wrapped
-from ..task.limits import CrankUnknown, Limits, PivotUnknown, SliderUnknown
+from ..linkage.linkage import SliderCrank, wrapped
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
+from ..task.limits import Limits
 from ..task.task import Normal
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
@@ -98,12 +99,12 @@ class Polished:
     def of(
         cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
     ) -> Polished:
-        """What came of all searches, those that are kept, perhaps polished further, and the starts that keep them all."""
+        """Make the record from all answers, those that keep every constraint, and the starts that keep them as they are."""
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
     def joined(self, other: Polished) -> Polished:
-        """Both, of searches of different kinds of linkages."""
+        """Join the answers of searches for different kinds of linkages."""
         return Polished(
             kept=self.kept + other.kept,
             others=self.others + other.others,
@@ -133,7 +134,7 @@ def polish(
         parts, interrupted = over_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
         return [answer for part in parts for answer in part], interrupted
 
-    begun = kept_of([worker.kept(start) for start in starts])
+    begun = kept_answers([worker.kept(start) for start in starts])
     given = [answer for answer in begun if answer.start.given]
     # where enough of the starts themselves can race, few are fitted by squares; the ends of a straight part are not met by few
     # iterations
@@ -141,7 +142,7 @@ def polish(
     enough = races and len(begun) >= FITTED
     fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
     found, interrupted = spread("fit_all", fitted, f"fitting {len(fitted)} starts")
-    kept = kept_of(found)
+    kept = kept_answers(found)
     # an interruption after the last search has nothing to stop
     if interrupted and len(found) < len(fitted):
         return Polished.of(found, kept, True, begun)
@@ -156,16 +157,16 @@ def polish(
             "onwards", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
         )
     else:
-        begin = kept_of([worker.measured(answer) for answer in [*kept, *begun]])
+        begin = kept_answers([worker.measured(answer) for answer in [*kept, *begun]])
         laps = RACE["open area" if normal.quality == "area" and not normal.closed else normal.quality]
         kept, interrupted = _raced(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
-        best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
+        best = distinct(kept_answers(kept) or kept_answers(found), ONWARDS, pivot)
         kept, interrupted = spread("least", best, f"making least the {limits.least.along.name}")
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.along:
         kept = [answer for answer in kept if worker.kept(answer.start).feasible]
-    return replace(Polished.of(found, kept_of(kept), interrupted, begun), done=len(starts))
+    return replace(Polished.of(found, kept_answers(kept), interrupted, begun), done=len(starts))
 
 
 def _raced(
@@ -174,7 +175,7 @@ def _raced(
     given: Sequence[Answer],
     laps: Sequence[tuple[int, int]],
 ) -> tuple[list[Answer], bool]:
-    """From many answers by few iterations each, from the best of these by more; whether that was interrupted."""
+    """Refine many answers by few iterations each, then the best of them by more; return whether that was interrupted."""
     for lap, (count, iterations) in enumerate(laps):
         # guesses run in the first lap whatever they are worth; what does not run in it is left behind
         best = distinct([*given, *kept], count + len(given), distance=RACED)
@@ -186,25 +187,25 @@ def _raced(
             return [*done, *kept], True
         rest = [answer for answer in kept if answer not in best] if lap else []
         # those that have come to the same optimum count as one
-        kept, given = distinct(kept_of([*done, *rest]), len(done) + len(rest), distance=RACED), []
+        kept, given = distinct(kept_answers([*done, *rest]), len(done) + len(rest), distance=RACED), []
     return list(kept), False
 
 
-def kept_of(answers: Sequence[Answer]) -> list[Answer]:
-    """Those that keep every constraint, best first."""
+def kept_answers(answers: Sequence[Answer]) -> list[Answer]:
+    """Return the answers that keep every constraint, best first."""
     return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
 
 
 @ONE_THREAD
 def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
-    """A method of a `Polisher`, by its name, in another process or thread."""
+    """Call a method of a new `Polisher` by its name, in another process or thread."""
     return getattr(Polisher(normal, limits, pivot), name)(item)
 
 
 def distinct(
     answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
 ) -> list[Answer]:
-    """The first answers that are different linkages: in their links, as shares of the longest, and their point and pivot."""
+    """Return the first answers that are different linkages, by links as shares of the longest, coupler point and pivot."""
 
     def mark(answer: Answer) -> FloatArray:
         q, v = answer.start.q, answer.start.pivot
@@ -218,7 +219,7 @@ def distinct(
             relative = turned[0] * v[1] - turned[1] * q[8]
             v = np.array([v[0], largest * np.cos(relative), largest * np.sin(relative), *v[2:]])
         side = 3.0 * answer.start.branch
-        if q[5] == 0.0:
+        if answer.start.linkage is SliderCrank:
             # a slider-crank without an offset is the same one seen from the other side of its guide
             turned = np.exp(1j * q[7])
             v = np.array(
@@ -245,14 +246,14 @@ class Polisher:
         self._programs: dict[tuple[str, bool], Program] = {}
 
     def program(self, objective: Objective, *, exact: bool = False) -> Program:
-        """The program with this objective; where the pivot is fixed all are exact."""
+        """Return the program with this objective; with a fixed pivot all are exact."""
         key = objective, exact and self.pivot is not None
         if key not in self._programs:
             self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1])
         return self._programs[key]
 
     def fit(self, start: Start) -> Answer:
-        """The optimum of the squared errors from a start; where points are met exactly, of the transmission angle."""
+        """Fit the squared errors from a start; where points are met exactly, maximise the transmission angle."""
         fitted = self.by_least_squares
         answer = fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start)
         if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
@@ -262,11 +263,11 @@ class Polisher:
         return answer
 
     def fit_all(self, starts: Sequence[Start]) -> list[Answer]:
-        """`fit` from each of them."""
+        """Fit each of the starts."""
         return [self.fit(start) for start in starts]
 
     def _solved(self, start: Start) -> Answer:
-        """By IPOPT; where a region is not convex, in several of its triangles, and on across the edges that hold it up."""
+        """Solve by IPOPT; where a region is not convex in several of its triangles, and on across the edges that hold it up."""
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
             return program.solve(start)
@@ -300,7 +301,7 @@ class Polisher:
         return last.exact(answer, lambda start, places: last.solve(start, places=places))
 
     def least(self, answers: Sequence[Answer]) -> list[Answer]:
-        """From small errors to what is made small in their place."""
+        """Minimise the objective that takes the place of the error, from answers with small errors."""
         return [self._least(answer) for answer in answers]
 
     def _least(self, answer: Answer) -> Answer:
@@ -323,12 +324,12 @@ class Polisher:
         return program.exact(found, lambda start, places: solve(start, places=places)) if found.feasible else found
 
     def measured(self, answer: Answer) -> Answer:
-        """The answer with the measure of its path in the place of its quality."""
+        """Return the answer with the measure of its path as its quality."""
         curve, _ = self.refinement.traced(*self.refinement.program.at(answer.start))
         return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
 
     def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
-        """From least squares to the area, or to the greatest error, each by so many iterations at most."""
+        """Minimise the area or the greatest error from least squares, each by so many iterations at most."""
         return [self._onwards(*item) for item in items]
 
     def _onwards(self, answer: Answer, iterations: int) -> Answer:
@@ -354,16 +355,16 @@ class Polisher:
 
     @property
     def refinement(self) -> Refinement:
-        """Of a path whose timing is free; made when it is first needed."""
+        """Return the refinement of an untimed path; made when it is first needed."""
         if self._refinement is None:
             self._refinement = Refinement(self.program("curve", exact=True))
         return self._refinement
 
     def kept(self, start: Start) -> Answer:
-        """A start as it is, whether it keeps every constraint and bound."""
+        """Judge a start as it is: whether it keeps every constraint and bound."""
         if self.by_least_squares:
             within = outside(self.normal, self.limits.low, self.limits.high, start) <= KEPT
-            quality = quality_of(self.normal, start)
+            quality = sum_of_squares(self.normal, start)
             return replace(
                 Answer.unjoined(start),
                 start=replace(start, q=inside(start.q, self.limits.low, self.limits.high), quality=quality),
@@ -379,7 +380,7 @@ class Polisher:
 def residuals(
     normal: Normal, branch: int, q: FloatArray, rotation: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
+    """Compute the weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
 
     Returns
     -------
@@ -417,8 +418,8 @@ def residuals(
     return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)
 
 
-def quality_of(normal: Normal, start: Start) -> float:
-    """Sum of weighted squared errors of a start with a fixed pivot; infinite where the links cannot be joined."""
+def sum_of_squares(normal: Normal, start: Start) -> float:
+    """Return the sum of weighted squared errors of a start with a fixed pivot; infinite where the links cannot be joined."""
     rotation = normal.rotation if start.rotation is None else start.rotation
     assert rotation is not None
     residual = residuals(normal, start.branch, start.q, rotation)[0]
@@ -427,7 +428,7 @@ def quality_of(normal: Normal, start: Start) -> float:
 
 
 def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
-    """SciPy's trust region reflective method on bounds, with the exact Jacobian of the compiled kernels."""
+    """Fit by SciPy's trust region reflective method within bounds, with the exact Jacobian of the compiled kernels."""
     free = np.nonzero(limits.high > limits.low)[0]
     timed, n = normal.timed, normal.n
     base = inside(start.q, limits.low, limits.high)
@@ -473,7 +474,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
     ordered = timed or bool(np.all(np.sign(np.diff(rotation)) == np.sign(rotation[-1] - rotation[0])))
     ordered = ordered and abs(rotation[-1] - rotation[0]) <= 2.0 * pi + 1e-9
     ended = replace(start, q=q, rotation=None if timed else rotation)
-    quality = quality_of(normal, ended)
+    quality = sum_of_squares(normal, ended)
     return Answer(
         start=replace(ended, quality=quality),
         feasible=bool(np.isfinite(quality)) and ordered,

@@ -22,7 +22,7 @@ from linkwork.errors import InputError
 from ...numerics import symbolic
 from ..linkage.linkage import BY_SHORTEST
 from ..task.constraint import UNKNOWNS, half_planes
-from ..task.formula import peaks_of, physical
+from ..task.formula import find_peaks, physical
 from .start import Answer, Start, inside, outside, pivot_size
 from .statement import FURTHER, GRID, SOUGHT, Statement
 
@@ -47,12 +47,12 @@ class Program(Statement):
 
     @cached_property
     def _value(self) -> Any:
-        """Objective and constraints as a function, to see whether a start can be evaluated at all."""
+        """Return objective and constraints as a function; it shows whether a start can be evaluated at all."""
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
     @cached_property
     def _begin(self) -> Any:
-        """What the unknowns that stand for a greatest value or a middle are at a start."""
+        """Return the starting values of the unknowns that stand for a greatest value or a middle."""
         casadi = self._casadi
         return casadi.Function(
             "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
@@ -60,29 +60,29 @@ class Program(Statement):
 
     @cached_property
     def _curvature(self) -> Any:
-        """The first two derivatives, by the crank's rotation, of what is bounded of the pivot's motion, at the places held."""
+        """Return the first two derivatives, by the crank's rotation, of the pivot's bounded motions at the places held."""
         function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._bent)
         return lambda z, parameters: function.call([z, parameters])
 
     @cached_property
     def _slopes(self) -> Any:
-        """Gradient of the objective and Jacobian of the constraints, dense, as a function."""
+        """Return the gradient of the objective and Jacobian of the constraints, dense, as a function."""
         casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
         both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
         return casadi.Function("slopes", [x, p], both)
 
     def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """The objective at unknowns and parameters of `at`, and the constraints, kept between `g_low` and `g_high`."""
+        """Return the objective at unknowns and parameters of `at`, and the constraints, kept between `g_low` and `g_high`."""
         objective, constraints = self._value(z, parameters)
         return float(objective), np.asarray(constraints).ravel()
 
     def slopes_at(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Gradient of the objective, shape (k,), and Jacobian of the constraints, shape (m, k), there."""
+        """Return the gradient of the objective, shape (k,), and the Jacobian of the constraints, shape (m, k)."""
         gradient, jacobian = (np.asarray(value) for value in self._slopes(z, parameters))
         return gradient.ravel(), jacobian
 
     def stations(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Crank rotations of the stations there."""
+        """Return the crank rotations of the stations at unknowns and parameters."""
         return np.asarray(self._stations(z, parameters)).ravel()
 
     @cached_property
@@ -92,7 +92,7 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """The coupler point, shape (2, 1), at a share of the way of a path, and its derivatives, as a function."""
+        """Return the coupler point, shape (2, 1), at a share of the way of a path, and its derivatives, as a function."""
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends
@@ -100,7 +100,7 @@ class Program(Statement):
         return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
 
     def _solver(self, iterations: int, near: bool) -> Any:
-        """IPOPT with this many iterations at most, from a start that is near or not."""
+        """Return IPOPT with this many iterations at most, for a start that is near or not."""
         if (iterations, near) in self._solvers:
             return self._solvers[iterations, near]
         self._solvers[iterations, near] = symbolic.ipopt(
@@ -117,7 +117,7 @@ class Program(Statement):
         return self._solvers[iterations, near]
 
     def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
-        """For each region its triangles, the one that the pivot is in, or least far outside of, first."""
+        """Order the triangles of each region by how far the pivot is outside of them."""
         order = []
         for name, triangles in self.limits.regions:
             x, y = float(q[0]), float(q[1])
@@ -128,7 +128,7 @@ class Program(Statement):
         return order
 
     def value(self, start: Start) -> float:
-        """The objective of a start; infinite where the links cannot be joined."""
+        """Return the objective of a start; infinite where the links cannot be joined."""
         f = self.stated(*self.at(start))[0]
         return f if isfinite(f) else inf
 
@@ -138,7 +138,7 @@ class Program(Statement):
         return len(self.low) - len(self._initial)
 
     def greatest(self, start: Start) -> float:
-        """What is made small in the place of an error, at a start."""
+        """Return the greatest value of the minimised function at a start, where it takes the place of an error."""
         return float(np.asarray(self._begin(*self.at(start))).ravel()[0])
 
     def at(
@@ -150,7 +150,7 @@ class Program(Statement):
         places: Sequence[FloatArray] | None = None,
         share: float | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Unknowns and parameters of a start; see `solve`."""
+        """Return the unknowns and parameters of a start; see `solve`."""
         count = pivot_size(self.pivot)
         pivot = np.zeros(count) if len(start.pivot) == 0 else start.pivot
         if len(pivot) != count:
@@ -230,7 +230,7 @@ class Program(Statement):
         )
 
     def judged(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
-        """What unknowns are as an answer: evaluated anew, since where IPOPT ends at no number, CasADi returns zeros."""
+        """Evaluate unknowns as an answer: anew, since CasADi returns zeros where IPOPT ends at no number."""
         f, g = self.stated(z, parameters)
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
@@ -248,17 +248,22 @@ class Program(Statement):
         )
 
     def start_at(self, z: FloatArray, start: Start, quality: float) -> Start:
-        """Unknowns as a start; of stations whose rotations are not unknown they are left as they were."""
+        """Return unknowns as a start; rotations of stations that are not unknown stay as they were."""
         end = len(UNKNOWNS) + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation
         if not self.normal.timed and len(self.knots) == self.normal.n:
             rotation = z[end : end + self.normal.n]
         return Start(
-            q=z[: len(UNKNOWNS)], branch=start.branch, pivot=z[len(UNKNOWNS) : end], rotation=rotation, quality=quality
+            q=z[: len(UNKNOWNS)],
+            branch=start.branch,
+            pivot=z[len(UNKNOWNS) : end],
+            rotation=rotation,
+            quality=quality,
+            linkage=start.linkage,
         )
 
     def kept(self, start: Start) -> Answer:
-        """A start as it is: whether it keeps every constraint, its bounds too, and how far it is from that."""
+        """Judge a start as it is: whether it keeps every constraint and bound, and how far it is from that."""
         places = self.extremes(start)
         ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
         best: Answer | None = None
@@ -294,7 +299,7 @@ class Program(Statement):
         return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
-        """Where the pivot's motion, or a derivative of it, has its extremes: the angles of the roots of the next one.
+        """Find the extremes of the pivot's motion or of its derivatives: the angles of the roots of the next derivative.
 
         Then where what holds along the crank's rotation has its greatest values.
         """
@@ -312,14 +317,14 @@ class Program(Statement):
         return found + self._greatest(start)
 
     def _greatest(self, start: Start) -> list[FloatArray]:
-        """The rotations at which each function that holds along them has its greatest values; see `peaks_of`."""
+        """Find the rotations at which each function along the rotation has its greatest values; see `find_peaks`."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
         p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
-        return [peaks_of(along, p, FURTHER) for along, _ in self._along]
+        return [find_peaks(along, p, FURTHER) for along, _ in self._along]
 
 
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
-    """Rows r with r . (l1, l2, l3, l4) <= 0 that a four-bar of this type satisfies, shape (6, 4); zero rows ask nothing.
+    """Return rows r with r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4); zero rows ask nothing.
 
     Of a triple-rocker, whose links are not convex in their lengths, the shortest and the longest stay what they are.
     """

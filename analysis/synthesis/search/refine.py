@@ -89,12 +89,12 @@ class Refinement:
     # The measure
 
     def traced(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The curve's points, shape (2, n), and their derivatives with respect to the unknowns, shape (2, n, k)."""
+        """Return the curve's points, shape (2, n), and their derivatives with respect to the unknowns, shape (2, n, k)."""
         place, slopes = self._trace(z, parameters, self._shares)
         return np.ascontiguousarray(place), np.asarray(slopes).reshape(2, CURVE, len(z))
 
     def measure(self, curve: FloatArray) -> float:
-        """What is made small: the area (units squared), or the Hausdorff distance (units)."""
+        """Return the area (units squared) or the Hausdorff distance (units) between curve and target."""
         if not np.isfinite(curve).all():
             return inf
         if self.normal.quality == "worst":
@@ -102,7 +102,7 @@ class Refinement:
         return self.area(curve)[0]
 
     def area(self, curve: FloatArray) -> tuple[float, FloatArray]:
-        """Area between curve and target (units squared), and its gradient with respect to the curve's points."""
+        """Return the area between curve and target (units squared), and its gradient with respect to the curve's points."""
         gradient = np.zeros_like(curve)
         if self._by_area:
             area = symmetric_difference(curve, self._outline, gradient)
@@ -124,7 +124,7 @@ class Refinement:
         return 0.5 * self._scale * total, 0.5 * self._scale * gradient
 
     def apart(self, curve: FloatArray) -> tuple[Near, Near]:
-        """Distances of the target's pieces from the curve, and of the curve's from the target: of their middles."""
+        """Compute the distances of the target's pieces from the curve, and of the curve's from the target, at their middles."""
         closed, n = self.normal.closed, curve.shape[1]
         middles = _middles(self._line, closed)
         if self.normal.quality == "worst":
@@ -142,13 +142,13 @@ class Refinement:
     # The way down
 
     def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
-        """What is made small: the measure, or within its bound what the program has instead."""
+        """Return the objective: the measure, or within its bound the program's own objective."""
         if self.limit is None:
             return self.measure(curve)
         return self.program.stated(z, parameters)[0] if self.over(curve) <= WITHIN * self.limit else inf
 
     def over(self, curve: FloatArray) -> float:
-        """By how much the greatest distance, as a path is judged by it, is over its bound (units)."""
+        """Return how far the greatest distance, by which a path is judged, exceeds its bound (units)."""
         if self.limit is None or not np.isfinite(curve).all():
             return inf
         return hausdorff(curve.T, self._target, closed=self.normal.closed) - self.limit
@@ -161,7 +161,7 @@ class Refinement:
         places: Sequence[FloatArray] | None = None,
         size: float = 1.0,
     ) -> Answer:
-        """The path with the least measure near an answer; the answer itself where nothing better keeps the constraints."""
+        """Minimise the measure near an answer; return the answer itself where nothing better keeps the constraints."""
         program = self.program
         z0, parameters = program.at(answer.start, places=places, size=size)
         curve, slopes = self.traced(z0, parameters)
@@ -200,7 +200,7 @@ class Refinement:
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _rounds(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
-        """Which of the distances are held within the greatest: a few all along, then all that are nearly as great."""
+        """Choose the distances that are held within the greatest: a few all along, then all that are nearly as great."""
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
@@ -217,7 +217,7 @@ class Refinement:
         return few, great, great
 
     def _stretched(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Directions of the unknowns that each move the curve by one, root mean square across it; shape (k, free)."""
+        """Return directions of the unknowns that each move the curve by one, root mean square across it; shape (k, free)."""
         tangent = np.roll(curve, -1, axis=1) - np.roll(curve, 1, axis=1)
         normal = np.array([-tangent[1], tangent[0]]) / np.maximum(np.hypot(*tangent), 1e-300)
         across = (slopes * normal[:, :, None]).sum(axis=0)[:, self.free]
@@ -228,7 +228,7 @@ class Refinement:
         return stretch
 
     def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Rotations at which the curve comes nearest to the stations in their order, by dynamic programming."""
+        """Find the rotations at which the curve comes nearest to the stations in their order, by dynamic programming."""
         normal, program = self.normal, self.program
         assert normal.points is not None
         assert start.rotation is not None
@@ -299,12 +299,12 @@ class _Descent:
         return y
 
     def unknowns(self, y: FloatArray) -> FloatArray:
-        """The program's unknowns, within their bounds to the last digit."""
+        """Return the program's unknowns, within their bounds to the last digit."""
         z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
         return np.clip(z, self._program.low, self._program.high)
 
     def value(self, y: FloatArray) -> tuple[float, FloatArray]:
-        """The measure, and what the program adds to it, with the gradient; far more where the links cannot be joined."""
+        """Return the measure and the program's own terms, with the gradient; far more where the links cannot be joined."""
         if self._bound:
             return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
         z = self.unknowns(y)
@@ -319,11 +319,11 @@ class _Descent:
         return (area + added) / self._size, whole @ self._stretch / self._size
 
     def _near(self, z: FloatArray) -> list[tuple[Near, Any]]:
-        """The distances, and which of them are held within the bound."""
+        """Return the distances, and which of them are held within the bound."""
         return list(zip(self._of.apart(self.curve(z)[0]), self._some))
 
     def constraints(self) -> list[dict[str, Any]]:
-        """Those of the program and its bounds, and that every distance is within the bound."""
+        """Return the constraints of the program, its bounds, and the bound of the distances."""
         program = self._program
         low, high = program.g_low, program.g_high
         equal = low == high
@@ -378,7 +378,7 @@ class _Descent:
 
 
 def _remembered(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
-    """The function with its last value kept for another call with the same unknowns."""
+    """Keep the last value of a function for another call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
     def called(z: FloatArray) -> Made:
@@ -395,7 +395,7 @@ def _rows(points: NDArray[np.complex128]) -> FloatArray:
 
 
 def _middles(line: FloatArray, closed: bool) -> FloatArray:
-    """Middles of the pieces of a polyline, rows x, y."""
+    """Return the middles of the pieces of a polyline, rows x, y."""
     both = 0.5 * (line + np.roll(line, -1, axis=1))
     return np.ascontiguousarray(both if closed else both[:, :-1])
 
@@ -403,7 +403,7 @@ def _middles(line: FloatArray, closed: bool) -> FloatArray:
 def _nearest(
     points: FloatArray, line: FloatArray, closed: bool
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
-    """Distance of each point from a polyline, the piece next to it, the share of that piece, and the place; see `nearest`."""
+    """Return the distance of each point from a polyline, the nearest piece, the share of it, and the place."""
     count = points.shape[1]
     distance, piece, share = np.empty(count), np.empty(count, dtype=np.int64), np.empty(count)
     nearest(points, line, closed, distance, piece, share)
@@ -412,7 +412,7 @@ def _nearest(
 
 
 def divided(outline: NDArray[np.complex128], weights: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """An outline with its pieces cut into short ones, rows x, y, and the weight of each."""
+    """Cut the pieces of an outline into short ones, rows x, y; return the weight of each too."""
     points = np.append(outline, outline[0]) if closed else outline
     around = np.append(weights, weights[0]) if closed else weights
     lengths = np.abs(np.diff(points))

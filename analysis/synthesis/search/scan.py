@@ -15,7 +15,7 @@ coupler point. What is left is searched by a Sobol sequence, which a seed scramb
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import cos, degrees, inf, log, pi, sin
 
@@ -25,7 +25,8 @@ from scipy.stats import qmc
 
 from ...run import shown
 from ..linkage.kernels import many_directions, match_windows
-from ..linkage.linkage import BY_SHORTEST, geared, transmission_excess
+from ..linkage.kind import Kind
+from ..linkage.linkage import BY_SHORTEST, Linkage, SliderCrank
 from ..task.constraint import TURNING, InfeasibleError
 from ..task.limits import Limits
 from ..task.task import Normal
@@ -67,8 +68,73 @@ class Candidates:
     pivot: FloatArray | None = None
 
 
+class _FourBarShapes:
+    """The shapes of four-bars: which ratios of links are drawn, and which of them a constraint allows.
+
+    ``base`` is the unknown that the ``others`` are ratios to, within ``ranges``.
+    """
+
+    base, others, ranges = 2, slice(3, 6), SHAPES
+
+    @staticmethod
+    def links(shapes: FloatArray, limits: Limits) -> FloatArray:
+        """Return rows (l1, l2, l3, l4, l5)."""
+        return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.zeros(len(shapes))])
+
+    @staticmethod
+    def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+        """Return which shapes keep the transmission angle over a turn."""
+        l1, l2, l3, l4, _ = links.T
+        ends = (l1 - l2) ** 2, (l1 + l2) ** 2
+        excess = limits.linkage.transmission_excess(l3, l4, *ends, cos(max(least, TURNING)))
+        kept: NDArray[np.bool_] = np.all([one <= 0.0 for one in excess], axis=0)
+        return kept
+
+    @staticmethod
+    def shares(start: Start) -> FloatArray:
+        """Return the ratios by which starts are told apart."""
+        ratios: FloatArray = start.q[3:6] / start.q[2]
+        return ratios
+
+
+class _SliderCrankShapes(_FourBarShapes):
+    """The shapes of slider-cranks: offset and crank as shares of the coupler."""
+
+    base, others, ranges = 4, slice(2, 5), (*GUIDED, (1.0, 1.0))
+
+    @staticmethod
+    def links(shapes: FloatArray, limits: Limits) -> FloatArray:
+        one, none = np.ones(len(shapes)), np.zeros(len(shapes))
+        offset = shapes[:, 0] if limits.high[2] > 0.0 else none
+        return np.column_stack([offset, shapes[:, 1], one, none, none])
+
+    @staticmethod
+    def shares(start: Start) -> FloatArray:
+        return np.array([start.q[3] / start.q[4], 1.0 + start.q[2] / start.q[4]])
+
+
+class _FiveBarShapes(_FourBarShapes):
+    """The shapes of geared five-bars: those of a four-bar, and the second crank's length and phase."""
+
+    @staticmethod
+    def links(shapes: FloatArray, limits: Limits) -> FloatArray:
+        low, high = np.log(SECOND)
+        return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.exp(low + (high - low) * shapes[:, 6])])
+
+    @staticmethod
+    def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+        return _turning(shapes, links, limits, least)
+
+
+_SHAPES: Mapping[Kind, type[_FourBarShapes]] = {
+    "four-bar": _FourBarShapes,
+    "slider-crank": _SliderCrankShapes,
+    "geared-five-bar": _FiveBarShapes,
+}
+
+
 def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
-    """The best starts of a scan over both assemblies, none near another, best first.
+    """Find the best starts of both assemblies, none near another, best first.
 
     Parameters
     ----------
@@ -94,12 +160,12 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
                 found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
                 placed += len(shapes)
     if not found:
-        raise InfeasibleError(f"no shape of {limits.kind} {_why(limits, seed)}")
+        raise InfeasibleError(f"no shape of {limits.linkage.kind} {_why(limits, seed)}")
     return _apart(found, starts, limits)
 
 
 def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
-    """Allowed shapes with the other searched numbers in [0, 1), in chunks.
+    """Yield allowed shapes with the other searched numbers in [0, 1), in chunks.
 
     Rows of (l2/l1, l3/l1, l4/l1), of a slider-crank (l1/l3, l2/l3, 1), and six numbers.
     """
@@ -116,7 +182,7 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
 
 
 def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
-    """The same rows, about `CHUNK` at a time: of each chunk only the best are placed."""
+    """Yield the same rows, about `CHUNK` at a time: of each chunk only the best are placed."""
     rows: list[FloatArray] = []
     for chunk in chunks:
         rows.append(chunk)
@@ -128,7 +194,7 @@ def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
 
 
 def _why(limits: Limits, seed: int) -> str:
-    """Which of the limits leaves no shape, by itself or only with the others."""
+    """Say which of the limits leaves no shape, by itself or only with the others."""
     free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
     alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
     if limits.turn is not None:
@@ -144,44 +210,34 @@ def _why(limits: Limits, seed: int) -> str:
 
 
 def _stretched(unit: FloatArray, limits: Limits) -> FloatArray:
-    """Rows of `_shapes`, from numbers in [0, 1)."""
+    """Return the rows of `_shapes`, from numbers in [0, 1)."""
     low, high = np.log(_ratios(limits)).T
     return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
 
 
 def _ratios(limits: Limits) -> FloatArray:
-    """Least and greatest ratios of `_shapes`, shape (3, 2): what the bounds of the links leave of `SHAPES`, or without it."""
-    base, of, usual = (4, slice(2, 5), (*GUIDED, (1.0, 1.0))) if limits.sliding else (2, slice(3, 6), SHAPES)
+    """Return the least and greatest ratios of `_shapes`, shape (3, 2), within the bounds of the links."""
+    own = _SHAPES[limits.linkage.kind]
+    base, of = own.base, own.others
     given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
-    ranges = np.array(usual)
+    ranges = np.array(own.ranges)
     both = np.column_stack([np.maximum(given[:, 0], ranges[:, 0]), np.minimum(given[:, 1], ranges[:, 1])])
     # an offset may be none
     return np.maximum(np.where(both[:, :1] <= both[:, 1:], both, given), 1e-12)
 
 
 def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
-    """Rows (l1, l2, l3, l4, l5) of shapes, l4 = 0 without a rocker, l5 = 0 without a second crank."""
-    one, none = np.ones(len(shapes)), np.zeros(len(shapes))
-    if limits.sliding:
-        offset = shapes[:, 0] if limits.high[2] > 0.0 else none
-        return np.column_stack([offset, shapes[:, 1], one, none, none])
-    low, high = np.log(SECOND)
-    second = none if limits.second is None else np.exp(low + (high - low) * shapes[:, 6])
-    return np.column_stack([one, shapes[:, :3], second])
+    """Return the rows (l1, l2, l3, l4, l5) of shapes, l4 = 0 without a rocker, l5 = 0 without a second crank."""
+    return _SHAPES[limits.linkage.kind].links(shapes, limits)
 
 
 def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
-    """Whether shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
+    """Return which shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
     sized = _links(shapes, limits)
     links = sized[:, :4]
-    l1, l2, l3, l4 = links.T
     allowed = np.ones(len(shapes), dtype=bool)
-    if limits.turn is not None and limits.second is not None:
-        allowed = _turning(shapes, sized, limits, limits.turn)
-    elif limits.turn is not None:
-        rocker, ends = None if limits.sliding else l4, ((l1 - l2) ** 2, (l1 + l2) ** 2)
-        for excess in transmission_excess(l3, rocker, *ends, cos(max(limits.turn, TURNING))):
-            allowed &= excess <= 0.0
+    if limits.turn is not None:
+        allowed = _SHAPES[limits.linkage.kind].turning(shapes, sized, limits, limits.turn)
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
         excess = order[:, 0] + order[:, 3] - order[:, 1] - order[:, 2]
@@ -196,8 +252,8 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
 
 
 def _turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-    """Whether geared five-bars keep the transmission angle at `AROUND` rotations, most of which few come to."""
-    turned = geared(limits.ratio)
+    """Return which geared five-bars keep the transmission angle at `AROUND` rotations; few come to the last ones."""
+    turned = limits.gears
     allowed = np.ones(len(shapes), dtype=bool)
     for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
         rows = np.flatnonzero(allowed)
@@ -206,19 +262,19 @@ def _turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float
         second = np.exp(1j * _second(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
         off = l1 + second - l2 * np.exp(1j * turned[0] * phi)
         d2 = off.real**2 + off.imag**2
-        for excess in transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
+        for excess in Linkage.transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
             allowed[rows] &= excess <= 0.0
     return allowed
 
 
 def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
-    """Phase of the second crank, so that the curve does not depend on the first one's."""
+    """Return the phase of the second crank, such that the curve does not depend on the first one's."""
     turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
     return turned
 
 
 def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest factors of links with which every one keeps its bounds."""
+    """Return the least and greatest factors of links with which every one keeps its bounds."""
     second = limits.second or (0.0, inf)
     there = links > 0.0
     low, high = (
@@ -251,8 +307,8 @@ def _directions(
     limits: Limits,
     turned: FloatArray | float = 0.0,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Directions of coupler and rocker of shapes at crank rotations, after those by which each shape has turned already."""
-    first, second = (1, 0) if limits.second is None else geared(limits.ratio)
+    """Compute the directions of coupler and rocker of shapes at crank rotations, after a rotation of each shape's own."""
+    first, second = limits.gears
     links = _links(shapes, limits)
     phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
     rows = np.column_stack([links[:, :4], *phases])
@@ -264,7 +320,7 @@ def _directions(
 
 
 def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Rocker functions: the phase is searched, the mounting angle follows."""
+    """Place rocker functions: the phase is searched, the mounting angle follows."""
     assert normal.rotation is not None
     assert normal.angle is not None
     phase = 2.0 * pi * shapes[:, 3]
@@ -285,7 +341,7 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
 
 
 def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Slider functions: shape and phase are searched; the size, and where the shaft is, above the guide or below, follow."""
+    """Place slider functions: shape and phase are searched; size and place of the shaft follow."""
     assert normal.rotation is not None
     assert normal.points is not None
     phase = 2.0 * pi * shapes[:, 3]
@@ -311,7 +367,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
 def _timed(
     normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator | None
 ) -> Candidates:
-    """Timed paths and motions by variable projection; without given rotations, over random ones in order."""
+    """Place timed paths and motions by variable projection; without given rotations, over random ones in order."""
     phase = 2.0 * pi * shapes[:, 3]
     links = _links(shapes, limits)
     n = normal.n
@@ -326,7 +382,7 @@ def _timed(
         for k in range(n):
             coupler[:, k] = _directions(shapes, phase, np.zeros(1), branch, limits, rotation[:, k])[0][:, 0]
     assert normal.points is not None
-    crank = np.exp(1j * (phase[:, None] + limits.turns * rotation))
+    crank = np.exp(1j * (phase[:, None] + limits.gears[0] * rotation))
     basis = np.stack([np.ones_like(crank), crank, coupler], axis=1)
     w, p = normal.weights, normal.points
     z = _projected(basis, p, w)
@@ -366,7 +422,7 @@ def _timed(
 
 
 def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
-    """Weighted least squares of p = z . basis for every row; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
+    """Solve p = z . basis for every row by weighted least squares; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
     weighted = basis.conj() * w
     gram = weighted @ basis.transpose(0, 2, 1)
     # transposed: gram[a, b] = sum of conj(basis_a) w basis_b
@@ -379,7 +435,7 @@ def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexAr
 
 
 def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Untimed paths: coupler curves laid over the target by a similarity."""
+    """Place untimed paths: coupler curves laid over the target by a similarity."""
     links = _links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
     coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
@@ -389,7 +445,7 @@ def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> C
     distance = longest * np.exp(np.log(0.1) + np.log(30.0) * shapes[:, 4])
     distance[: len(shapes) // PINNED] = 0.0
     point = distance * np.exp(2j * pi * shapes[:, 5])
-    curves = links[:, 1:2] * np.exp(1j * limits.turns * rotation) + point[:, None] * coupler
+    curves = links[:, 1:2] * np.exp(1j * limits.gears[0] * rotation) + point[:, None] * coupler
     return (_closed_paths if normal.closed else _open_paths)(normal, limits, links, curves, point, branch)
 
 
@@ -486,7 +542,7 @@ def _open_paths(
 def _bounded(
     scale: ComplexArray, links: FloatArray, point: ComplexArray, limits: Limits
 ) -> tuple[FloatArray, ComplexArray]:
-    """Sizes and scales within the bounds of links and coupler point."""
+    """Return the sizes and scales within the bounds of links and coupler point."""
     least, most = _sizes(links, limits)
     most = np.minimum(most, limits.high[6] / np.maximum(np.abs(point), 1e-300))
     size = np.abs(scale)
@@ -513,7 +569,7 @@ def _vectors(
 
 
 def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
-    """Closed curves at even arc length, shape (m, k), and the crank rotation at each of these points."""
+    """Resample closed curves at even arc length, shape (m, k); return the crank rotation at each of these points too."""
     m, n = curves.shape
     ring = np.hstack([curves, curves[:, :1]])
     length = np.hstack([np.zeros((m, 1)), np.cumsum(np.abs(np.diff(ring, axis=1)), axis=1)])
@@ -531,12 +587,13 @@ def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
 
 
 def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
-    """The best candidates of all, none within `APART` of a better one."""
+    """Return the best candidates of all, none within `APART` of a better one."""
     best = [
         Start(
             q=c.q[i],
             branch=c.branch,
             quality=float(c.quality[i]),
+            linkage=SliderCrank if limits.linkage is SliderCrank else Linkage,
             rotation=None if c.rotation is None else c.rotation[i],
             pivot=np.empty(0) if c.pivot is None else c.pivot[i],
         )
@@ -547,10 +604,7 @@ def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
 
     def mark(start: Start) -> FloatArray:
         begin = start.q[8] if start.rotation is None else start.rotation[0]
-        # shares of the ground link, or of the coupler
-        links = (
-            [start.q[3] / start.q[4], 1.0 + start.q[2] / start.q[4]] if limits.sliding else start.q[3:6] / start.q[2]
-        )
+        links = _SHAPES[limits.linkage.kind].shares(start)
         if start.q[6] == 0.0:
             # on the crank pin any other links trace the same circle
             links = np.ones(len(links))

@@ -20,7 +20,8 @@ from ...units import Amount, in_si
 from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
 from ..linkage.kind import Kind
 from ..linkage.linkage import UNITS, Linkage
-from ..result.report import columns_of
+from ..linkage.pivot import PivotUnknown
+from ..result.report import solution_columns
 from ..result.solution import Solution, nearest_rotations, ranked
 from ..task.constraint import (
     USUAL,
@@ -32,22 +33,11 @@ from ..task.constraint import (
     MaxPinForce,
     Stroke,
 )
-from ..task.limits import (
-    GEARS,
-    Limits,
-    PivotUnknown,
-    as_asked,
-    is_of,
-    kind_of,
-    limits_of,
-    limits_of_kinds,
-    second_crank,
-    usual_kinds,
-)
+from ..task.limits import GEARS, Limits, as_asked, limits_by_kind, make_limits, usual_kinds
 from ..task.task import Normal, Task, UntimedPath, normal_form, reweighted
 from .polish import Polished, distinct, polish
 from .scan import scan
-from .start import QUICK_SEARCH, USUAL_SEARCH, Answer, Search, Start, linkage_of, random_pivot, start_of
+from .start import QUICK_SEARCH, USUAL_SEARCH, Answer, Search, Start, make_linkage, make_start, random_pivot
 
 #: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
 STATIONS = 144
@@ -91,12 +81,12 @@ class Synthesis(Shown):
 
     @property
     def best(self) -> Solution:
-        """The first solution."""
+        """Return the first solution."""
         return self.solutions[0]
 
     def columns(self) -> dict[str, list[float]]:
-        """Rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
-        return columns_of(self.solutions)
+        """Return rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
+        return solution_columns(self.solutions)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
@@ -179,21 +169,21 @@ def synthesize(
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(task, QuickReturn | QuickSwing):
         return _in_closed_form(task, bounds, constraints, kinds, search, begun)
-    task = _as_sought(task, constraints, pivot, search)
-    normal = fitted_form(task, pivot)
-    every = limits_of_kinds(task, normal, bounds, constraints, kinds, gears)
+    task = _searched_task(task, constraints, pivot, search)
+    normal = search_form(task, pivot)
+    every = limits_by_kind(task, normal, bounds, constraints, kinds, gears)
     if tuple(kinds) != ("four-bar",) and pivot is not None:
         raise InputError("only a four-bar's pivot can be moved: leave the other kinds out")
     for number, guess in enumerate(guesses):
-        if not any(is_of(guess.linkage, limits) for limits in every):
+        if not any(limits.admits(guess.linkage) for limits in every):
             raise InputError(
                 f"guess {number} is a {guess.verdicts.grashof}: it must be of the kinds that are asked for"
             )
     found: list[tuple[Solution, ...]] = []
     done, refused, total = Polished.of((), (), False), None, 0
     for limits in every:
-        own = pivot or second_crank(limits, normal.unit)
-        given = [guess for guess in guesses if is_of(guess.linkage, limits)]
+        own = pivot or limits.second_crank(normal.unit)
+        given = [guess for guess in guesses if limits.admits(guess.linkage)]
         # the ratios of gears share the starts and the candidates of a kind
         share = 1 if limits.second is None else len(gears)
         how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
@@ -207,7 +197,7 @@ def synthesize(
             done = replace(done, interrupted=True)
             break
         done = done.joined(part)
-        found.append(solutions_of(task, normal, limits, part, own, search.solutions))
+        found.append(make_solutions(task, normal, limits, part, own, search.solutions))
         if done.interrupted:
             break
     if refused is not None and not found:
@@ -237,7 +227,7 @@ def _in_closed_form(
 def _searched(
     normal: Normal, limits: Limits, guesses: Sequence[Solution], pivot: PivotUnknown | None, search: Search
 ) -> Polished:
-    """What came of the starts of a scan, and of guesses, of one kind of linkage."""
+    """Search for one kind of linkage, from the starts of a scan and from guesses."""
     begin = [_start(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
     scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
@@ -248,9 +238,9 @@ def _searched(
 
 
 def _together(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
-    """The first of all solutions, at most so many, with the best of each kind among them."""
+    """Return the best of all solutions, at most so many, with the best of each kind among them."""
     every = ranked([s for part in found for s in part])
-    first = {kind_of(s.linkage): s for s in reversed(every)}.values()
+    first = {s.linkage.kind: s for s in reversed(every)}.values()
     rest = [s for s in every if not any(s is best for best in first)]
     return ranked([*ranked(list(first))[:count], *rest[: max(0, count - len(first))]])
 
@@ -287,9 +277,9 @@ def improve(
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
     begun = perf_counter()
-    task = _as_sought(task, constraints, pivot, search)
-    normal = fitted_form(task, pivot)
-    limits = limits_of(task, normal, bounds, constraints)
+    task = _searched_task(task, constraints, pivot, search)
+    normal = search_form(task, pivot)
+    limits = make_limits(task, normal, bounds, constraints)
     base, *begin = (_start(of, normal, pivot) for of in (linkage, *guesses))
     random = np.random.default_rng(search.seed)
     begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
@@ -298,13 +288,13 @@ def improve(
     same: dict[str, Any] = {name: getattr(given, name) for name in kept}
     found = tuple(
         Solution.of(task, replace(s.linkage, **same), s.evaluation.rotation)
-        for s in solutions_of(task, normal, limits, done, pivot, search.solutions)
+        for s in make_solutions(task, normal, limits, done, pivot, search.solutions)
     )
     return _result(task, found, done, len(begin), search, begun)
 
 
-def _as_sought(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
-    """The task as it is searched for: of the greatest error, where that is bounded and something else made small.
+def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
+    """Return the task as it is searched for: with the greatest error, where that is bounded and something else minimised.
 
     Raises InputError if what is asked is about a four-bar, and the pivot moved, or the method can make nothing but errors
     small.
@@ -320,7 +310,7 @@ def _as_sought(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | Non
 def _result(
     task: Task, found: tuple[Solution, ...], done: Polished, total: int, search: Search, begun: float
 ) -> Synthesis:
-    """The result of a search of so many starts that began at a time of `perf_counter`; or why there is none."""
+    """Return the result of a search of so many starts that began at a time of `perf_counter`; or raise why there is none."""
     result = Synthesis(
         task=task,
         solutions=found,
@@ -337,15 +327,15 @@ def _result(
     return result
 
 
-def fitted_form(task: Task, pivot: PivotUnknown | None) -> Normal:
-    """Normal form of a task for a search; of an untimed path with more stations where the pivot moves."""
+def search_form(task: Task, pivot: PivotUnknown | None) -> Normal:
+    """Return the normal form of a task for a search; an untimed path has more stations where the pivot moves."""
     if pivot is not None and isinstance(task, UntimedPath):
         task = replace(task, samples=max(task.samples, STATIONS))
     return normal_form(task)
 
 
 def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
-    """A linkage as a start, its untimed stations at the solution's rotations, or else where it comes nearest to them.
+    """Make a start of a linkage, its untimed stations at the solution's rotations, or where it comes nearest to them.
 
     Raises InputError if rotations are needed and cannot be found so, because the path is open.
     """
@@ -359,19 +349,19 @@ def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -
             raise InputError("a start for an open path needs the crank rotations of its stations")
         else:
             rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
-    return start_of(linkage, normal, pivot, rotation)
+    return make_start(linkage, normal, pivot, rotation)
 
 
-def solutions_of(
+def make_solutions(
     task: Task, normal: Normal, limits: Limits, done: Polished, pivot: PivotUnknown | None, count: int
 ) -> tuple[Solution, ...]:
-    """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
+    """Evaluate answers as solutions, ranked, and at most so many."""
 
     def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
         found = (
             Solution.of(
                 task,
-                as_asked(task, linkage_of(a.start, normal, pivot, limits)),
+                as_asked(task, make_linkage(a.start, normal, pivot, limits)),
                 _stations(task, normal, a.start.rotation),
             )
             for a in answers
@@ -395,7 +385,7 @@ def solutions_of(
 
 
 def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-    """Crank rotations of the task's own stations, from those of the ones it was fitted at."""
+    """Return the crank rotations of the task's own stations, from those of the stations it was fitted at."""
     own = normal_form(task)
     if rotation is None or len(rotation) == own.n:
         return rotation
@@ -408,7 +398,7 @@ def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) 
 
 
 def infeasible(done: Polished) -> InfeasibleError:
-    """What to say where nothing was found that keeps the constraints."""
+    """Return the error for a search that found nothing that keeps the constraints."""
     if not done.others:
         return InfeasibleError("no linkage keeps all bounds and constraints")
     nearest: Answer = min(done.others, key=lambda a: a.violation)
@@ -439,15 +429,15 @@ class TradeOff:
 
     @property
     def error(self) -> np.ma.MaskedArray:
-        """Quality function at each limit, masked where there is no linkage; shape (n,)."""
+        """Return the quality function at each limit, masked where there is no linkage; shape (n,)."""
         values = [np.nan if s is None else s.error for s in self.solutions]
         return np.ma.masked_invalid(np.array(values))
 
     def columns(self) -> dict[str, list[float]]:
-        """Each limit with the columns of its best linkage, as in `Synthesis.columns`; limits without one are left out."""
+        """Return rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
         there = [(float(limit), s) for limit, s in zip(self.limit, self.solutions) if s is not None]
         over = OVER[self.over]
-        columns = columns_of([s for _, s in there])
+        columns = solution_columns([s for _, s in there])
         columns.pop("rank", None)
         return {f"limit of {over.name} [{over.unit}]": [limit for limit, _ in there], **columns}
 
@@ -493,7 +483,7 @@ def trade_off(
     kinds: Sequence[Kind] | None = None,
     gears: Sequence[float] = GEARS,
 ) -> TradeOff:
-    """Error against size or transmission angle, by the epsilon-constraint method with warm starts.
+    """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
 
     From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a
     second pass goes back, so that a solution found late serves the looser limits too, itself or polished anew: the error of
@@ -539,19 +529,19 @@ def trade_off(
         which: dict[str, Any] = {"pivot": pivot, "kinds": kinds, "gears": gears}
         return synthesize(task, bounds, (*rest, limit(k)), weights, guesses=guesses, search=how, **which).solutions
 
-    found, done = there_and_back(order.tolist(), best)
+    found, done = solve_both_ways(order.tolist(), best)
     result = TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))
     if done is not None:
         raise TradeOffInterrupted(result, done, 2 * len(values))
     return result
 
 
-def there_and_back(
+def solve_both_ways(
     order: Sequence[int],
     search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
     begin: Sequence[Solution] = (),
 ) -> tuple[dict[int, Solution], int | None]:
-    """The best solutions of a row of problems, each started from the ones before it, from the loosest to the tightest and back.
+    """Solve a row of problems, each started from the ones before it, from the loosest to the tightest and back.
 
     Parameters
     ----------
@@ -600,6 +590,6 @@ SHOWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "N": (1.0, "N")}
 
 
 def format_limit(over: str, limit: float) -> str:
-    """A limit of a trade-off with its unit."""
+    """Format a limit of a trade-off with its unit."""
     factor, unit = SHOWN[OVER[over].unit]
     return f"{factor * limit:.6g} {unit}"

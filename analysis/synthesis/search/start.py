@@ -15,9 +15,10 @@ from linkwork.errors import InputError
 from ...numerics.fourier import FourierSeries
 from ...numerics.workers import check_jobs, cores_of, interruptible, over_workers
 from ...run import shown
-from ..linkage.linkage import Linkage, SecondCrank, SliderMotion, wrapped
+from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
 from ..task.constraint import UNKNOWNS
-from ..task.limits import CrankUnknown, Limits, PivotUnknown, SliderUnknown
+from ..task.limits import Limits
 from ..task.task import Normal
 
 Item = TypeVar("Item")
@@ -63,7 +64,7 @@ class Search:
 
     @property
     def cores(self) -> int:
-        """Number of workers."""
+        """Return the number of workers."""
         return cores_of(self.n_jobs)
 
 
@@ -75,7 +76,7 @@ QUICK_SEARCH = Search(starts=12)
 def over_cores(
     work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
 ) -> tuple[list[Made], bool]:
-    """The results of all items, in their order on any number of cores; on Ctrl-C of those that were done, and True."""
+    """Work on all items, in their order on any number of cores; on Ctrl-C return the results so far, and True."""
     made: dict[int, Made] = {}
     with interruptible() as interrupted, shown(search.progress, float(len(items)), what) as show:
         for number, value in over_workers(work, items, interrupted, n_jobs=search.n_jobs):
@@ -108,6 +109,8 @@ class Start:
         In units squared; of a greatest error, in units.
     given : bool
         Whether it is a guess.
+    linkage : type
+        Type of the linkage: without a second crank, which is the pivot's.
     """
 
     q: FloatArray
@@ -116,6 +119,7 @@ class Start:
     given: bool = False
     pivot: FloatArray = field(default_factory=lambda: np.empty(0))
     rotation: FloatArray | None = None
+    linkage: type[Linkage] = Linkage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,7 +140,7 @@ class Answer:
 
     @classmethod
     def unjoined(cls, start: Start) -> Answer:
-        """Of a start whose links cannot be joined."""
+        """Make the answer for a start whose links cannot be joined."""
         return cls(
             start=replace(start, quality=inf),
             feasible=False,
@@ -150,7 +154,7 @@ class Answer:
 
 
 def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
-    """Unknowns of a pivot at random: harmonics that fall off with their order, within the bounds of stroke and length.
+    """Draw unknowns of a pivot at random: harmonics that fall off with their order, within the bounds of stroke and length.
 
     Parameters
     ----------
@@ -172,7 +176,7 @@ def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.r
 
 
 def pivot_size(pivot: PivotUnknown | None) -> int:
-    """Number of the pivot's unknowns."""
+    """Return the number of the pivot's unknowns."""
     if pivot is None:
         return 0
     return 2 + 2 * pivot.harmonics
@@ -190,7 +194,7 @@ def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, F
 
 
 def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Unknowns within their bounds, angles by whole turns where that is enough."""
+    """Move unknowns within their bounds, angles by whole turns where that is enough."""
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
     middle = 0.5 * (low[angles] + high[angles])
@@ -201,7 +205,7 @@ def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> float:
-    """How far a start is from its bounds (units, rad), in the dimensions that the task sees."""
+    """Return how far a start is from its bounds (units, rad), in the dimensions that the task sees."""
     q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
     off = np.abs(wrapped(q - start.q))
     off[:7] = np.abs(q - start.q)[:7]
@@ -212,10 +216,10 @@ def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> 
     return float(off.max())
 
 
-def linkage_of(
+def make_linkage(
     start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
 ) -> Linkage:
-    """The linkage of a start, in SI; its angles within a half turn of zero, or else within their limits."""
+    """Make the linkage of a start, in SI; its angles within half a turn of zero, or else within their limits."""
     q = start.q.copy()
     q[:7] *= normal.unit
     q[0] += normal.origin.real
@@ -234,13 +238,14 @@ def linkage_of(
     elif isinstance(pivot, CrankUnknown) and len(v):
         series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
         moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(wrapped(v[1])), series)
-    return Linkage.from_vector(q, start.branch, pivot=moved)
+    made: type[Linkage] = FiveBar if isinstance(moved, SecondCrank) else start.linkage
+    return made.from_vector(q, start.branch, pivot=moved)
 
 
-def start_of(
+def make_start(
     linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
 ) -> Start:
-    """A linkage as a start; the pivot's motion is cut off after, or filled up to, the harmonics sought."""
+    """Make a start of a linkage; the pivot's motion is cut off after, or filled up to, the harmonics sought."""
     q = np.append(linkage.vector, linkage.output_angle)
     q[0] -= normal.origin.real
     q[1] -= normal.origin.imag
@@ -256,11 +261,12 @@ def start_of(
             series = linkage.pivot.series.to_order(pivot.harmonics)
             v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
             v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
-    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True)
+    kind = SliderCrank if isinstance(linkage, SliderCrank) else Linkage
+    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
 
 
 def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
-    """The first items, at most so many, whose marks differ from those of all before by the distance in some component."""
+    """Return the first items, at most so many, whose marks differ by the distance from those of all before."""
     chosen: list[Item] = []
     marks: list[FloatArray] = []
     for item in items:

@@ -15,14 +15,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
-from ...run import traced as equations
-from ..linkage.kernels import guided
-from ..linkage.linkage import geared, transmission_excess
+from ..linkage.linkage import Linkage
+from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
 from ..task.constraint import TURNING, UNKNOWNS, Along, Least, Require
 from ..task.formula import physical, traced
-from ..task.limits import CrankUnknown, Limits, PivotUnknown, SliderUnknown
+from ..task.limits import Limits
 from ..task.task import Normal, turn
 from .start import pivot_bounds
 
@@ -53,14 +51,13 @@ class Label(NamedTuple):
     name: str
     factor: float
     unit: str
+    linkage: type[Linkage] = Linkage
 
     def measured(self, violation: float, q: FloatArray) -> str:
-        """By how much, with its unit; of a transmission angle, from what it does to the angle at the limit."""
+        """Format a violation with its unit; of a transmission angle by its effect on the angle at the limit."""
         if self.unit == "transmission":
             least = self.factor
-            # of a slider-crank, which has no rocker, of its square
-            sliding = q[5] == 0.0
-            cosine = cos(least) + violation / (2.0 * float(q[4] * q[4] * cos(least) if sliding else q[4] * q[5]))
+            cosine = cos(least) + violation / float(self.linkage.excess_slope(q[4], q[5], cos(least)))
             return f"{degrees(least - acos(min(1.0, cosine))):.3g} deg"
         return f"{self.factor * violation:.3g} {self.unit}".strip()
 
@@ -165,24 +162,24 @@ class Statement:
         self._nlp = {"x": casadi.vertcat(*z), "f": quality, "g": g, "p": parameters}
 
     def _unknown(self, name: str, low: FloatArray, high: FloatArray) -> Any:
-        """A new column of unknowns between bounds."""
+        """Add a column of unknowns between bounds."""
         symbol = self._casadi.SX.sym(name, len(low))
         self._unknowns.append((symbol, low, high))
         return symbol
 
     def _extra(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
-        """A new unknown that stands for a greatest value or the middle of a range, with what it is at a start."""
+        """Add an unknown that stands for a greatest value or the middle of a range, with its starting value."""
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
 
     @property
     def least(self) -> Least:
-        """What is made small in the place of an error."""
+        """Return the function that is minimised in the place of an error."""
         assert self.limits.least is not None
         return self.limits.least
 
     def _traced(self, require: Require, p: Any) -> Any:
-        """The values of a required function; of one along the crank's rotation also at the rotations that parameters say."""
+        """Trace a required function; one along the crank's rotation also at the rotations given by parameters."""
         casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
         if not isinstance(require, Along):
             return traced(require, values)
@@ -201,13 +198,12 @@ class Statement:
     # Objective
 
     def _closed(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
-        """Directions of the links and the coupler point (x, y) at rotations, by the plant's own loop closure."""
+        """Close the loop: directions of the links and the coupler point (x, y) at rotations, by the plant's equations."""
         casadi = self._casadi
         th2 = self._turns[0] * phi + p.crank_phase
         c2, s2 = casadi.cos(th2), casadi.sin(th2)
         dx, dy = self._displacement(v, phi)
-        closed = guided if self.limits.sliding else equations(FIVE_BAR).joined
-        g = closed(
+        g = self.limits.linkage.closure()(
             c2,
             s2,
             p.ground_length + dx - p.crank_length * c2,
@@ -234,7 +230,7 @@ class Statement:
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
     def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
-        """The quality function; with it the constraints that belong to it."""
+        """State the quality function, and the constraints that belong to it."""
         casadi, normal = self._casadi, self.normal
         g, point = self._closed(p, v, phi, branch)
         ex: Any = None
@@ -276,7 +272,7 @@ class Statement:
         return quality + self._straight_part(p, v, phi, branch, ex, ey)
 
     def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
-        """Constraints of a straight part, and what is added to the quality where its flatness is only favoured."""
+        """Constrain a straight part; return what is added to the quality where its flatness is only favoured."""
         casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
         if straight is None or points is None:
             return 0.0
@@ -304,11 +300,11 @@ class Statement:
     # Constraints
 
     def _in_words(self, share: float) -> float:
-        """Factor of an error in shares of something in units, to mm or degrees."""
+        """Return the factor to mm or degrees of an error given as a share of something in units."""
         return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
 
     def excess(self, violation: float) -> dict[str, Any]:
-        """What an `Answer` says whose greatest error is too large by that (units)."""
+        """Return the fields of an `Answer` whose greatest error is too large by that (units)."""
         label = Label(ERROR, self._in_words(1.0), "deg" if self.normal.of_rocker else "mm")
         return {"violation": violation, "worst": ERROR, "excess": label.measured(violation, np.empty(0))}
 
@@ -317,14 +313,14 @@ class Statement:
     ) -> None:
         """Keep a value between bounds; ``factor`` makes its unit of it, by default from units of length or rad."""
         usual = {"mm": 1e3 * self.normal.unit, "deg": degrees(1.0)}
-        label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit)
+        label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit, self.limits.linkage)
         self._constraints.append((value, low, high, label))
 
     def _at_most(self, value: Any, name: str, unit: str = "mm", factor: float | None = None) -> None:
         self._within(value, -inf, 0.0, name, unit, factor)
 
     def _ordered(self, phi: Any, direction: Any) -> None:
-        """The stations come one after the other, within a turn."""
+        """Keep the stations in order, within a turn."""
         n = self.normal.n
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
@@ -335,7 +331,7 @@ class Statement:
         self._within(total, *closing, "stations within a turn", "deg")
 
     def _way_of_path(self, direction: Any) -> tuple[Any, Any]:
-        """Stations of a path on even steps between the few whose rotations matter, and the rotations of these."""
+        """Place the stations of a path on even steps between the few with unknown rotations; return these rotations too."""
         casadi, normal = self._casadi, self.normal
         ends = set() if normal.closed else {0, normal.n - 1}
         part = () if normal.straight is None else (normal.straight.start, normal.straight.end)
@@ -360,7 +356,7 @@ class Statement:
         return phi, knots
 
     def _shaped(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
-        """The links keep their Grashof type, the fixed pivots their regions."""
+        """Keep the links' Grashof type, and the fixed pivots in their regions."""
         casadi, limits = self._casadi, self.limits
         if limits.grashof:
             links = casadi.vertcat(p.ground_length, p.crank_length, p.coupler_length, p.rocker_length)
@@ -374,7 +370,7 @@ class Statement:
             self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
 
     def _assembled(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
-        """The transmission angle keeps its distance over the turn, over the way of the task, or both."""
+        """Keep the transmission angle over the turn, over the way of the task, or both."""
         casadi, limits = self._casadi, self.limits
         l1, l2 = p.ground_length, p.crank_length
         if limits.turn is not None and self.pivot is None:
@@ -388,36 +384,36 @@ class Statement:
             x, step = self._way(phi)
             d2 = self._reach(p, v, x)
             # an extreme between two of these rotations is where the crank lies along the ground link: no more than this off
-            slack = 2.0 * (l1 + l2 * limits.sliding) * l2 * (1.0 - casadi.cos(0.5 * step))
+            slack = limits.linkage.slack(l1, l2, casadi.cos(0.5 * step))
             self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
-        """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
+        """Keep |cos mu| below cos(least), and below the tilt, from squares of the distance BD and without division."""
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
-            rocker = None if self.limits.sliding else p.rocker_length
-            for excess in transmission_excess(p.coupler_length, rocker, nearest, farthest, cosine):
+            links = p.coupler_length, p.rocker_length
+            for excess in self.limits.linkage.transmission_excess(*links, nearest, farthest, cosine):
                 self._at_most(
                     excess, "transmission angle", "transmission", acos(cosine) if isinstance(cosine, float) else 0.0
                 )
 
     def _reach(self, p: Any, v: Any, x: Any) -> Any:
-        """Square of the distance from crank pin to rocker pivot, or to the guide, at rotations."""
+        """Return the square of the distance from crank pin to rocker pivot, or to the guide, at rotations."""
         casadi = self._casadi
         dx, dy = self._displacement(v, x)
         th2 = self._turns[0] * x + p.crank_phase
         bx = p.ground_length + dx - p.crank_length * casadi.cos(th2)
         by = dy - p.crank_length * casadi.sin(th2)
-        return bx * bx if self.limits.sliding else bx * bx + by * by
+        return self.limits.linkage.square(bx, by)
 
     def _way(self, phi: Any) -> tuple[Any, Any]:
-        """The stations' rotations and some in between, and how far from each the next one is."""
+        """Return the stations' rotations and some in between, and the distance from each to the next."""
         steps = 0.25 * (phi[1:] - phi[:-1])
         between = [phi[:-1] + k * steps for k in (1, 2, 3)]
         casadi = self._casadi
         return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], steps, steps, steps)
 
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
-        """Bounds of the slider's motion; what its smoothness adds to the quality."""
+        """Bound the slider's motion; return what its smoothness adds to the quality."""
         casadi, unit = self._casadi, self.normal.unit
 
         def position(x: Any) -> Any:
@@ -446,7 +442,7 @@ class Statement:
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
     def _rate(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
-        """A derivative of the slider's position within a bound (m)."""
+        """Keep a derivative of the slider's position within a bound (m)."""
         if isfinite(bound):
             scale = self.normal.unit / bound
             self._bounded(
@@ -461,7 +457,7 @@ class Statement:
     def _bounded(
         self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0
     ) -> None:
-        """A trigonometric polynomial of the crank's rotation stays within -1 and 1; what IPOPT sees is ``size`` times that.
+        """Keep a trigonometric polynomial of the crank's rotation within -1 and 1; IPOPT sees ``size`` times that.
 
         It is held at places all round and where the parameters say, less a share: of a first solution that which makes sure of
         what is between the places, a trigonometric polynomial being nowhere larger than at these but for the cosine (Ehlich and
@@ -484,7 +480,7 @@ class Statement:
 
 
 def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:
-    """A Fourier series, or a derivative of it, at x: mean (where there is one), then cosine and sine of each harmonic."""
+    """Evaluate a Fourier series or a derivative: mean (where there is one), then cosine and sine of each harmonic."""
     value = (coefficients[0] if order == 0 else 0.0) + 0.0 * x if mean else 0.0 * x
     first = 1 if mean else 0
     for k in range((coefficients.numel() - first) // 2):

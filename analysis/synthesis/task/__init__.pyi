@@ -1,7 +1,7 @@
 from .constraint import Constraint as Constraint
 from .constraint import InfeasibleError as InfeasibleError
 from .limits import Limits as Limits
-from .limits import limits_of_kinds as limits_of_kinds
+from .limits import limits_by_kind as limits_by_kind
 from .target import TargetPath as TargetPath
 from .target import area_between as area_between
 from .task import Task as Task

@@ -15,6 +15,7 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 from ...numerics import symbolic
 from ...units import Amount, in_si, quantity
 from ..linkage.kernels import PLACES
+from ..linkage.linkage import Linkage
 from ..linkage.machine import PINS, USUAL_MAKE, Make, pin_functions
 from .task import Normal
 
@@ -128,7 +129,7 @@ class PivotRegion:
         object.__setattr__(self, "polygon", corners)
 
     def pieces(self) -> list[FloatArray]:
-        """The region as triangles, counter-clockwise, each shape (3, 2)."""
+        """Cut the region into triangles, counter-clockwise, each shape (3, 2)."""
         from shapely import Polygon, constrained_delaunay_triangles
         from shapely.geometry.polygon import orient
 
@@ -137,7 +138,7 @@ class PivotRegion:
 
 
 def half_planes(triangle: FloatArray) -> FloatArray:
-    """Rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
+    """Return rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
     rows = np.zeros((3, 3))
     for k in range(3):
         (x0, y0), (x1, y1) = triangle[k], triangle[(k + 1) % 3]
@@ -208,17 +209,17 @@ class Way(NamedTuple):
         The task's crank rotations, where it gives any.
     straight : bool
         Whether the bounds hold the coupler point on the line of B and C.
-    sliding : bool
+    linkage : type
         Whether it is about a slider-crank.
     """
 
     turn: bool
     rotation: FloatArray | None
     straight: bool = False
-    sliding: bool = False
+    linkage: type[Linkage] = Linkage
 
     def ends(self, what: str) -> tuple[float, float]:
-        """First and last crank angle of a turn, or crank rotation of the task.
+        """Return the first and last crank angle of a turn, or crank rotation of the task.
 
         Raises InputError if neither is known.
         """
@@ -228,7 +229,7 @@ class Way(NamedTuple):
         return float(rotation.min()), float(rotation.max())
 
     def timed(self, what: str) -> FloatArray:
-        """The task's crank rotations; raises InputError if it gives none."""
+        """Return the task's crank rotations; raises InputError if it gives none."""
         if self.rotation is None:
             raise InputError(f"{what} needs crank rotations, and the task gives none")
         return self.rotation
@@ -253,11 +254,11 @@ class Demand:
     seeks: ClassVar[bool] = False
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The functions."""
+        """Return the required functions."""
         raise NotImplementedError
 
     def sought(self, way: Way, normal: Normal) -> Least | None:
-        """What it makes small in the place of an error."""
+        """Return the function that is minimised in the place of an error; None where there is none."""
         return None
 
 
@@ -281,7 +282,7 @@ class TimeRatio(Demand):
             raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """Functions of how much the crank's way between the dead centres is off half a turn."""
+        """Return the required functions."""
 
         def differs(d: Any) -> Any:
             # directions of C from A with crank and coupler in line, by the law of cosines
@@ -309,7 +310,7 @@ USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
 
 
 def _kinds() -> list[str]:
-    """Names of the constraints."""
+    """Return the names of the constraints."""
     found, below = [kind.__name__ for kind in get_args(Constraint)[1:]], [Demand]
     while below:
         below = [kind for one in below for kind in one.__subclasses__()]
@@ -336,7 +337,7 @@ class Stroke:
             raise ParameterError("stroke", (self.least, self.greatest), "be two lengths in order (m)")
 
     def requires(self) -> tuple[Require, ...]:
-        """The same as functions of the dimensions."""
+        """Return the required functions."""
         found = []
         if self.least > 0.0:
             low = self.least
@@ -348,21 +349,21 @@ class Stroke:
 
 
 def stroke(d: Any) -> Any:
-    """Travel of the slider of a slider-crank (m), of numbers and symbols: between crank and coupler in line and folded."""
+    """Return the travel of the slider of a slider-crank (m), of numbers and symbols."""
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     ends = [np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)) for side in (1.0, -1.0)]
     return ends[0] - ends[1]
 
 
 def advance(d: Any) -> Any:
-    """By how much the crank's way between the dead centres of a slider-crank is off half a turn (rad), as `stroke`."""
+    """Return the crank's rotation between the dead centres of a slider-crank less half a turn (rad), of symbols too."""
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     angles = [np.arctan2(np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)), l1) for side in (1.0, -1.0)]
     return angles[0] - angles[1]
 
 
 def _time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
-    """The time ratio of a slider-crank as functions of the dimensions: (pi + advance)/(pi - advance)."""
+    """Return the time ratio of a slider-crank as required functions: (pi + advance)/(pi - advance)."""
     low, high = (
         pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi for ratio in (asked.least, asked.greatest)
     )
@@ -385,13 +386,13 @@ class _Forces(Demand):
     pins: str
 
     def along(self, way: Way) -> Along:
-        """The forces on the pins (N), a column each."""
+        """Return the forces on the pins (N), a column each."""
         ends, turn = way.ends("a force on the pins"), way.turn
 
         def magnitudes(d: Any, rotation: Any) -> Any:
             casadi = symbolic.library()
             th2 = rotation if turn else rotation + d.crank_phase
-            found = pin_functions(d, self.make, th2, straight=way.straight, sliding=way.sliding)
+            found = pin_functions(d, self.make, th2, straight=way.straight, linkage=way.linkage)
             # a force of zero has a slope, too
             chosen = [found[pin] for pin in self.pins]
             return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))
@@ -400,8 +401,8 @@ class _Forces(Demand):
             function=magnitudes,
             name="force on the pins",
             unit="N",
-            rotation=grid(ends),
-            ends=looked(ends),
+            rotation=even_rotations(ends),
+            ends=search_range(ends),
             symbolic=True,
         )
 
@@ -431,7 +432,7 @@ class MaxPinForce(_Forces):
         _check_pins(self.pins)
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The forces less the bound."""
+        """Return the required functions."""
         forces = self.along(way)
 
         def excess(d: Any, rotation: Any) -> Any:
@@ -464,11 +465,11 @@ class LeastPinForce(_Forces):
         _check_pins(self.pins)
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """Nothing by itself."""
+        """Return the required functions."""
         return ()
 
     def sought(self, way: Way, normal: Normal) -> Least:
-        """The forces, and the bound of the error in normal form."""
+        """Return the function that is minimised in the place of an error; None where there is none."""
         error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
         if not (isfinite(error) and error > 0.0):
             raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
@@ -486,12 +487,12 @@ BEYOND = 0.02
 # As constraints
 
 
-def grid(ends: tuple[float, float]) -> FloatArray:
-    """Rotations between two, evenly."""
+def even_rotations(ends: tuple[float, float]) -> FloatArray:
+    """Return evenly spaced rotations between two angles."""
     return np.linspace(*ends, GRID, endpoint=ends[1] - ends[0] < 2.0 * pi)
 
 
-def looked(ends: tuple[float, float]) -> tuple[float, float]:
-    """The rotations between which peaks are looked for: of a turn a little more, so that one at its end is seen."""
+def search_range(ends: tuple[float, float]) -> tuple[float, float]:
+    """Return the range in which peaks are searched: a little more than a turn, so that one at its end is seen."""
     over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
     return ends[0] - over, ends[1] + over

@@ -49,7 +49,7 @@ _LONGEST = 1000
 
 
 def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]:
-    """A function of one variable from a text such as ``"70 + 100*abs(sin(t/2))"``.
+    """Make a function of one variable from a text such as ``"70 + 100*abs(sin(t/2))"``.
 
     Numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign
     floor ceil hypot min max degrees radians``, and the variable; angles in radians. Nothing else is run: the text is parsed
@@ -141,7 +141,7 @@ def _number(value: float | str) -> float:
 
 
 def _parameter(start: float | str, end: float | str, n: int, turn: bool) -> FloatArray:
-    """n values at equal steps from start to end, the end itself left out for a whole turn."""
+    """Return n values at equal steps from start to end, without the end for a whole turn."""
     a, b = _number(start), _number(end)
     if not (np.isfinite([a, b]).all() and b > a):
         raise InputError(f"the parameter goes from {start!r} to {end!r}: the end must be greater, and both finite")
@@ -158,7 +158,7 @@ def path_from_formula(
     end: float | str = 2.0 * pi,
     variable: str = "t",
 ) -> TargetPath:
-    """A curve from two formulas, at n equal steps of their parameter.
+    """Make a curve from two formulas, at n equal steps of their parameter.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def function_from_formula(
     variable: str = "t",
     spacing: Spacing = "even",
 ) -> tuple[FloatArray, FloatArray]:
-    """Angles at n equal steps of the crank angle from a formula; for example ``"70 + 100*abs(sin(t/2))"`` in ``"deg"``.
+    """Compute angles at n equal steps of the crank angle from a formula such as ``"70 + 100*abs(sin(t/2))"``.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def function_from_formula(
 
 
 def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
-    """Places of n precision points between two limits, at which the error between them is about the least.
+    """Return the places of n precision points between two limits at which the error between them is about the least.
 
     The roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
 
@@ -272,7 +272,7 @@ _MEASURE = re.compile(
 
 
 def requirement(text: Any, name: str = "constraints.require") -> Require:
-    """A constraint from a text such as ``"crank_length + rocker_length <= 300 mm"``.
+    """Make a constraint from a text such as ``"crank_length + rocker_length <= 300 mm"``.
 
     Two sides about ``<=``, ``>=`` or ``==``, of dimensions by their name in `Linkage`, numbers with a unit of length or angle
     or without (SI), ``+ - * / **``, brackets, ``pi`` and functions. It is parsed, and each part either stands on this list or
@@ -305,7 +305,7 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
     try:
         for side in sides:
             _check_side(side, text, numbers)
-        function = _of_dimensions(ast.BinOp(sides[sign < 0], ast.Sub(), sides[sign > 0]))
+        function = _compile_dimensions(ast.BinOp(sides[sign < 0], ast.Sub(), sides[sign > 0]))
         if math.isinf(function(SimpleNamespace(**dict.fromkeys(UNKNOWNS, 0.1)))):
             raise OverflowError
     except RecursionError:
@@ -358,8 +358,8 @@ class _Dimensions(ast.NodeTransformer):
         return ast.Constant(float(node.value))  # type: ignore[arg-type]  # 9**9**9 of integers would never end
 
 
-def _of_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
-    """A function of a namespace of dimensions; from `math` as a function written by hand, so that it can be traced."""
+def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
+    """Compile an expression to a function of a namespace of dimensions, with `math` as in a function written by hand."""
     argument = ast.arguments(posonlyargs=[], args=[ast.arg(arg="p")], kwonlyargs=[], kw_defaults=[], defaults=[])
     body = ast.Expression(body=ast.Lambda(args=argument, body=_Dimensions().visit(tree)))
     code = compile(ast.fix_missing_locations(body), "<requirement>", "eval")
@@ -387,7 +387,7 @@ RENAMED: dict[str, Callable[..., Any]] = {
 
 
 def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
-    """Dimensions in SI, from those in normal form, for functions of the user's."""
+    """Return dimensions in SI from those in normal form, for functions of the user."""
     values = dict(vars(p))
     for name in UNKNOWNS[:7]:
         values[name] = unit * values[name]
@@ -396,7 +396,7 @@ def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespac
 
 
 def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
-    """Value of a function for CasADi symbols; what one of the user's takes from `math` or NumPy is replaced by CasADi's.
+    """Evaluate a function for CasADi's symbols; functions of `math` and NumPy are replaced by CasADi's.
 
     Raises
     ------
@@ -422,8 +422,8 @@ def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
     return value
 
 
-def peaks_of(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
-    """Where a function along the crank's rotation has its greatest values, and how they are curved.
+def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
+    """Find the greatest values of a function along the crank's rotation, and their curvature.
 
     Returns
     -------
@@ -451,7 +451,7 @@ def peaks_of(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
 
 
 def _rebound(value: Any, seen: dict[int, Any]) -> Any:
-    """What a function of the user's takes from elsewhere, `math` and NumPy replaced by CasADi, his own functions likewise."""
+    """Replace `math` and NumPy in a user's function by CasADi, and so in the functions that it calls."""
     casadi = symbolic.library()
     if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
         known = {n: getattr(casadi, n) for n in TRACED} | RENAMED
@@ -477,5 +477,5 @@ def _rebound(value: Any, seen: dict[int, Any]) -> Any:
 
 
 def _asked_names(code: CodeType) -> set[str]:
-    """Global names that code, or code within it, may ask for."""
+    """Return the global names that code, or code within it, may ask for."""
     return {*code.co_names}.union(*(_asked_names(c) for c in code.co_consts if isinstance(c, CodeType)))

@@ -7,7 +7,7 @@ and rocker do, or the coupler is square to the guide, and the crank can go no fa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import acos, cos, inf, isfinite, pi
@@ -24,17 +24,102 @@ from ...mechanisms import FIVE_BAR
 from ...numerics import symbolic
 from ...run import traced
 from ...units import Amount, in_si
-from ..linkage.kernels import guided
-from ..linkage.linkage import Linkage, transmission_excess
-from .constraint import TURNING, Along, Demand, Require, Way, grid, looked
+from ..linkage.kind import Kind
+from ..linkage.linkage import Linkage
+from .constraint import TURNING, Along, Demand, Require, Way, even_rotations, search_range
 
 FloatArray = NDArray[np.float64]
 #: Two links in one line: one beyond the other, or one over the other.
 InLine = Literal["stretched", "folded"]
 
 
+class _FourBarPositions:
+    """Conditions of the limit positions of a four-bar, of numbers and symbols; `POSITIONS` has those of each kind."""
+
+    @staticmethod
+    def dead_cosine(l1: float, reach: float, l4: float) -> float:
+        """Return the cosine of the direction of C from A with crank and coupler in line, C at a distance ``reach``."""
+        return (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * reach)
+
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        """Return what is zero in a dead centre: how far the triangle of A, C and D is from closing."""
+        l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
+        return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
+
+    @staticmethod
+    def toggle_cosines(l1: float, l2: float, l3: float, l4: float) -> list[float]:
+        """Return the cosines of the crank angle in the toggles."""
+        return [(l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (l3 + l4, l3 - l4)]
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        """Return what is zero in a toggle, at the cosine of the crank angle; side 1 is stretched, -1 folded."""
+        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+        reach = l3 + l4 if side > 0.0 else l3 - l4
+        return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
+
+    @staticmethod
+    def out_of_line(d: Any, c: Any) -> Any:
+        """Return what is below zero where coupler and rocker are out of line."""
+        l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+        square = l1**2 + l2**2 - 2.0 * l1 * l2 * c
+        both = Linkage.transmission_excess(l3, l4, square, square, cos(TURNING))
+        return symbolic.library().horzcat(*both) / (2.0 * l3 * l4)
+
+    @staticmethod
+    def gained(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
+        """Return the numerator of the mechanical advantage, zero in a toggle."""
+        return linkage.rocker_length * (s3 * c4 - c3 * s4) / linkage.crank_length
+
+    @staticmethod
+    def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        """Return the speed of the driven link for one of the crank, from the closed loop."""
+        return traced(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
+
+
+class _SliderCrankPositions(_FourBarPositions):
+    """Conditions of the limit positions of a slider-crank: C on its guide, the coupler square to it in a toggle."""
+
+    @staticmethod
+    def dead_cosine(l1: float, reach: float, l4: float) -> float:
+        return l1 / reach
+
+    @staticmethod
+    def dead_gap(d: Any, reach: Any, c: Any) -> Any:
+        return (d.ground_length - reach * c) / d.coupler_length
+
+    @staticmethod
+    def toggle_cosines(l1: float, l2: float, l3: float, l4: float) -> list[float]:
+        return [(l1 - l3) / l2, (l1 + l3) / l2]
+
+    @staticmethod
+    def toggle_gap(d: Any, c: Any, side: float) -> Any:
+        return (d.ground_length - d.crank_length * c) / d.coupler_length - side
+
+    @staticmethod
+    def out_of_line(d: Any, c: Any) -> Any:
+        apart = (d.ground_length - d.crank_length * c) / d.coupler_length
+        return apart * apart - cos(TURNING) ** 2
+
+    @staticmethod
+    def gained(linkage: Linkage, c3: Any, s3: Any, c4: Any, s4: Any) -> Any:
+        return s3
+
+    @staticmethod
+    def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
+        return (g.s3 * c2 - g.c3 * s2) / g.s3
+
+
+#: Of a geared five-bar nothing rests.
+POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
+    "four-bar": _FourBarPositions,
+    "slider-crank": _SliderCrankPositions,
+}
+
+
 def dead_centres(linkage: Linkage) -> tuple[float, ...]:
-    """Crank rotations at which rocker or slider rest, within a turn from 0 (rad), increasing; none where they never rest.
+    """Return the crank rotations at which rocker or slider rest, within a turn from 0 (rad), increasing; none without rest.
 
     Raises
     ------
@@ -48,7 +133,7 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
         if reach == 0.0:
             continue
         # of the direction of the coupler, which points to the side of the assembly
-        cosine = l1 / reach if linkage.slides else (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * reach)
+        cosine = POSITIONS[linkage.kind].dead_cosine(l1, reach, l4)
         if abs(cosine) > 1.0:
             continue
         th3 = linkage.branch * acos(cosine)
@@ -57,7 +142,7 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
 
 
 def toggles(linkage: Linkage) -> tuple[float, ...]:
-    """Crank rotations at which coupler and rocker lie in one line, within a turn from 0 (rad); none if the crank turns fully.
+    """Return the crank rotations at which coupler and rocker are in line, within a turn from 0 (rad); none with a full turn.
 
     Of a slider-crank where the coupler is square to the guide; where the rocker pivot moves, of the shaft that turns once
     until all is as it was.
@@ -66,18 +151,14 @@ def toggles(linkage: Linkage) -> tuple[float, ...]:
         return _toggles_by_roots(linkage)
     l1, l2, l3, l4 = _fixed_lengths(linkage)
     found = []
-    if linkage.slides:
-        cosines = [(l1 - l3) / l2, (l1 + l3) / l2]
-    else:
-        cosines = [(l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (l3 + l4, l3 - l4)]
-    for cosine in cosines:
+    for cosine in POSITIONS[linkage.kind].toggle_cosines(l1, l2, l3, l4):
         if abs(cosine) <= 1.0:
             found += [acos(cosine), -acos(cosine)]
     return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
 
 
 def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
-    """Where the cosine of the angle between coupler and rocker passes -1 or 1."""
+    """Find where the cosine of the angle between coupler and rocker passes -1 or 1."""
 
     def beyond(phi: Any) -> Any:
         return np.abs(linkage.cosine_at_c(linkage.reach(phi))) - 1.0
@@ -89,7 +170,7 @@ def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
 
 
 def time_ratio(linkage: Linkage) -> float | None:
-    """Time of the slow swing or stroke over that of the quick one, the crank turning evenly: 1 at least.
+    """Return the time of the slow swing or stroke over that of the quick one, the crank turning evenly: 1 at least.
 
     None where the crank cannot turn fully, or the rocker turns with it.
 
@@ -106,7 +187,7 @@ def time_ratio(linkage: Linkage) -> float | None:
 
 
 def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
-    """Torque on the rocker for a torque on the crank, without friction and masses: the crank's speed over the rocker's.
+    """Return the torque on the rocker for a torque on the crank, without friction and masses.
 
     Of a slider-crank the force on the slider for a force on the crank pin across the crank: the pin's speed over the slider's.
     Infinite in a dead centre, zero in a toggle; NaN where the links cannot be joined. Shape of the rotations.
@@ -120,7 +201,7 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     phi = np.atleast_1d(np.asarray(rotation, dtype=float))
     c3, s3, c4, s4, _, _ = linkage.directions(phi)
     th2 = phi + linkage.crank_phase
-    gained = s3 if linkage.slides else linkage.rocker_length * (s3 * c4 - c3 * s4) / linkage.crank_length
+    gained = POSITIONS[linkage.kind].gained(linkage, c3, s3, c4, s4)
     given = s3 * np.cos(th2) - c3 * np.sin(th2)
     with np.errstate(divide="ignore"):
         ratio = np.where(given == 0.0, inf, gained / np.where(given == 0.0, 1.0, given))
@@ -128,14 +209,14 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
 
 
 def _fixed_lengths(linkage: Linkage) -> tuple[float, float, float, float]:
-    """l1 ... l4 of a four-bar or a slider-crank; raises ParameterError if the rocker pivot moves."""
+    """Return l1 ... l4 of a four-bar or a slider-crank; raises ParameterError if the rocker pivot moves."""
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: where it moves, nothing rests in a dead centre")
     return linkage.ground_length, linkage.crank_length, linkage.coupler_length, linkage.rocker_length
 
 
 def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
-    """A range of crank rotations (rad), shorter than the longest, from its two ends or from one value."""
+    """Read a range of crank rotations (rad), shorter than the longest, from its two ends or from one value."""
     try:
         low, high = (float(end) for end in (value if isinstance(value, tuple | list) else (value, value)))
     except (TypeError, ValueError):
@@ -177,23 +258,20 @@ class MechanicalAdvantage(Demand):
             object.__setattr__(self, "at", at)
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """Functions of the speed of rocker or slider for that of crank or crank pin, which is finite in a dead centre."""
+        """Return the required functions of the dimensions."""
         all_the_way = self.at is None
         ends = way.ends("mechanical advantage") if all_the_way else None
         if ends is None:
             way.timed("mechanical advantage at crank rotations")
-        rotation, turn = self.at if ends is None else grid(ends), way.turn and all_the_way
+        rotation, turn = self.at if ends is None else even_rotations(ends), way.turn and all_the_way
 
         def speed(d: Any, rotation: Any) -> Any:
-            casadi, plant = symbolic.library(), traced(FIVE_BAR)
+            casadi = symbolic.library()
             th2 = rotation if turn else rotation + d.crank_phase
             c2, s2 = casadi.cos(th2), casadi.sin(th2)
             l2, l3, l4 = d.crank_length, d.coupler_length, d.rocker_length
-            closed = guided if way.sliding else plant.joined
-            g = closed(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
-            if way.sliding:
-                return (g.s3 * c2 - g.c3 * s2) / g.s3
-            return plant.coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
+            g = way.linkage.closure()(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
+            return POSITIONS[way.linkage.kind].speed(g, c2, s2, l2, l3, l4)
 
         def slow(d: Any, rotation: Any) -> Any:
             both = self.least * speed(d, rotation)
@@ -208,7 +286,7 @@ class MechanicalAdvantage(Demand):
                 function=f,
                 name=f"{which} mechanical advantage",
                 rotation=rotation,
-                ends=ends and looked(ends),
+                ends=ends and search_range(ends),
                 symbolic=True,
             )
             for which, (f, wanted) in asked.items()
@@ -245,7 +323,7 @@ class _Place(Demand):
         return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
 
     def _between(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
-        """Something that is zero in the place changes its sign from one end of the range to the other."""
+        """Require that a function which is zero in the place changes its sign within the range."""
         way.timed(f"a {self._name()} at crank rotations")
         low, high = self.at
         if low == high:
@@ -271,17 +349,14 @@ class DeadCentre(_Place):
         return "dead centre"
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The triangle of A, C and D closes there, or C is on the guide, on the side of the assembly."""
+        """Return the required functions of the dimensions."""
         stretched = self.position == "stretched"
 
         def closes(d: Any, rotation: float) -> Any:
-            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
-            reach = l3 + l2 if stretched else l3 - l2
+            reach = d.coupler_length + d.crank_length if stretched else d.coupler_length - d.crank_length
             # C from A is along the crank, or against it
             c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
-            if way.sliding:
-                return (l1 - reach * c) / l3
-            return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
+            return POSITIONS[way.linkage.kind].dead_gap(d, reach, c)
 
         def aside(d: Any, rotation: float) -> Any:
             s = symbolic.library().sin(rotation + d.crank_phase)
@@ -312,16 +387,11 @@ class Toggle(_Place):
         return "toggle"
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The triangle of A, B and D closes there, or the coupler spans the distance of B from the guide."""
+        """Return the required functions of the dimensions."""
 
         def closes(d: Any, rotation: float) -> Any:
-            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
-            stretched = self.position == "stretched"
-            reach = l3 + l4 if stretched else l3 - l4
             c = symbolic.library().cos(rotation + d.crank_phase)
-            if way.sliding:
-                return (l1 - l2 * c) / l3 - (1.0 if stretched else -1.0)
-            return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
+            return POSITIONS[way.linkage.kind].toggle_gap(d, c, 1.0 if self.position == "stretched" else -1.0)
 
         return self._between(way, closes)
 
@@ -343,22 +413,19 @@ class NoToggle(Demand):
         object.__setattr__(self, "between", _rotations(self.between, "rotations without a toggle"))
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The cosine of the transmission angle stays short of -1 and 1."""
+        """Return the required functions of the dimensions."""
         way.timed("a range of crank rotations without a toggle")
 
         def excess(d: Any, rotation: Any) -> Any:
-            casadi, l3, l4 = symbolic.library(), d.coupler_length, d.rocker_length
-            c = casadi.cos(rotation + d.crank_phase)
-            if way.sliding:
-                apart = (d.ground_length - d.crank_length * c) / l3
-                return apart * apart - cos(TURNING) ** 2
-            square = d.ground_length**2 + d.crank_length**2 - 2.0 * d.ground_length * d.crank_length * c
-            both = transmission_excess(l3, l4, square, square, cos(TURNING))
-            return casadi.horzcat(*both) / (2.0 * l3 * l4)
+            return POSITIONS[way.linkage.kind].out_of_line(d, symbolic.library().cos(rotation + d.crank_phase))
 
         ends = self.between
         return (
             Along(
-                function=excess, name="range without a toggle", rotation=grid(ends), ends=looked(ends), symbolic=True
+                function=excess,
+                name="range without a toggle",
+                rotation=even_rotations(ends),
+                ends=search_range(ends),
+                symbolic=True,
             ),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, pi
+from math import pi
 from typing import Any, get_args
 
 import numpy as np
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, ParameterError
 
 from ...files import unknown_name
-from ...units import Amount, in_si
 from ..linkage.kind import Kind
-from ..linkage.linkage import ANGLES, LINKS, Linkage, SecondCrank, geared
+from ..linkage.linkage import ANGLES, LINKS, FiveBar, Linkage, SliderCrank
+from ..linkage.pivot import CrankUnknown, geared
 from .constraint import (
     SECOND_LENGTH,
     UNKNOWNS,
@@ -46,89 +46,6 @@ LARGEST = 5.0
 GROUND = 0.1
 
 
-@in_si(guide_angle="rad", position="m", stroke="m", speed="m", acceleration="m")
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SliderUnknown:
-    """A slider whose motion is sought: a Fourier series with this many harmonics.
-
-    Attributes
-    ----------
-    harmonics : int
-        0 is a slider set once.
-    guide_angle : (float, float)
-        Bounds (rad); equal ones fix it.
-    position : (float, float), optional
-        Least and greatest slider position (m); by default one ground link to either side of its end, beyond which it would be
-        another linkage.
-    stroke : float
-        Greatest distance between the ends of its travel (m).
-    speed, acceleration : float
-        Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
-    smoothness : float
-        Weight of the mean of (d2u/dphi2)^2 (1/rad4) added to the quality: trades error for smoothness.
-    """
-
-    harmonics: int
-    guide_angle: tuple[Amount, Amount] = (-pi, pi)
-    position: tuple[Amount, Amount] | None = None
-    stroke: Amount = inf
-    speed: Amount = inf
-    acceleration: Amount = inf
-    smoothness: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.harmonics < 0:
-            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
-        low, high = self.guide_angle
-        if not (isfinite(low) and isfinite(high) and low <= high):
-            raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
-        if self.position is not None:
-            low, high = self.position
-            if not (isfinite(low) and isfinite(high) and low < high):
-                raise ParameterError(
-                    "bounds of slider position", self.position, "be two finite lengths, increasing (m)"
-                )
-        for name in ("stroke", "speed", "acceleration"):
-            if not getattr(self, name) > 0.0:
-                raise ParameterError(f"greatest {name}", getattr(self, name), "be greater than zero")
-        if not (isfinite(self.smoothness) and self.smoothness >= 0.0):
-            raise ParameterError("smoothness", self.smoothness, "be a finite number, zero or greater")
-
-
-@in_si(length="m")
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CrankUnknown:
-    """A second crank whose length, phase and, with ``harmonics``, independent rotation are sought.
-
-    Attributes
-    ----------
-    ratio : float
-        Turns for one of the first crank: see `SecondCrank`.
-    length : (float, float)
-        Bounds (m).
-    harmonics : int
-        Of the rotation added to the geared one; 0 of gears.
-    speed : float
-        Greatest deviation of d psi/d phi from the ratio.
-    """
-
-    ratio: float
-    length: tuple[Amount, Amount]
-    harmonics: int = 0
-    speed: float = inf
-
-    def __post_init__(self) -> None:
-        low, high = self.length
-        if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
-            raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
-        geared(self.ratio)
-        if self.harmonics < 0:
-            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
-
-
-PivotUnknown = SliderUnknown | CrankUnknown
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
     """Bounds and constraints in normal form: lengths in units of the target's size, about its centre.
@@ -146,8 +63,8 @@ class Limits:
     regions : tuple
         (pivot, triangles of complex corners), in units.
     requires : tuple of Require
-    sliding : bool
-        Whether it is of a slider-crank.
+    linkage : type
+        Type of the linkages.
     second : (float, float), optional
         Bounds of a second crank's length, in units, of a geared five-bar.
     ratio : float
@@ -164,29 +81,37 @@ class Limits:
     branches: tuple[int, ...]
     regions: tuple[tuple[str, tuple[FloatArray, ...]], ...]
     requires: tuple[Require, ...]
-    sliding: bool = False
+    linkage: type[Linkage] = Linkage
     second: tuple[float, float] | None = None
     ratio: float = 1.0
     least: Least | None = None
 
     @property
-    def kind(self) -> str:
-        """What it is of."""
-        return "slider-crank" if self.sliding else "four-bar" if self.second is None else "geared five-bar"
+    def gears(self) -> tuple[int, int]:
+        """Return the turns of the crank and of the second one for one of the shaft whose rotation is searched."""
+        return (1, 0) if self.second is None else geared(self.ratio)
 
-    @property
-    def turns(self) -> int:
-        """Turns of the crank for one of the shaft whose rotation is searched."""
-        return 1 if self.second is None else geared(self.ratio)[0]
+    def second_crank(self, unit: float) -> CrankUnknown | None:
+        """Return the second crank that a search varies; None but for a geared five-bar. The unit is in m."""
+        if self.second is None:
+            return None
+        low, high = self.second
+        return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
+
+    def admits(self, linkage: Linkage) -> bool:
+        """Return whether a linkage is of the kind that is searched for; a pivot moved otherwise counts as a four-bar's."""
+        if self.linkage is FiveBar:
+            return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio
+        return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)
 
     @property
     def along(self) -> bool:
-        """Whether something holds along the crank's rotation."""
+        """Return whether something holds along the crank's rotation."""
         return any(isinstance(require, Along) for require in self.requires)
 
     @property
     def bounds_only(self) -> bool:
-        """Whether nothing but bounds is asked, so that a least squares method can do it."""
+        """Return whether nothing but bounds is asked, so that a least squares method can do it."""
         return (
             self.turn is None
             and self.way is None
@@ -196,15 +121,15 @@ class Limits:
         )
 
 
-def limits_of(
+def make_limits(
     task: Task,
     normal: Normal,
     bounds: Mapping[str, tuple[float, float]] | None,
     constraints: Sequence[Constraint],
     *,
-    sliding: bool = False,
+    linkage: type[Linkage] = Linkage,
 ) -> Limits:
-    """Bounds and constraints of a task in normal form, of a four-bar or a slider-crank.
+    """Return bounds and constraints of a task in normal form, of a four-bar or a slider-crank.
 
     Raises ParameterError if a bound does not have the name of a dimension, or its ends are in the wrong order; InfeasibleError
     if they contradict one another.
@@ -222,7 +147,7 @@ def limits_of(
         if not isinstance(c, Constraint):
             raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")
     given = _ends(task, normal, bounds, constraints)
-    _check_links(given, constraints, sliding)
+    _check_links(given, constraints, linkage)
     _check_reach(given, normal, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
@@ -230,7 +155,7 @@ def limits_of(
     scale[:7] = normal.unit
     turn, way, grashof = _turning(constraints)
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
-    over = Way(turn is not None, normal.rotation, straight, sliding)
+    over = Way(turn is not None, normal.rotation, straight, linkage)
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
     if len(least) > 1:
         raise InputError("more than one thing is to be made small: a search has one objective")
@@ -250,7 +175,7 @@ def limits_of(
             if isinstance(c, PivotRegion)
         ),
         requires=tuple(r for c in constraints for r in _required(c, over)),
-        sliding=sliding,
+        linkage=linkage,
         least=least[0] if least else None,
     )
 
@@ -258,7 +183,7 @@ def limits_of(
 def _ends(
     task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]
 ) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of every unknown (m, rad): as asked, or what is usual."""
+    """Return the least and greatest value of every unknown (m, rad): as asked, or the usual ones."""
     caps = [c.length for c in constraints if isinstance(c, LargestLink)]
     function = isinstance(task, RockerFunction)
     cap = min(caps, default=LARGEST * (GROUND if function else normal.unit))
@@ -297,7 +222,7 @@ def _required(constraint: Constraint, way: Way) -> tuple[Require, ...]:
 
 
 def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
-    """Least transmission angles over a turn and over the way of the task, and Grashof's type; see `Limits`."""
+    """Return the least transmission angles over a turn and over the way of the task, and Grashof's type; see `Limits`."""
     turn, way = (
         max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
         for over in ("turn", "task")
@@ -323,7 +248,7 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
 
 
 def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]) -> tuple[float, float]:
-    """Bounds as given; an end that is None or infinite is the usual one."""
+    """Return bounds as given, with the usual value for an end that is None or infinite."""
     try:
         low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
     except (TypeError, ValueError):
@@ -336,12 +261,15 @@ def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[fl
     return low, high
 
 
-def _check_links(given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], sliding: bool) -> None:
+def _check_links(
+    given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], linkage: type[Linkage]
+) -> None:
     """Make sure that bounds alone leave a linkage whose crank turns, where that is asked."""
     if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
         return
     l1, l2, l3, l4 = (given[name] for name in LINKS)
     # l1 + l2 <= l3 + l4 is needed for a full turn, of a slider-crank l1 + l2 <= l3
+    sliding = linkage is SliderCrank
     least, most = l1[0] + l2[0], l3[1] + (0.0 if sliding else l4[1])
     if least > most:
         raise InfeasibleError(
@@ -398,11 +326,11 @@ _NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant 
 
 
 def usual_kinds(task: Task) -> tuple[Kind, ...]:
-    """The kinds that are tried where none are asked for."""
+    """Return the kinds that are tried where none are asked for."""
     return ("slider-crank",) if isinstance(task, SliderFunction) else ("four-bar",)
 
 
-def limits_of_kinds(
+def limits_by_kind(
     task: Task,
     normal: Normal,
     bounds: Mapping[str, tuple[float, float]] | None,
@@ -410,10 +338,10 @@ def limits_of_kinds(
     kinds: Sequence[Kind] | None = None,
     gears: Sequence[float] = GEARS,
 ) -> list[Limits]:
-    """Bounds and constraints of the searches: one for each kind, or the usual one, of geared five-bars one for each ratio.
+    """Return bounds and constraints for each kind of linkage, of geared five-bars for each ratio; see `usual_kinds`.
 
     Raises InputError if a kind is none, cannot do the task, or has no such constraint; ParameterError, InfeasibleError as
-    `limits_of`.
+    `make_limits`.
     """
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(kinds, str) or not kinds:
@@ -429,13 +357,13 @@ def limits_of_kinds(
             _check_constraints(kind, constraints)
         if kind == "four-bar":
             own: Sequence[Any] = constraints
-            found.append(limits_of(task, normal, bounds, own))
+            found.append(make_limits(task, normal, bounds, own))
         elif kind == "slider-crank":
-            found.append(_of_slider_crank(task, normal, bounds, constraints))
+            found.append(_slider_crank_limits(task, normal, bounds, constraints))
         else:
             if not gears:
                 raise InputError("no ratio of gears: geared five-bars need at least one")
-            found += _of_five_bars(task, normal, bounds, constraints, gears)
+            found += _five_bar_limits(task, normal, bounds, constraints, gears)
     return found
 
 
@@ -458,7 +386,7 @@ def _check_constraints(kind: Kind, constraints: Sequence[Any]) -> None:
             raise InputError(f"a {kind} cannot keep {name}{why}: leave it out, or ask for {' or '.join(able)} alone")
 
 
-def _of_slider_crank(task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any]) -> Limits:
+def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any]) -> Limits:
     own: list[Constraint] = []
     for c in constraints:
         if isinstance(c, Stroke):
@@ -479,7 +407,7 @@ def _of_slider_crank(task: Task, normal: Normal, bounds: Any, constraints: Seque
         )
         bounds = {"point_angle": (0.0, 0.0)} | dict(bounds or {})
     given = {"ground_length": (0.0, None)} | {n: ends for n, ends in dict(bounds or {}).items() if n != "rocker_length"}
-    limits = limits_of(task, normal, given, own, sliding=True)
+    limits = make_limits(task, normal, given, own, linkage=SliderCrank)
     low, high = limits.low.copy(), limits.high.copy()
     low[UNKNOWNS.index("rocker_length")] = high[UNKNOWNS.index("rocker_length")] = 0.0
     offset = UNKNOWNS.index("ground_length")
@@ -488,10 +416,10 @@ def _of_slider_crank(task: Task, normal: Normal, bounds: Any, constraints: Seque
     return replace(limits, low=low, high=high)
 
 
-def _of_five_bars(
+def _five_bar_limits(
     task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any], gears: Sequence[float]
 ) -> list[Limits]:
-    limits = limits_of(task, normal, bounds, constraints)
+    limits = make_limits(task, normal, bounds, constraints)
     links = slice(UNKNOWNS.index("ground_length"), UNKNOWNS.index("point_distance"))
     longest = float(limits.high[links].max())
     second = 1e-3 * longest, longest
@@ -501,32 +429,11 @@ def _of_five_bars(
         second = unknown.length[0] / normal.unit, unknown.length[1] / normal.unit
     # a ratio of gears is refused where it is made one
     made = [CrankUnknown(ratio=ratio, length=(1.0, 1.0)).ratio for ratio in gears]
-    return [replace(limits, second=second, ratio=float(ratio)) for ratio in made]
-
-
-def second_crank(limits: Limits, unit: float) -> CrankUnknown | None:
-    """The second crank that a search varies; None but for a geared five-bar."""
-    if limits.second is None:
-        return None
-    low, high = limits.second
-    return CrankUnknown(ratio=limits.ratio, length=(unit * low, unit * high))
-
-
-def kind_of(linkage: Linkage) -> Kind:
-    """Of what kind a linkage is; a pivot that is moved by no gears counts as a four-bar's."""
-    if isinstance(linkage.pivot, SecondCrank):
-        return "geared-five-bar"
-    return "slider-crank" if linkage.slides else "four-bar"
-
-
-def is_of(linkage: Linkage, limits: Limits) -> bool:
-    """Whether a linkage is of the kind that is searched for; a pivot that is moved otherwise counts as a four-bar's."""
-    geared = isinstance(linkage.pivot, SecondCrank) and linkage.pivot.ratio == limits.ratio
-    return linkage.slides == limits.sliding and (geared or limits.second is None)
+    return [replace(limits, linkage=FiveBar, second=second, ratio=float(ratio)) for ratio in made]
 
 
 def as_asked(task: Task, linkage: Linkage) -> Linkage:
-    """A slider-crank with its guide on the x axis and the slider as its coupler point, exactly, where that is asked."""
+    """Move a slider-crank's guide to the x axis and its coupler point to the slider, exactly, where the task asks for that."""
     if not isinstance(task, SliderFunction):
         return linkage
     side = 1.0 if linkage.ground_angle > 0.0 else -1.0

@@ -28,7 +28,7 @@ FREEDOM_WEIGHT = 1.4
 
 
 def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
-    """Points as an array of shape (n, 2) of finite numbers, a copy.
+    """Return points as an array of shape (n, 2) of finite numbers, a copy.
 
     Raises InputError if the shape is another, a coordinate is not finite, or there are less than ``least`` points; ``what``
     they are is named.
@@ -50,17 +50,17 @@ def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
 
 
 def ring(points: FloatArray, closed: bool) -> FloatArray:
-    """The polyline's vertices in order, the first one again at the end if it is closed."""
+    """Return the polyline's vertices in order, the first one again at the end if it is closed."""
     return np.vstack([points, points[:1]]) if closed else points
 
 
 def arc_lengths(vertices: FloatArray) -> FloatArray:
-    """Length along a polyline up to each vertex, from 0, shape (n,)."""
+    """Return the length along a polyline up to each vertex, from 0, shape (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
 
 
 def halves(lengths: FloatArray, closed: bool) -> FloatArray:
-    """Half of both segments at each point of a polyline, from the lengths of its segments."""
+    """Return half of both segments at each point of a polyline, from the lengths of its segments."""
     before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
     after = lengths if closed else np.append(lengths, 0.0)
     both: FloatArray = 0.5 * (before + after)
@@ -68,13 +68,13 @@ def halves(lengths: FloatArray, closed: bool) -> FloatArray:
 
 
 def along(vertices: FloatArray, s: ArrayLike) -> FloatArray:
-    """Points of a polyline at arc lengths s, shape (len(s), 2)."""
+    """Interpolate points of a polyline at arc lengths s, shape (len(s), 2)."""
     lengths = arc_lengths(vertices)
     return np.column_stack([np.interp(np.asarray(s, dtype=float), lengths, column) for column in vertices.T])
 
 
 def even_odd_area(*rings: FloatArray) -> float:
-    """Area of the points that closed polylines go round an odd number of times in all (m2).
+    """Compute the area of the points that closed polylines go round an odd number of times in all (m2).
 
     Of one polyline it is the enclosed area, by the even-odd rule where it crosses itself: both lobes of a figure-eight
     count, an inner loop does not. Of two it is the area of the symmetric difference of what they enclose, because a
@@ -146,7 +146,7 @@ class TargetPath:
     def from_file(
         cls, path: str | Path, *, unit: str | None = None, name: str | None = None, closed: bool | None = None
     ) -> TargetPath:
-        """The curve of a CSV or SVG file; see `analysis.files.read_points`. ``closed`` overrules what the file says.
+        """Read the curve of a CSV or SVG file; see `analysis.files.read_points`. ``closed`` overrules the file.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class TargetPath:
 
     @property
     def length(self) -> float:
-        """Length of the polyline (m)."""
+        """Return the length of the polyline (m)."""
         return float(arc_lengths(ring(self.points, self.closed))[-1])
 
     def _segments(self) -> tuple[FloatArray, FloatArray]:
@@ -167,14 +167,14 @@ class TargetPath:
 
     @property
     def centroid(self) -> FloatArray:
-        """Centroid of the line itself, not of the area inside (m), shape (2,)."""
+        """Return the centroid of the line itself, not of the area inside (m), shape (2,)."""
         middles, lengths = self._segments()
         centre: FloatArray = lengths @ middles / lengths.sum()
         return centre
 
     @property
     def size(self) -> float:
-        """Radius of gyration: the root of the mean squared distance of the line from its centroid (m)."""
+        """Return the radius of gyration: the root of the mean squared distance of the line from its centroid (m)."""
         middles, lengths = self._segments()
         # a segment has l^2/12 about its own middle
         squares = ((middles - self.centroid) ** 2).sum(axis=1) + lengths**2 / 12.0
@@ -182,7 +182,7 @@ class TargetPath:
 
     @property
     def signed_area(self) -> float:
-        """Integral of x dy round the closed curve (m2): positive counter-clockwise; the lobes of a figure-eight cancel.
+        """Return the integral of x dy round the closed curve (m2): positive counter-clockwise; lobes of a figure-eight cancel.
 
         Raises
         ------
@@ -195,7 +195,7 @@ class TargetPath:
 
     @property
     def enclosed_area(self) -> float:
-        """Area inside, by the even-odd rule where the curve crosses itself (m2); see `even_odd_area`.
+        """Return the area inside, by the even-odd rule where the curve crosses itself (m2); see `even_odd_area`.
 
         Raises
         ------
@@ -211,12 +211,12 @@ class TargetPath:
 
     @property
     def weights(self) -> FloatArray:
-        """Arc length that belongs to each point: half of both segments at it (m), shape (n,); their sum is the length."""
+        """Return the arc length that belongs to each point: half of both segments at it (m), shape (n,)."""
         return halves(self._segments()[1], self.closed)
 
     @property
     def normals(self) -> FloatArray:
-        """Unit normals at the points, shape (n, 2): outwards of a closed curve, to the right along an open one.
+        """Return the unit normals at the points, shape (n, 2): outwards of a closed curve, to the right along an open one.
 
         The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), at an
         open end that of the segment. Of a closed curve that crosses itself 'outwards' is that of the lobe with more area.
@@ -239,12 +239,12 @@ class TargetPath:
         return normals
 
     def reversed(self) -> TargetPath:
-        """The same curve the other way round; a closed one starts at the same point."""
+        """Return the same curve the other way round; a closed one starts at the same point."""
         points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
         return TargetPath(points=points, closed=self.closed)
 
     def resampled(self, n: int) -> TargetPath:
-        """n points at equal arc length along the polyline, from the first point on; both ends of an open one included.
+        """Return n points at equal arc length along the polyline, from the first point on, with both ends of an open one.
 
         Raises
         ------
@@ -260,7 +260,7 @@ class TargetPath:
     def transformed(
         self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
     ) -> TargetPath:
-        """The curve scaled and turned (rad, counter-clockwise) about the origin, then shifted (m).
+        """Return the curve scaled and turned (rad, counter-clockwise) about the origin, then shifted (m).
 
         Raises
         ------
@@ -273,7 +273,7 @@ class TargetPath:
         return TargetPath(points=self.points @ np.array([[c, s], [-s, c]]) + shift, closed=self.closed)
 
     def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
-        """A cubic smoothing spline of a noisy curve, at n points of equal arc length.
+        """Fit a cubic smoothing spline to a noisy curve; return n points of it at equal arc length.
 
         The spline z(u) over the chord length u of the points z_k = x + i y minimises::
 
@@ -312,7 +312,7 @@ class TargetPath:
         c = modes.T @ z
 
         def misfit(log: float) -> float:
-            """Mean squared distance of the points from the spline."""
+            """Return the mean squared distance of the points from the spline."""
             held = 1.0 / (1.0 + np.exp(log) * stiffness)
             return float((np.abs((1.0 - held) * c) ** 2).mean())
 
@@ -344,7 +344,7 @@ class TargetPath:
 
 
 def _bending(h: FloatArray, closed: bool) -> FloatArray:
-    """The matrix K of z' K z = integral of z''^2 over the cubic spline through z at knots h apart, K = Q R^-1 Q'.
+    """Return the matrix K of z' K z = integral of z''^2 over the cubic spline through z at knots h apart, K = Q R^-1 Q'.
 
     Green and Silverman, section 2.1.2; periodic, or natural with z'' = 0 at both ends.
     """
@@ -368,7 +368,7 @@ PIECES = 2000
 
 
 def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
-    """Distance of each point from the nearest point of a curve, exact to its segments (m), shape (m,).
+    """Compute the distance of each point from a curve, exact to its segments (m), shape (m,).
 
     Parameters
     ----------
@@ -392,13 +392,13 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
 
 
 def _cut(vertices: FloatArray) -> tuple[FloatArray, float]:
-    """Middles of the `PIECES` of a polyline, and its length."""
+    """Return the middles of the `PIECES` of a polyline, and its length."""
     length = float(arc_lengths(vertices)[-1])
     return along(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
 
 
 def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
-    """Area between a traced curve and its target (m2).
+    """Compute the area between a traced curve and its target (m2).
 
     Both closed: the area of the symmetric difference of what they enclose, each by the even-odd rule where it crosses itself
     (`even_odd_area`); exact for the polylines.
@@ -440,7 +440,7 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
 
 
 def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
-    """Hausdorff distance of a traced curve from its target: the largest that a point of the one is from the other (m).
+    """Compute the Hausdorff distance of a traced curve from its target (m).
 
     Of an open target and a closed curve only the target's points are taken, as in `area_between`. It is the largest over
     the vertices and over `PIECES` points at equal arc length: short of the true one by at most half their spacing.
@@ -493,7 +493,7 @@ class Straightness:
 
 
 def straightness(part: ArrayLike, *, direction: float | None = None) -> Straightness:
-    """Travel and flatness of a part of a curve.
+    """Compute travel and flatness of a part of a curve.
 
     Parameters
     ----------
@@ -526,7 +526,7 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
 
 
 def _narrowest(points: FloatArray) -> float:
-    """Direction of the narrowest strip that holds the points."""
+    """Return the direction of the narrowest strip that holds the points."""
     import shapely
 
     hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(points)))
@@ -547,7 +547,7 @@ def straightest_part(
     least_travel: float = 0.0,
     closed: bool = True,
 ) -> Straightness:
-    """The flattest part of ``count`` successive points of a curve; points at equal crank angles make it a crank window.
+    """Find the flattest part of ``count`` successive points of a curve, such as a window of crank angles.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
 
 
 def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None) -> None:
-    """Without crank rotations a target cannot follow itself: there is no time in which to dwell."""
+    """Check that targets without crank rotations differ from the ones before: there is no time in which to dwell."""
     same = (np.diff(points, axis=0) == 0.0).all(axis=1)
     if angle is not None:
         same &= np.diff(angle) == 0.0
@@ -112,7 +112,7 @@ def _set(task: Any, **values: Any) -> None:
 
 
 def turn(n: int) -> FloatArray:
-    """n equal steps over one turn of the crank (rad), the end left out."""
+    """Return n equal steps over one turn of the crank (rad), without the end."""
     return np.linspace(0.0, 2.0 * pi, n, endpoint=False)
 
 
@@ -376,7 +376,7 @@ def _extent(points: FloatArray) -> float:
 
 
 def _leverage(length: float | None, points: FloatArray) -> float:
-    """Length by which an error of angle counts as one of place: as given, or what is usual."""
+    """Return the length by which an error of angle counts as one of place: as given, or the usual one."""
     if length is None:
         return 0.5 * (_extent(points) or TURNED)
     if not (isfinite(length) and length > 0.0):
@@ -446,23 +446,23 @@ class Normal:
 
     @property
     def n(self) -> int:
-        """Number of stations."""
+        """Return the number of stations."""
         return len(self.weights)
 
     @property
     def places(self) -> NDArray[np.complex128]:
-        """Targets of the coupler point in the plane (m), shape (n,)."""
+        """Return the targets of the coupler point in the plane (m), shape (n,)."""
         assert self.points is not None
         return self.origin + self.unit * self.points
 
     @property
     def timed(self) -> bool:
-        """Whether the crank rotations are given."""
+        """Return whether the crank rotations are given."""
         return self.rotation is not None
 
     @property
     def shares(self) -> FloatArray:
-        """Share of the length of the line through the stations' targets up to each of them, shape (n,)."""
+        """Return the share of the length of the line through the stations' targets up to each of them, shape (n,)."""
         assert self.points is not None
         steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
         length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -471,7 +471,7 @@ class Normal:
 
 
 def reweighted(task: Task, weights: ArrayLike | None) -> Task:
-    """The task with other weights, where any are given.
+    """Return the task with other weights, where any are given.
 
     Raises InputError if they are not one per target, or the task has none.
     """
@@ -485,7 +485,7 @@ def reweighted(task: Task, weights: ArrayLike | None) -> Task:
 
 
 def normal_form(task: Task) -> Normal:
-    """Normal form of a task.
+    """Return the normal form of a task.
 
     Raises
     ------
@@ -508,7 +508,7 @@ def normal_form(task: Task) -> Normal:
             quality=quality,
         )
     if isinstance(task, UntimedPath):
-        return _of_path(task)
+        return _path_normal(task)
     points = np.asarray(task.points)
     # of a body that only turns: what its angles count for
     unit = _extent(points) or 2.0 * float(task.length)  # type: ignore[union-attr, arg-type]
@@ -530,7 +530,7 @@ def normal_form(task: Task) -> Normal:
     )
 
 
-def _of_path(task: UntimedPath) -> Normal:
+def _path_normal(task: UntimedPath) -> Normal:
     points = np.asarray(task.path.points) @ np.array([1.0, 1j])
     closed = task.path.closed
     weights = np.asarray(task.weights)

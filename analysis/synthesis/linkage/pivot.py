@@ -1,0 +1,210 @@
+"""Motions of the rocker pivot: on a guide or on a second crank, known, or as what a search is to find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import cos, inf, isfinite, pi, sin
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import ParameterError
+
+from ...numerics.fourier import FourierSeries
+from ...units import Amount, in_si
+
+FloatArray = NDArray[np.float64]
+#: Greatest number of turns of either crank until a geared five-bar is as it was.
+TEETH = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SliderMotion:
+    """The rocker pivot D moves along a guide as a Fourier series of the crank's rotation.
+
+    Attributes
+    ----------
+    series : FourierSeries
+        u(phi) in m: its order is the number of harmonics.
+    guide_angle : float
+        alpha, the guide's direction from the ground link (rad).
+
+    Raises
+    ------
+    ParameterError
+        If the guide's angle is not finite.
+    """
+
+    series: FourierSeries
+    guide_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.guide_angle):
+            raise ParameterError("guide_angle", self.guide_angle, "be a finite number")
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the displacement of D in the frame of the ground link (m)."""
+        u = self.series(rotation)
+        return u * cos(self.guide_angle), u * sin(self.guide_angle)
+
+    @property
+    def stroke(self) -> float:
+        """Return the distance between the ends of the slider's travel (m)."""
+        return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
+
+    def scaled(self, factor: float) -> SliderMotion:
+        """Return the motion of a linkage that is larger by the factor."""
+        return replace(self, series=self.series * factor)
+
+
+def geared(ratio: float) -> tuple[int, int]:
+    """Return the turns k of the first crank and m of the second until both are where they were: the ratio is m/k.
+
+    Raises ParameterError if it is not zero and no ratio of whole numbers up to six.
+    """
+    if isfinite(ratio):
+        near = Fraction(ratio).limit_denominator(TEETH)
+        if abs(near - Fraction(ratio)) <= 1e-9 and abs(near.numerator) <= TEETH:
+            return near.denominator, near.numerator
+    raise ParameterError("ratio of the second crank", ratio, f"be a ratio of whole numbers up to {TEETH}")
+
+
+def format_ratio(ratio: float) -> str:
+    """Format a ratio of gears, such as "2", "-1" or "1/2"."""
+    return str(Fraction(ratio).limit_denominator(TEETH))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SecondCrank:
+    """The rocker pivot D sits on a second crank, geared to the first or turned independently: a five-bar.
+
+    D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio and
+    the first crank turns k times as fast as phi: phi is the rotation of the shaft that turns once until all is as it was.
+
+    Attributes
+    ----------
+    length : float
+        l5 (m).
+    ratio : float
+        Turns of the second crank for one of the first: a ratio of whole numbers up to six.
+    phase : float
+        psi at the start (rad).
+    series : FourierSeries
+        What is added to the geared rotation (rad): zero with gears.
+
+    Raises
+    ------
+    ParameterError
+        If the length is not greater than zero, the ratio none of small whole numbers, or the phase not finite.
+    """
+
+    length: float
+    ratio: float = 1.0
+    phase: float = 0.0
+    series: FourierSeries = field(default_factory=lambda: FourierSeries.constant(0.0))
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.length) and self.length > 0.0):
+            raise ParameterError("second_crank_length", self.length, "be a finite number greater than zero")
+        geared(self.ratio)
+        if not isfinite(self.phase):
+            raise ParameterError("second_crank_phase", self.phase, "be a finite number")
+
+    def angle(self, rotation: ArrayLike) -> FloatArray:
+        """Return psi, the angle of the second crank (rad)."""
+        phi = np.asarray(rotation, dtype=float)
+        value: FloatArray = geared(self.ratio)[1] * phi + self.phase + self.series(phi)
+        return value
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the displacement of D in the frame of the ground link (m)."""
+        psi = self.angle(rotation)
+        return self.length * np.cos(psi), self.length * np.sin(psi)
+
+    def scaled(self, factor: float) -> SecondCrank:
+        """Return the motion of a linkage that is larger by the factor."""
+        return replace(self, length=self.length * factor)
+
+
+@in_si(guide_angle="rad", position="m", stroke="m", speed="m", acceleration="m")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderUnknown:
+    """A slider whose motion is sought: a Fourier series with this many harmonics.
+
+    Attributes
+    ----------
+    harmonics : int
+        0 is a slider set once.
+    guide_angle : (float, float)
+        Bounds (rad); equal ones fix it.
+    position : (float, float), optional
+        Least and greatest slider position (m); by default one ground link to either side of its end, beyond which it would be
+        another linkage.
+    stroke : float
+        Greatest distance between the ends of its travel (m).
+    speed, acceleration : float
+        Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
+    smoothness : float
+        Weight of the mean of (d2u/dphi2)^2 (1/rad4) added to the quality: trades error for smoothness.
+    """
+
+    harmonics: int
+    guide_angle: tuple[Amount, Amount] = (-pi, pi)
+    position: tuple[Amount, Amount] | None = None
+    stroke: Amount = inf
+    speed: Amount = inf
+    acceleration: Amount = inf
+    smoothness: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+        low, high = self.guide_angle
+        if not (isfinite(low) and isfinite(high) and low <= high):
+            raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
+        if self.position is not None:
+            low, high = self.position
+            if not (isfinite(low) and isfinite(high) and low < high):
+                raise ParameterError(
+                    "bounds of slider position", self.position, "be two finite lengths, increasing (m)"
+                )
+        for name in ("stroke", "speed", "acceleration"):
+            if not getattr(self, name) > 0.0:
+                raise ParameterError(f"greatest {name}", getattr(self, name), "be greater than zero")
+        if not (isfinite(self.smoothness) and self.smoothness >= 0.0):
+            raise ParameterError("smoothness", self.smoothness, "be a finite number, zero or greater")
+
+
+@in_si(length="m")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrankUnknown:
+    """A second crank whose length, phase and, with ``harmonics``, independent rotation are sought.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns for one of the first crank: see `SecondCrank`.
+    length : (float, float)
+        Bounds (m).
+    harmonics : int
+        Of the rotation added to the geared one; 0 of gears.
+    speed : float
+        Greatest deviation of d psi/d phi from the ratio.
+    """
+
+    ratio: float
+    length: tuple[Amount, Amount]
+    harmonics: int = 0
+    speed: float = inf
+
+    def __post_init__(self) -> None:
+        low, high = self.length
+        if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
+            raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
+        geared(self.ratio)
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+
+
+PivotUnknown = SliderUnknown | CrankUnknown
