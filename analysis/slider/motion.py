@@ -1,8 +1,8 @@
 """Direct search for the slider's motion as a Fourier series of the crank's rotation (thesis, chapter VII).
 
-The rocker pivot of a given linkage is moved so that it does its task better: mean, harmonics and the guide's angle are sought
-with exact Jacobians from several starts, within bounds of stroke, speed and acceleration; or the links together with them. The
-optimum at every crank angle by itself is in `analysis.slider.variational`; it may jump, a Fourier series cannot.
+The rocker pivot of a given linkage is moved to improve its task: mean, harmonics and guide angle, and the links if they are
+free, are optimised with exact Jacobians from several starts, within bounds of stroke, speed and acceleration. The optimum at
+each crank angle alone is in `analysis.slider.variational`; it may jump, a Fourier series cannot.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ def slider_motion(
     Parameters
     ----------
     task : Task
-        Of `analysis.synthesis`; weights are the task's own.
+        Task of `analysis.synthesis`, with its weights.
     linkage : Linkage or Solution
-        Its dimensions are kept, but for those that ``bounds`` sets free. For an open path it must be a solution, which brings
-        the crank rotations of the stations.
+        Its dimensions are kept except those with ``bounds``. For an open path it must be a solution, which has the crank
+        rotations of the stations.
     unknown : SliderUnknown or CrankUnknown
         Harmonics, and bounds of guide angle, stroke, speed and acceleration.
     bounds : mapping, optional
@@ -69,9 +69,9 @@ def slider_motion(
     constraints : sequence
         By default the links stay joined over the turn.
     guesses : sequence of Linkage or Solution
-        Searched from as well: their pivots' motion, and with free dimensions those too.
+        Further starts of the search: their pivots' motion, and their free dimensions.
     search : Search
-        Its starts are random ones besides: phases and amplitudes of the harmonics, guide angles all round; there is no scan.
+        Its starts are random phases and amplitudes of the harmonics and guide angles; there is no scan.
 
     Returns
     -------
@@ -122,9 +122,9 @@ class SmoothnessCurve:
     Attributes
     ----------
     acceleration : ndarray, shape (n,)
-        Greatest ``|d2u/dphi2|`` that was allowed (m/rad2), increasing.
+        Bounds of ``|d2u/dphi2|`` (m/rad2), increasing.
     solutions : tuple of Solution or None
-        The best at each; None where there is none.
+        Best solution for each bound; None if there is none.
     """
 
     acceleration: FloatArray
@@ -189,9 +189,9 @@ def smoothness_curve(
 ) -> SmoothnessCurve:
     """Find the best motion for each bound of its second derivative: error against smoothness, warm started.
 
-    From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one
-    before, their harmonics shrunk to the new bound, and from its own random starts; then back, each problem keeping the
-    smoother solution or what is polished from it, so that the error never grows with the freedom.
+    From no bound to the tightest, each problem starts from the solutions of the one before, their harmonics scaled down to the
+    new bound, and from random starts. Then back: each problem keeps the smoother solution or one refined from it, so that a
+    wider bound never has a larger error.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def smoothness_curve(
         On Ctrl-C, with the best so far at each bound.
     """
     if not isinstance(unknown, SliderUnknown):
-        raise InputError(f"the smoothness of {unknown!r}: it must be that of a SliderUnknown")
+        raise InputError(f"the unknown is {unknown!r}: a smoothness curve needs a SliderUnknown")
     values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
     if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
@@ -226,7 +226,7 @@ def smoothness_curve(
 
     found: dict[int, Solution] = {}
     done: int | None = 0
-    # what is best without a bound is the start for a wide one
+    # the best motion without a bound is the start for a wide bound
     with suppress(SynthesisInterrupted, KeyboardInterrupt):
         try:
             widest = best(inf, [], search.starts)
