@@ -27,7 +27,7 @@ from ...units import RAD_S_PER_RPM, Amount, si
 from ..motion.drive import Drive, published_drive
 from ..motion.floquet import Crossing
 from ..motion.orbit import PeriodicOrbit
-from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
+from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, speed_names, unit_of, value_of
 from ..response.branch import distance
 from ..response.frequency import first_freedom, natural_frequency
 from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
