@@ -451,9 +451,9 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
         return q, rotation0 if timed else x[size:]
 
     def value(x: FloatArray) -> FloatArray:
-        residual = residuals(normal, start.branch, *unpacked(x))[0]
-        # beyond the limit of assembly: farther than anything, so that the step is shortened
-        return residual if np.isfinite(residual).all() else np.full(len(residual), 1e3)
+        found = residuals(normal, start.branch, *unpacked(x))
+        # at the limit of assembly and beyond: farther than anything, so that the step is shortened
+        return found[0] if all(np.isfinite(part).all() for part in found) else np.full(len(found[0]), 1e3)
 
     def derivative(x: FloatArray) -> FloatArray:
         _, jacobian, rate = residuals(normal, start.branch, *unpacked(x))
@@ -465,7 +465,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
             own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
         return np.hstack([columns, own])
 
-    if not np.isfinite(residuals(normal, start.branch, *unpacked(x0))[0]).all():
+    if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpacked(x0))):
         return Answer.unjoined(start)
     result = least_squares(
         value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression, minimize
 
-from ..linkage.kernels import nearest, symmetric_difference
+from ...numerics.overlap import nearest, symmetric_difference
 from ..result.solution import CURVE
 from ..task.constraint import UNKNOWNS
 from ..task.target import TargetPath, hausdorff, ring
