@@ -1,4 +1,4 @@
-"""Slider-cranks of a given stroke and crank-rockers of a given swing, each with a time ratio: the best of them in closed form.
+"""The best slider-crank of a stroke, or crank-rocker of a swing, with a given time ratio, in closed form.
 
 In the dead centres C is l3 + l2 and l3 - l2 away from A, the two directions advance = pi (Q - 1)/(Q + 1) apart, so that by the
 laws of cosines and sines
@@ -6,7 +6,7 @@ laws of cosines and sines
     l2^2 (1 + cos advance) = H^2/2 - l3^2 (1 - cos advance),    l1 H = (l3^2 - l2^2) sin advance
 
 with the stroke H, the time ratio Q and the offset l1. That leaves l3, for which (l1 + l2)/l3, the cosine of the least
-transmission angle, is made small. Of a crank-rocker C is in the same two places, their distance the chord
+transmission angle, is minimised. Of a crank-rocker C is in the same two places, their distance the chord
 H = 2 l4 sin(swing/2) of its swing about D, which lies on A's side of that chord where a crank that turns to the left is slow
 while the rocker turns to the left. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
 """
@@ -173,7 +173,7 @@ def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -
 
 
 class _Swing:
-    """Crank-rockers of a swing and a time ratio, by their couplers in rockers; and their size, by bounds and caps."""
+    """Crank-rockers of a swing and a time ratio, one for each ratio of coupler to rocker, sized by the bounds."""
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)

@@ -1,4 +1,4 @@
-"""Compiled: the path of the coupler point and its exact derivatives, for many crank angles or many linkages.
+"""Compiled kernels: the path of the coupler point and its exact derivatives, for many crank angles or many linkages.
 
 The loop is closed by `kinematics.joined`, the plant's own function; the derivatives are those of loop closure, projected on
 the rocker and on the coupler as in `kinematics.coefficients`, with respect to every dimension. The loops run over arrays

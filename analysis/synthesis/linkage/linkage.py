@@ -545,7 +545,6 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def square(along: Any, across: Any) -> Any:
-        """Return the square of `distance`."""
         return along * along
 
     @staticmethod
@@ -555,12 +554,10 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
-        """Return the derivative of `transmission_excess` by the cosine."""
         return 2.0 * l3 * l3 * cosine
 
     @staticmethod
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
-        """Return how far an extreme of `square` may be off its value half a step away."""
         return 2.0 * (l1 + l2) * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:

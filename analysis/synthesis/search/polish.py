@@ -1,4 +1,4 @@
-"""From starts to optima: SciPy's least squares where bounds are all that is asked, IPOPT where there are inequalities.
+"""Polishing of starts to optima: SciPy's least squares where there are only bounds, IPOPT where there are inequalities.
 
 Both have exact Jacobians. What is not a sum of squares is fitted by least squares first: an area, or the greatest distance of a
 path, then goes on in `analysis.synthesis.refine`, the greatest error at given stations as the least bound of all by IPOPT.
@@ -61,7 +61,7 @@ EXACT = 1e-14
 
 
 class _OneThread(ContextDecorator):
-    """Inside, linear algebra is on one thread, for as long as any of our own threads is inside.
+    """A context in which linear algebra runs on one thread, as long as any of our threads is in it.
 
     The last digits of a sum depend on how many threads share it, and where a slope is flat a search ends by these.
     """
@@ -87,7 +87,7 @@ ONE_THREAD = _OneThread()
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """The answers of all starts: those that keep every constraint, best first, and the others; the starts that keep them."""
+    """The answers of all starts: those that keep every constraint, best first, and the others; the feasible starts."""
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]

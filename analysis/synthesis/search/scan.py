@@ -1,4 +1,4 @@
-"""The global scan: many thousand linkages, each placed as well as it can be in closed form.
+"""The global scan: many thousand linkages, each placed optimally in closed form.
 
 Variable projection: with the shape of the linkage (its links as shares of the ground link, of a slider-crank of the coupler, of
 a geared five-bar the second crank and its phase as well) and the crank's phase given, the
@@ -400,18 +400,8 @@ def _timed(
         left = np.exp(1j * (normal.angle - turn[:, None])) * coupler.conj()
         offset = np.angle((w * left).sum(axis=1))
         error = error + (normal.leverage * np.angle(left * np.exp(-1j * offset)[:, None])) ** 2
-    q = np.column_stack(
-        [
-            z[:, 0].real,
-            z[:, 0].imag,
-            bounded[:, None] * links[:, :4],
-            np.abs(z[:, 2]),
-            turn,
-            phase,
-            np.angle(z[:, 2]) - turn,
-            offset,
-        ]
-    )
+    lengths = [bounded[:, None] * links[:, :4], np.abs(z[:, 2])]
+    q = np.column_stack([z[:, 0].real, z[:, 0].imag, *lengths, turn, phase, np.angle(z[:, 2]) - turn, offset])
     return Candidates(
         quality=(w * error).sum(axis=1), q=q, rotation=None if random is None else rotation, branch=branch
     )
@@ -549,19 +539,10 @@ def _bounded(
 def _vectors(
     links: FloatArray, size: FloatArray, scale: ComplexArray, place: ComplexArray, point: ComplexArray
 ) -> FloatArray:
-    turn = np.angle(scale)
-    zero = np.zeros(len(links))
-    columns = [
-        place.real,
-        place.imag,
-        size[:, None] * links[:, :4],
-        size * np.abs(point),
-        turn,
-        zero,
-        np.angle(point),
-        zero,
-    ]
-    return np.column_stack(columns)
+    """Return the unknowns of linkages, shape (m, 11), from sizes, scales, places and coupler points."""
+    zero, sized = np.zeros(len(links)), size[:, None] * links[:, :4]
+    angles = [np.angle(scale), zero, np.angle(point), zero]
+    return np.column_stack([place.real, place.imag, sized, size * np.abs(point), *angles])
 
 
 def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
