@@ -32,9 +32,7 @@ from ...files import (
 )
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
-from ..linkage.kind import Kind
-from ..linkage.linkage import ANGLES
-from ..linkage.machine import PINS, Make, PinForces, pin_forces
+from ..linkage import ANGLES, PINS, Kind, Make, PinForces, pin_forces
 from ..result.solution import Solution
 from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from ..search.start import Search
