@@ -55,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import of_turns, orbits_of
+    from ..periodic import format_turns, orbits_of
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -66,9 +66,9 @@ def basins(
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
     ]
     found = [orbits_of(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
-    _motions(f"{chosen.case.title}: periodic motions of {of_turns(turns)}", found)
+    _motions(f"{chosen.case.title}: periodic motions of {format_turns(turns)}", found)
     if not any(part.stable for part in found):
-        raise InputError(f"no stable motion of {of_turns(turns)} was found: no start ends in one")
+        raise InputError(f"no stable motion of {format_turns(turns)} was found: no start ends in one")
     picture = find_basins(
         parameters,
         drive,

@@ -56,7 +56,7 @@ OPTIONS = (
     "-ffunction-sections", "-Wl,--gc-sections", "-s",
 )  # fmt: skip
 
-_SHELL = ("face.h", "model.h", "plant.h", "plant.c", "instance.h", "instance.c", "saved.c")
+_SHELL = ("face.h", "model.h", "plant.h", "step.h", "plant.c", "instance.h", "instance.c", "saved.c")
 _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),

@@ -21,7 +21,9 @@ from .equations_c import beginning, c_of, generated
 from .native_fmu import OPTIONS, compile_library
 
 TARGET = "wasm32-wasi"
-_SHELL = ("model.h", "plant.h", "plant.c", "studio.h", "studio.c", "orbits.c", "numbers.c", "driven.c")
+#: What a browser's module shares with a native FMU, and what it has of its own.
+_SHARED = ("model.h", "plant.h", "plant.c", "step.h")
+_OWN = Path(__file__).with_name("browser")
 #: The equations to which the page adds a motor's torque: the shell calls them by other names.
 _DRIVEN = ("derivative", "outputs", "clearance", "forward")
 _OPTIONS = (
@@ -31,7 +33,7 @@ _OPTIONS = (
 
 
 def build_web(mechanism: Mechanism) -> bytes:
-    """The WebAssembly of a mechanism; see `fmu_src/native/studio.c` for what it exports.
+    """The WebAssembly of a mechanism; see `browser/studio.c` for what it exports.
 
     Raises
     ------
@@ -42,16 +44,18 @@ def build_web(mechanism: Mechanism) -> bytes:
     """
     check(mechanism)
     with tempfile.TemporaryDirectory(prefix="linkwork-web-") as folder:
-        for name, text in web_sources(mechanism).items():
+        sources = web_sources(mechanism)
+        for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
-        files = ["plant.c", "studio.c", "orbits.c", "numbers.c", "driven.c", "equations.c", "tables.c", "drawing.c"]
+        files = [name for name in sources if name.endswith(".c")]
         compile_library(folder, files, "module.wasm", TARGET, _OPTIONS)
         return (Path(folder) / "module.wasm").read_bytes()
 
 
 def web_sources(mechanism: Mechanism) -> dict[str, str]:
     """All C files of a mechanism's module by name."""
-    files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHELL}
+    files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHARED}
+    files |= {path.name: path.read_text(encoding="utf-8") for path in sorted(_OWN.glob("*.[ch]"))}
     others = [f"Equation driven_{name};\n#define equations_{name} driven_{name}\n" for name in _DRIVEN]
     files["model.h"] += f"#ifndef DRIVEN_C\n{''.join(others)}#endif\n"
     return files | generated(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}

@@ -45,13 +45,13 @@ class Design:
     method : str
         LQR, PID or PI.
     model : LinearModel
-        On which it was designed.
+        The linear model of the design.
     channel : str
         FMI name of the force.
     freedom : int
-        Number of the freedom that it drives, and controls.
+        Number of the driven and controlled freedom.
     gains : ndarray, shape (2 n,)
-        k: of the model's state (q, q'), in N per unit of each.
+        Gains k of the model's state (q, q'), in N per unit of each.
     integral_gain : float
         k_i (N/(m.s)); zero if there is no integral action.
     target, target_slope : ndarray, shape (2 n,)
@@ -59,7 +59,7 @@ class Design:
     force, force_slope : float
         F0 (N), and F_s (N/m).
     poles : ndarray
-        Of the closed loop (1/s), by magnitude.
+        Poles of the closed loop (1/s), by magnitude.
     gain_margin : float
         Factor on the force up to which the loop stays stable, infinite if there is none.
     phase_margin : float
@@ -251,14 +251,14 @@ def design_lqr(
     model : LinearModel
         Of an equilibrium, or the mean one of a periodic motion.
     q : mapping or array_like
-        Weights by name of the state, those left out zero; or the diagonal of Q, or Q. Of a deviation of 1 mm that may
-        cost as much as a force of 1 N it is 1e6 r.
+        Weights by name of the state, zero if left out; or the diagonal of Q, or Q. A weight of 1e6 r of a position lets a
+        deviation of 1 mm cost as much as a force of 1 N.
     r : float
         Weight of the force.
     integral : float
         Weight of the integral of the coordinate (1/s2); above zero the law has integral action.
     channel : str, optional
-        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
@@ -320,13 +320,13 @@ def design_pid(
     Parameters
     ----------
     model : LinearModel
-        Of one free freedom, such as a five-bar's in speed drive.
+        A model with one free freedom, such as a five-bar in speed drive.
     poles : sequence of 3 complex, optional
         1/s, real or in conjugate pairs, left of the imaginary axis.
     bandwidth, damping : float
         Instead of poles (rad/s): they are -bandwidth times 1 and damping +- i sqrt(1 - damping^2).
     channel : str, optional
-        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
@@ -373,8 +373,7 @@ def design_pi(
 ) -> Design:
     """Design a PI controller with crossover at ``bandwidth`` and at least a given phase margin.
 
-    Where the coordinate itself lags so little that an integral alone leaves more than the margin, there is no proportional
-    part.
+    If an integral alone leaves more than the phase margin, there is no proportional part.
 
     Parameters
     ----------
@@ -384,13 +383,12 @@ def design_pi(
     phase_margin : float
         rad.
     channel : str, optional
-        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
+        FMI name of the force; by default the force on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
     DesignError
-        If a PI cannot: it has no phase lead to give, and so none where a sprung mass needs it, near its resonance and
-        above.
+        If no PI meets the requirements: a PI has no phase lead, which a sprung mass needs near its resonance and above.
 
     Examples
     --------

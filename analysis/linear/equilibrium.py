@@ -28,7 +28,7 @@ from ..run import Inputs, expressions, given, takes_published
 from ..units import Amount, in_si
 from .model import FloatArray, Layout, Modes, layout, sampled_channels
 
-#: Points of the search for equilibria along a freedom that comes round again, over a turn, and along another, over its reach.
+#: Grid points of the search for equilibria: over a turn of a cyclic freedom, and over the reach of another.
 GRID = (48, 81)
 #: Largest imbalance of an equilibrium, relative to the forces that balance.
 BALANCE = 1e-12
@@ -43,9 +43,9 @@ class EquilibriumError(LinkworkError):
 def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
     """Return two CasADi functions of coordinates, channels and constants: statics alone, and with derivatives.
 
-    Of both the first result is the generalised forces at rest on the freedoms that are free; the others are the clearance,
-    and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels. Nothing that a
-    mechanism's switch is for acts at rest: friction.
+    The first result of both is the generalised forces at rest on the free freedoms. The first function also returns the
+    clearance; the second the negative derivatives of the forces by these freedoms, and the generalised forces of unit forces of
+    the channels. Friction, the purpose of a mechanism's switch, does not act at rest.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
@@ -78,11 +78,11 @@ class Equilibrium:
     coordinates : ndarray
         Of all freedoms.
     inputs : Inputs
-        What acts on it; a freedom that is held has the commanded rate 0.
+        Acting inputs; a held freedom has the commanded rate 0.
     holding : dict
-        Generalised force (N.m or N) that holds each freedom which is held, by its coordinate.
+        Generalised force (N.m or N) that holds each held freedom, by its coordinate.
     stiffness : ndarray
-        Less the derivative of the generalised forces with respect to the freedoms that are free or held.
+        Negative derivative of the generalised forces by the free and held freedoms.
     residual : float
         Largest imbalance, relative to the forces that balance.
     iterations : int
@@ -125,7 +125,7 @@ class Equilibrium:
     @property
     def stable(self) -> bool:
         """Whether the potential energy of springs, gravity and constant forces has a minimum in the free freedoms."""
-        balance = _Balance.of(self.parameters, self.inputs)
+        balance = _Balance.build(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
         return bool(values[0] > 1e-9 * np.abs(values).max())
@@ -150,13 +150,13 @@ class _Balance:
     Attributes
     ----------
     modes : tuple of int
-        In which what is held is free, under no force: the forces then are those that hold it.
+        Modes in which held freedoms are free, under no force: their unbalanced forces are the holding forces.
     its : Layout
-        What is moved in those modes: free or held.
+        Layout in these modes: the free and the held freedoms.
     free : list of int
-        Which of those are free.
+        Places of the free freedoms among them.
     scale : ndarray
-        Of the coordinates of those.
+        Scales of their coordinates.
     """
 
     parameters: Parameters
@@ -169,7 +169,7 @@ class _Balance:
     scale: FloatArray
 
     @classmethod
-    def of(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
+    def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
         mechanism = mechanism_of(parameters)
         given(mechanism, inputs, None)
         if not inputs.held_exactly:
@@ -237,7 +237,7 @@ class _Balance:
 
     def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
         """Return the magnitude of the generalised forces that have to balance (N.m)."""
-        # what comes round again has no displacement that a spring would feel
+        # a cyclic freedom has no displacement that loads a spring
         far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
         elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
         return float(elastic + self.scale @ np.abs(of_inputs) @ np.abs(self.channels[list(self.its.forces)]))
@@ -293,12 +293,12 @@ def _balance_with_held(
     commands = {mechanism.freedoms[c.freedom].coordinate: c for c in mechanism.channels if c.kind == "command"}
     for name, value in (held or {}).items():
         if name not in commands:
-            raise InputError(f"{name} cannot be held: what can is {', '.join(commands) or 'nothing'}")
+            raise InputError(f"{name} cannot be held; these can: {', '.join(commands) or 'none'}")
         if not isfinite(value):
             raise InputError(f"{name} is {value}: it must be a finite number")
         inputs = inputs.replace(**{commands[name].argument: 0.0})
         coordinates[commands[name].freedom] = value
-    return _Balance.of(parameters, inputs), coordinates
+    return _Balance.build(parameters, inputs), coordinates
 
 
 @takes_published()
@@ -315,13 +315,12 @@ def find_equilibria(
     inputs : Inputs, optional
         Constant forces; by default none. A freedom whose rate is commanded, which must be 0, is held.
     held : mapping, optional
-        Coordinates (rad, m) of freedoms that are held, such as ``{"crank.angle": "30 deg"}``; of one that is held by the inputs
-        alone it is 0.
+        Coordinates (rad, m) of held freedoms, such as ``{"crank.angle": "30 deg"}``; 0 for a freedom held by the inputs alone.
 
     Returns
     -------
     tuple of Equilibrium
-        Angles of freedoms that come round again in (-pi, pi]. Where the equilibria are not isolated, some of them.
+        Angles of cyclic freedoms in (-pi, pi]. Where the equilibria are not isolated, some of them.
 
     Raises
     ------
@@ -363,8 +362,8 @@ def find_equilibrium(
     parameters, inputs, held
         As for `find_equilibria`.
     guess : array_like, optional
-        All coordinates (rad, m) from where to search; of a freedom that is held its own is not used. By default the stable
-        equilibrium of least potential energy is taken, or, where there is none, the lowest of all.
+        All coordinates (rad, m) to start from; those of held freedoms are not used. By default the stable equilibrium of least
+        potential energy is returned, or the lowest of all if none is stable.
 
     Raises
     ------
@@ -373,7 +372,7 @@ def find_equilibrium(
     AssemblyError
         If the links cannot be joined at the guess.
     EquilibriumError
-        If there is no equilibrium, or none is found from the guess; says what is left, and where.
+        If there is no equilibrium, or none is found from the guess; the message has the imbalance and the place.
 
     Examples
     --------

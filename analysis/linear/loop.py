@@ -144,15 +144,15 @@ class LoopMetrics:
     Attributes
     ----------
     settling_time : float or None
-        From the start to when the coordinate stays within the band about the reference (s); None if it does not.
+        Time from the start until the coordinate stays within the band about the reference (s); None if it does not.
     overshoot : float
-        How far it goes past the reference, as a share of the way to it.
+        Greatest excursion beyond the reference, as a share of the way to it.
     peak_force : float
         Largest force either way (N).
     rms_error, peak_error : float
-        Against the reference over the window at the end (m).
+        Deviation from the reference over the window at the end (m).
     rms_force : float
-        Over that window (N).
+        Force over that window (N).
     """
 
     settling_time: float | None
@@ -401,10 +401,10 @@ def control_loop(
     controller : Controller
         Such as a `SampledController`; starts with its integral at zero.
     reference : float or function of time
-        Of the coordinate that is controlled, such as the slider position (m).
+        Reference of the controlled coordinate, such as the slider position (m).
     inputs : Inputs, optional
-        All else that acts, such as the speed of the crank (0 of one that is held), sampled and held with the controller. By
-        default nothing does.
+        All other inputs, such as the speed of the crank (0 if it is held), sampled and held with the controller; none by
+        default.
     initial
         State at the start.
     stop_time : float
@@ -423,7 +423,7 @@ def control_loop(
     Raises
     ------
     InputError
-        If something given is not usable, or the inputs have the controller's own force.
+        If an argument is not usable, or the inputs contain the controller's force.
     AssemblyError
         If the links cannot be joined at the start.
     """
@@ -545,16 +545,16 @@ def predict_loop(
     controller, reference, stop_time
         As for `control_loop`.
     inputs : Inputs, optional
-        Of which the forces act; what is commanded goes as in the motion. By default all acts as in the motion.
+        Forces that act; commanded freedoms move as in the motion. By default all forces are those of the motion.
     deviation : array_like, shape (2 n,), optional
-        Of the model's state from its operating point at the start.
+        Deviation of the model's state from its operating point at the start.
     averaged : bool
         Take the time-averaged model of a periodic motion instead of the time-periodic one.
 
     Raises
     ------
     InputError
-        If something given is not usable, or the model is about a single state that is no equilibrium.
+        If an argument is not usable, or the model is about a single state that is no equilibrium.
     """
     n = model.A.shape[-1]
     start = np.zeros(n) if deviation is None else np.array(deviation, dtype=float)

@@ -98,7 +98,7 @@ def layout(mechanism: Mechanism, modes: Modes) -> Layout:
     forces = tuple(n for n in acting if kinds[n] == "force")
     inputs = [mechanism.channels[n].name for n in forces]
     for n in commanded:
-        inputs += [_channel_of(mechanism, n, "rate"), _channel_of(mechanism, n, "command")]
+        inputs += [_channel_name(mechanism, n, "rate"), _channel_name(mechanism, n, "command")]
         inputs.append(mechanism.freedoms[n].coordinate)
     names_of = [mechanism.freedoms[n] for n in free]
     return Layout(
@@ -110,7 +110,7 @@ def layout(mechanism: Mechanism, modes: Modes) -> Layout:
     )
 
 
-def _channel_of(mechanism: Mechanism, freedom: int, kind: str) -> str:
+def _channel_name(mechanism: Mechanism, freedom: int, kind: str) -> str:
     return next(c.name for c in mechanism.channels if c.kind == kind and c.freedom == freedom)
 
 
@@ -146,7 +146,7 @@ def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
     channels = dict(zip(mechanism.input_names, casadi.vertsplit(u)))
     acting = [channels[mechanism.channels[k].name] for k in its.forces]
     for k in its.commanded:
-        acting += [channels[_channel_of(mechanism, k, "rate")], x[n + k], x[k]]
+        acting += [channels[_channel_name(mechanism, k, "rate")], x[n + k], x[k]]
     w = casadi.vertcat(*acting)
 
     def in_modes(expression: Any) -> Any:
@@ -196,7 +196,7 @@ class Matrices:
     outputs : ndarray, shape (..., l)
         The outputs at the operating point.
     acceleration : ndarray, shape (..., f)
-        Of all freedoms there.
+        Accelerations of all freedoms at the operating point.
     """
 
     parameters: Parameters
@@ -294,7 +294,7 @@ class LinearModel(Matrices):
         Parameters
         ----------
         name : str, optional
-            By default that on the last of the free freedoms: of a five-bar ``slider.force``.
+            By default the force on the last free freedom: of a five-bar ``slider.force``.
 
         Raises
         ------
@@ -307,7 +307,7 @@ class LinearModel(Matrices):
             if name in (None, channel.name):
                 return channel.name, channel.freedom
         known = ", ".join(channel.name for channel in channels) or "none"
-        raise LinearModelError(f"no force {name or ''} drives a freedom of this model; those that do: {known}")
+        raise LinearModelError(f"no force {name or ''} drives a freedom of this model; these do: {known}")
 
     def to_state_space(
         self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None
@@ -366,7 +366,7 @@ def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> 
     values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
     forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
     acting = {name: values[name] for name in forces if values[name] != 0.0}
-    # what chooses a mode and is no channel is a flag, such as groove
+    # an argument that chooses a mode and is no channel is a flag, such as groove
     chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
     return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
@@ -424,7 +424,7 @@ def sampled_channels(
 ) -> tuple[Modes, FloatArray]:
     """Return modes and channels (s, channels) for inputs at times and states.
 
-    Raises InputError if the inputs are another mechanism's or not finite, or command a rate that is not that of the states.
+    Raises InputError if the inputs belong to another mechanism, are not finite, or command a rate unlike that of the states.
     """
     inputs, _ = given(mechanism, inputs, None)
     encoded = encode(inputs, mechanism)
@@ -452,10 +452,10 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
     parameters
         Of the mechanism; or a published set or its name.
     state : array_like
-        All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need be no
-        equilibrium: the deviations are then those from the motion through it, and the model holds at that instant.
+        All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need not be an
+        equilibrium: the deviations are then from the motion through it, and the model holds at that instant.
     inputs : Inputs, optional
-        In force there at time 0, such as `Equilibrium.inputs`; they choose what is free. By default nothing acts.
+        Inputs at time 0, such as `Equilibrium.inputs`; they decide which freedoms are free. None by default.
 
     Raises
     ------

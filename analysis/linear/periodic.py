@@ -113,7 +113,7 @@ class PeriodicModel(Matrices):
     def mean(self) -> LinearModel:
         """Return the time-averaged model: the means of M, C, K, F, H and D over the period.
 
-        It foretells slow deviations of a motion whose M and K vary little; `monodromy` says what the motion does in truth.
+        It predicts slow deviations of a motion whose M and K vary little; `monodromy` is exact.
         """
         return self._model(lambda values: np.asarray(values.mean(axis=0)))
 
@@ -139,12 +139,12 @@ class PeriodicModel(Matrices):
     def check(self) -> None:
         """Make sure that the rates of the free freedoms are the derivatives of the periodic samples.
 
-        Of a wrong period, an end sampled twice or an unsettled motion they are not.
+        They are not if the period is wrong, the end is sampled twice or the motion has not settled.
 
         Raises
         ------
         InputError
-            With the freedom of which they are not.
+            If they are not, with the freedom.
         """
         mechanism, n, secular = self.mechanism, len(self), self._secular()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -208,18 +208,17 @@ def linearise_along(
         States at evenly spaced times of one period, the end of it left out: all coordinates, then all rates; or an object
         such as `analysis.periodic.PeriodicOrbit`.
     inputs : Inputs, optional
-        In force along the motion of an array, which begins at time 0; by default nothing acts. A torque or force that follows
-        the state by a law of its own, a motor's or a controller's, enters with its value: the slope of the law is none of
-        the plant's.
+        Inputs along the motion of an array, which begins at time 0; none by default. A torque or force by a law of the state,
+        such as a motor's or a controller's, enters with its value: the model does not include the derivative of that law.
     period : float, optional
-        s. By default that of the orbit, and of an array at a constant prescribed speed one turn.
+        Period (s); by default the period of the orbit, or one turn for an array at a constant prescribed speed.
     samples : int
-        Samples of an orbit; of an array there are as many as it has.
+        Number of samples of an orbit; an array has its own.
 
     Raises
     ------
     InputError
-        If inputs or period are given for an orbit; if the samples are fewer than `LEAST_SAMPLES`, not finite, or not those
+        If inputs or period are given for an orbit; if the samples are fewer than `LEAST_SAMPLES`, not finite, or not samples
         of a periodic motion evenly spaced in time.
     AssemblyError
         If the links cannot be joined at one of them.
@@ -227,7 +226,7 @@ def linearise_along(
     mechanism = mechanism_of(parameters)
     if isinstance(motion, Orbit):
         if inputs is not None or period is not None:
-            raise InputError("inputs and period are those of the orbit: they cannot be given besides")
+            raise InputError("an orbit has its own inputs and period: they cannot be given beside it")
         turn = motion.turn(samples)
         states, channels = _resample(mechanism, turn)
         modes, period = turn.modes, turn.period
@@ -298,9 +297,9 @@ def settled_motion(
     parameters
         Of the mechanism.
     inputs : Inputs
-        With the speed of a freedom that comes round, such as ``Inputs(speed=40.0)``; all else constant, too.
+        Constant inputs with the speed of a cyclic freedom, such as ``Inputs(speed=40.0)``.
     initial : optional
-        Start of the run; by default all is zero, and the others at rest.
+        Start of the run; by default at zero and at rest but for the commanded speed.
     samples : int
         States of the last turn, evenly spaced, its end left out.
     turns : int
@@ -325,7 +324,7 @@ def settled_motion(
     crank = next((k for k in its.commanded if mechanism.freedoms[k].period), None)
     if crank is None or not inputs.held_exactly:
         raise InputError(
-            f"{inputs}: a motion settles at a constant speed of a freedom that comes round, all else constant"
+            f"{inputs}: a motion settles at a constant speed of a cyclic freedom, with all other inputs constant"
         )
     channel, speed = speeds[crank]
     if not speed:

@@ -5,8 +5,8 @@ from .chart.boundary import RemovingDamping as RemovingDamping
 from .chart.boundary import follow_crossing as follow_crossing
 from .chart.boundary import orbit_monodromy as orbit_monodromy
 from .chart.boundary import orbit_test as orbit_test
+from .chart.boundary import plane_test as plane_test
 from .chart.boundary import removing_damping as removing_damping
-from .chart.boundary import test_of as test_of
 from .chart.chart import OTHER_ORBIT as OTHER_ORBIT
 from .chart.chart import TRUE_ORBIT as TRUE_ORBIT
 from .chart.chart import Axis as Axis
@@ -20,7 +20,7 @@ from .chart.coexistence import Basins as Basins
 from .chart.coexistence import Coexistence as Coexistence
 from .chart.coexistence import basins as basins
 from .chart.coexistence import coexistence as coexistence
-from .chart.coexistence import of_turns as of_turns
+from .chart.coexistence import format_turns as format_turns
 from .chart.grid import Grid as Grid
 from .chart.grid import GridInterrupted as GridInterrupted
 from .chart.grid import grid as grid

@@ -72,9 +72,9 @@ class SliderTable:
     Attributes
     ----------
     harmonics : tuple of int
-        Increasing; each is searched for, from the one before.
+        Numbers of harmonics, increasing; each search starts from the solutions of the one before.
     links : str
-        Whether the links are kept, or free: optimised together with the motion.
+        "kept", or "free": optimised together with the motion.
     guide_angle, position, stroke, speed, acceleration
         Bounds, as of `SliderUnknown`.
     starts : int
@@ -126,15 +126,15 @@ class TrackingWanted:
     Attributes
     ----------
     period : float
-        Of sampling (s).
+        Sampling period (s).
     bandwidth : float, optional
-        Of the feedback, a PID (rad/s); ten times the crank's speed by default, 0 for none.
+        Bandwidth of the feedback, a PID (rad/s); ten times the crank's speed by default, 0 for none.
     feedforward : bool
     revolutions : float
     limit : float
-        Of the force (N).
+        Limit of the force (N).
     coulomb_friction : float, optional
-        Of the plant (N); by default the model's.
+        Coulomb friction of the plant (N); by default the model's.
     mass_error : float
         Share by which the plant's slider and links are heavier than the model's.
     load_known : bool
@@ -166,13 +166,13 @@ class SliderCase:
     Attributes
     ----------
     synthesis : SynthesisCase
-        Task, bounds, constraints, search, and what the linkage is made of.
+        Task, bounds, constraints, search, and masses of the linkage.
     linkage : Linkage or None
-        The one whose pivot is moved; None if it is to be found first.
+        Linkage whose pivot is moved; None if it is to be found first.
     slider : SliderTable
-        The motion that is sought.
+        Unknowns and bounds of the motion.
     strategy, drive, tracking
-        What is asked for besides; None for what is not.
+        Further computations; None if not asked for.
     load : Load, optional
     """
 
@@ -363,7 +363,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or what it says is not usable.
+        If the file cannot be read, or an entry is not usable.
     InfeasibleError
         If bounds and constraints contradict one another.
     """

@@ -1,7 +1,7 @@
 """Inverse dynamics: the control force, the crank torque and the pin forces of a prescribed motion of the slider.
 
 The slider follows u(th2) while the crank turns at a constant speed w2, so that u' = w2 du/dth2 and u'' = w2^2 d2u/dth2^2.
-The second equation of motion then is no differential equation any more but gives the force,
+The second equation of motion then gives the force,
 
     F2 = m22 u'' + b2 - Q2
 
@@ -49,7 +49,7 @@ class TurnBalance:
     force, torque, load : float
         Work of the slider force, of the crank torque, of the load at P.
     dissipated : float
-        By damper and guide friction.
+        Work of damper and guide friction.
     """
 
     force: float
@@ -85,7 +85,7 @@ class SliderDrive:
 
     Notes
     -----
-    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are those of the samples. `linearise.linearise_along`
+    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are taken over the samples. `linear.linearise_along`
     takes a drive as the motion to linearise about.
     """
 
@@ -238,14 +238,14 @@ def inverse_dynamics(
     load : (float, float) or function of the crank angle (rad)
         Force at the coupler point P (N).
     samples : int
-        Of the turn, at equal steps of the crank angle from 0 on.
+        Number of samples of the turn, at equal steps of the crank angle from 0 on.
 
     Raises
     ------
     InputError
         If the speed is zero or not finite, the load is not two finite numbers, or there are too few samples for the series.
     AssemblyError
-        If the links cannot be joined somewhere on the turn, with where.
+        If the links cannot be joined somewhere on the turn, with the place.
     """
     check_speed(crank_speed)
     samples = whole_number(samples, "samples of a turn")
@@ -322,13 +322,13 @@ class BestSpring:
     Attributes
     ----------
     parameters : FiveBarParameters
-        With that spring in the place of the one they had.
+        Parameters with that spring.
     stiffness, free_position : float
         N/m, m; no spring is a stiffness of zero.
     rms_force : float
-        Of the control force with it (N).
+        Rms control force with that spring (N).
     rms_force_without : float
-        Without any spring (N).
+        Rms control force without any spring (N).
     """
 
     parameters: FiveBarParameters
@@ -358,7 +358,7 @@ def best_spring(
     ----------
     free_position : (float, float), optional
         Least and greatest free position (m); by default the ground link's length either way. Without bounds a constant
-        force would pass for an endlessly soft spring.
+        force would be matched by an arbitrarily soft spring.
     parameters, slider, crank_speed, load, samples
         As for `inverse_dynamics`; the spring of the parameters does not matter.
 

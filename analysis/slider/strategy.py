@@ -2,7 +2,7 @@
 
 A four-bar first; if its best is not good enough, a four-bar whose rocker pivot is moved by a slider, harmonic by harmonic,
 links and motion optimised together; then five-bars, whose rocker pivot is on a second crank, geared to the first or turned
-independently. Each step starts from the one before, and says why it was not the last.
+independently. Each step starts from the one before, and records why it was not enough.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ class Step:
     Attributes
     ----------
     mechanism : str
-        In words.
+        Description of the mechanism.
     solution : Solution or None
-        Its best; None if there is none.
+        Its best solution; None if there is none.
     value : float
-        What was compared with the tolerance; infinite without a solution.
+        Value compared with the tolerance; infinite without a solution.
     reason : str
         Why it was taken, or why it was not enough.
     """
@@ -115,22 +115,21 @@ def simplest_mechanism(
     ----------
     task : Task
     tolerance : float
-        Of the quality function (m2; of a rocker function rad2), or of the worst error (m, of a motion with its errors of angle
-        times its length; rad).
+        Bound of the quality function (m2, rad2), or of the worst error (m, rad; angular errors of a motion times its length).
     criterion : "error" or "worst"
-        Which of them; with ``"worst"`` it is also what is made small, whatever the task's objective.
+        The criterion; ``"worst"`` is also minimised, whatever the task's objective.
     bounds, constraints
-        Of the links, as for `synthesize`: they hold for every mechanism.
+        Bounds and constraints of the links of every mechanism, as for `synthesize`.
     stroke : float, optional
         Greatest stroke of the slider (m); half the ground link of the best four-bar by default.
     harmonics : int
-        Up to so many of the slider, and of an independent second crank.
+        Greatest number of harmonics of the slider, and of an independent second crank.
     ratios : sequence of int
-        Gears that are tried.
+        Gear ratios to be tried.
     second_crank : float, optional
         Its greatest length (m); half the stroke by default.
     search : Search
-        Of each mechanism; of a four-bar with twice as many starts.
+        Search for each mechanism; the four-bar has twice as many starts.
 
     Returns
     -------
@@ -159,7 +158,7 @@ def simplest_mechanism(
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
     if criterion == "worst":
-        # what is judged is what is made small
+        # the criterion is also the objective
         task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
     four_bar = tried.four_bar()

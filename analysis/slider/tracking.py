@@ -4,11 +4,11 @@ The force over a sampling period h is
 
     F2 = F_ff + feedback on (u - u_ref, u' - u_ref')
 
-F_ff is that of inverse dynamics on the model half a period ahead, th2 + w2 h/2, for a force that is held is right in the
-middle of its period: the error then goes with h^2, while that of the force at the sample goes with h. The reference
-goes with the measured crank. The feedback's gains, its integral and its limit are those of `analysis.linear`.
+F_ff is the force of inverse dynamics on the model half a period ahead, at th2 + w2 h/2: a held force is right in the middle of
+its period, so that the error is of order h^2, whereas the force at the sample would make it of order h. The reference follows
+the measured crank. Gains, integral and limit of the feedback are those of `analysis.linear`.
 
-The plant in the loop may differ from the model in what is not known beforehand: friction, masses, the load at P.
+The plant in the loop may differ from the model in friction, masses, and the load at P.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ class TrackingController:
     Parameters
     ----------
     parameters : FiveBarParameters
-        Of the model.
+        Parameters of the model.
     slider : FourierSeries
         Reference u(th2) (m).
     period : float
-        Of sampling (s).
+        Sampling period (s).
     design : Design, optional
-        Of the feedback, on a model in speed drive; by default there is none.
+        Design of the feedback, on a model in speed drive; none by default.
     feedforward : bool
-        Without it the force that holds the slider on the design's linear model takes its place.
+        Whether there is a feed-forward; otherwise the holding force of the design's linear model takes its place.
     load : (float, float) or function of the crank angle
         At P (N), as far as the feed-forward knows it.
     limit : float
@@ -63,7 +63,7 @@ class TrackingController:
     Raises
     ------
     InputError
-        If there is neither feed-forward nor feedback, or something given is not usable.
+        If there is neither feed-forward nor feedback, or an argument is not usable.
     """
 
     channel = "slider.force"
@@ -128,13 +128,13 @@ class TrackingMetrics:
     Attributes
     ----------
     rms_error, peak_error : float
-        Of the slider against its reference (m).
+        Deviation of the slider from its reference (m).
     rms_point_error, peak_point_error : float
-        Of the coupler point P against where the model has it on the reference (m).
+        Distance of the coupler point P from the model's P on the reference (m).
     rms_force, peak_force : float
         N.
     mean_power, peak_power : float
-        Of the slider force, the peak either way (W).
+        Power of the slider force (W); the peak is its greatest magnitude.
     """
 
     rms_error: float
@@ -154,7 +154,7 @@ class TrackingResult:
     Attributes
     ----------
     method : str
-        Of control.
+        Name of the control.
     crank_speed : float
         rad/s.
     loop : LoopResult
@@ -162,9 +162,9 @@ class TrackingResult:
     error : ndarray, shape (n,)
         u - u_ref (m).
     point_error : ndarray, shape (n,)
-        Distance of P from where the model has it on the reference (m).
+        Distance of P from the model's P on the reference (m).
     power : ndarray, shape (n,)
-        Of the slider force, its mean over the period before each sample (W); zero at the first.
+        Mean power of the slider force over the period before each sample (W); zero at the first.
     """
 
     method: str
@@ -214,16 +214,16 @@ def track(
     Parameters
     ----------
     controller : TrackingController
-        With the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean one along
-        the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
+        Controller with the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean
+        model along the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
     crank_speed : float
         Constant prescribed speed (rad/s).
     revolutions : float
         Turns of the crank.
     plant : FiveBarParameters, optional
-        Of the plant; by default it is the controller's model.
+        Parameters of the plant; by default those of the controller's model.
     load : (float, float) or function of the crank angle
-        At P (N), held over a period at its value in the middle of it; what the feed-forward knows of it is the controller's.
+        At P (N), held over a period at its value in the middle of it; the feed-forward uses the controller's load.
     initial : InitialState, optional
         By default on the reference at crank angle 0.
     fmu : path, optional
@@ -239,9 +239,9 @@ def track(
     Raises
     ------
     InputError
-        If something given is not usable.
+        If an argument is not usable.
     AssemblyError
-        If the links of the model cannot be joined somewhere on the reference, or those of the plant at the start.
+        If the links cannot be joined: the model's somewhere on the reference, or the plant's at the start.
     """
     check_speed(crank_speed)
     if not 0.0 < revolutions < inf:

@@ -12,14 +12,14 @@ and one freedom is left, the slider position u. It moves the links by
 For a path, P turns with the coupler about B and |P - p*|^2 falls with the angle between BP and the direction from B to p*; for
 a function the rocker has to be at th4*. So the error as a function of u has its minima
 
-    with the link at the angle that is wanted, the other link on either side of the perpendicular to the guide;
+    with the link at the target angle, the other link on either side of the perpendicular to the guide;
     with the other link perpendicular to the guide, either way, and the link on either side: cos t = 0 for a path, cos s = 0
     for a function;
     at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
-The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the best may lie
-in the other assembly, past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least
-transmission angle before.
+The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the optimum may lie in the
+other assembly, past a dead centre. A linkage that keeps its assembly stops there, and earlier if it keeps a least transmission
+angle.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ class VariationalMotion:
     branch : ndarray of int, shape (n,)
         Assembly, the sign of sin(th4 - th3).
     kind : ndarray of str, shape (n,)
-        Why the error is least: "target" (the link is at the angle that is wanted), "perpendicular" (the other link is, to the
+        Why the error is least: "target" (the link is at the target angle), "perpendicular" (the other link is, to the
         guide), "limit" (limit of assembly or least transmission angle), "stroke" (end of the stroke).
     error : ndarray, shape (n,)
         Distance from the target point (m), or from the target angle (rad).
     weights : ndarray, shape (n,)
-        Of the squared errors.
+        Weights of the squared errors.
     jumps : ndarray of int
         Every k for which the slider would have to jump from rotation k to the next: no path of minima of one assembly leads
         across.
@@ -164,7 +164,7 @@ class _Problem:
         low = self.least_transmission
         least = sqrt((l3 - l4) ** 2 + 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
         most = sqrt((l3 + l4) ** 2 - 4.0 * l3 * l4 * sin(0.5 * low) ** 2)
-        # with B on D the directions of coupler and rocker are those of neither limit: the perpendicular ones are candidates
+        # with B on D the directions of coupler and rocker are undetermined: perpendicular ones are candidates
         return [(pi - low, most, 1.0)] + ([(low, least, -1.0)] if least > 0.0 else [])
 
     def pin(self, rotation: FloatArray) -> NDArray[np.complex128]:
@@ -193,7 +193,7 @@ class _Problem:
             wanted = target.real - k.output_angle - self.guide_angle
             own, other, offset = l4, l3, -b.imag
 
-        # angles of the own and the other link from the guide where the error is stationary
+        # angles from the guide of the target link and the other link where the error is stationary
         sine = (own * np.sin(wanted) + offset) / other
         side = np.arcsin(np.clip(sine, -1.0, 1.0))
         x, y = [wanted, wanted], [side, pi - side]
@@ -450,7 +450,7 @@ def _choose_minima(
         before[k] = ways.argmin(axis=1)
         total = ways.min(axis=1) + cost[:, k]
     if not closed:
-        # what leads back to the first rotation does not count
+        # the step back to the first rotation does not count
         step[-1] = 0.0
     first, row = np.unravel_index(int((total + step[-1].T).argmin()), (m, m))
     choice = np.empty(n, dtype=int)

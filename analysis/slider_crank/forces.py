@@ -192,7 +192,7 @@ class ForceTurn:
     def singularities(self) -> tuple[DeadCentre, ...]:
         """Configurations between the first and last angle at which the torque does not determine the slider force.
 
-        The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
+        Zeros of ``ratio``. They differ from the dead centres only if the shift moves without a groove in the shaft.
         """
         return self.dead_centres if has_shaft_groove(self.law) else self._course.singularities(*self._span)
 
@@ -245,8 +245,8 @@ class ForceTurn:
     def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
         """Return which angles (n,) are further than ``degrees`` from poles of the forces.
 
-        That is at the limits of assembly and, where the slider's force is sought, at ``singularities``; without ``poles``
-        the limits alone. What is beyond the first and the last angle counts.
+        Poles are at the limits of assembly and, if the slider force is unknown, at the singularities; without ``poles`` at the
+        limits alone. Poles beyond the first and the last angle count.
         """
         away = radians(degrees)
         low, high = self._span
@@ -361,7 +361,7 @@ def force_turn(
     Parameters
     ----------
     parameters : SliderCrankParameters
-        Or a published set or its name, which brings its crank speed and its shift.
+        Parameters, or a published set or its name, which has a crank speed and a shift.
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2); a number may be a text with its unit, such as "50 rpm", here and below.
     shift : ShiftLaw
@@ -374,15 +374,15 @@ def force_turn(
     torque : array_like, scalar or shape (n,), optional
         Torque of the drive on the crank (N.m); the load on the slider is sought. Excludes ``load``.
     partial : bool
-        Whether to leave out the angles at which the rod does not reach the guide, which ``unreachable`` then has.
+        Whether to leave out the angles at which the rod does not reach the guide; ``unreachable`` lists them.
 
     Raises
     ------
     InputError
         If both ``load`` and ``torque`` are given, a value is no finite number or of the wrong shape, or ``shift`` is no law.
     AssemblyError
-        If the rod does not reach the guide at an angle, with the ranges in which it does; with ``partial`` only if it does at
-        none.
+        If the rod does not reach the guide at some angle, with the ranges in which it does; with ``partial`` only if it does
+        not at any angle.
 
     Examples
     --------

@@ -7,10 +7,9 @@ With f and g the crank pin's coordinates across the guide, as in `kinematics`, a
     S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
 
 and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
-found by halving the turn: how much each of the two functions can change over a piece is bounded by the lengths and by the
-bounds of the law's derivatives, and a piece is dropped only where that excludes a zero. What is left is bisected to the
-last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, between which the slider moves by some
-1e-10 of the crank's length.
+found by halving the turn: lengths and the bounds of the law's derivatives bound the change of each function over a piece, and a
+piece is dropped only if this bound excludes a zero. The remaining pieces are bisected to the last digit. No zero is missed
+except pairs closer together than `FINEST`, between which the slider moves by some 1e-10 of the crank's length.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ class PeriodicShift:
     Parameters
     ----------
     at : callable
-        Of the crank angle (rad): the shift (m) and its first derivative by the angle (m/rad); further items are ignored,
-        so that it may be of the form of `kinematics.groove`.
+        Function of the crank angle (rad) that returns the shift (m) and its first derivative by the angle (m/rad); further
+        items are ignored, so that `kinematics.groove` fits.
     rate, curvature : float
         Bounds of the absolute first and second derivatives by the angle (m/rad, m/rad2). They need not be sharp.
     turns : int
@@ -106,7 +105,7 @@ def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     Raises
     ------
     ParameterError
-        If alpha is not a ratio of whole numbers of which the lower is at most 64: the law repeats after that many turns.
+        If alpha is not a ratio of whole numbers with a denominator of at most 64, after which many turns the law repeats.
     """
     p = parameters.constants()
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
@@ -138,8 +137,8 @@ class Place(NamedTuple):
 class DeadCentre(NamedTuple):
     """A configuration in which the slider turns back: angle (rad), shift and slider position (m).
 
-    ``outer`` is true where the slider is out furthest to the side of its assembly: at a maximum of S4 on branch +1, at a
-    minimum on branch -1.
+    ``outer`` is true at a maximum of S4 on branch +1 and at a minimum on branch -1: the slider is furthest out on the side of
+    its assembly.
     """
 
     crank_angle: float
@@ -442,7 +441,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
     Raises
     ------
     AssemblyError
-        If there is none, with by how much the rod is too short where that is least.
+        If there is none; the message has the least missing length of the rod.
     """
     found = ranges(parameters, law)
     if not found:
@@ -473,10 +472,10 @@ def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple
 def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
     """Find the configurations along the law in which crank torque and slider force do not balance: kth = 0.
 
-    kth is the derivative of the slider position by the crank angle at the shift held. Where the shift is driven by a force
-    of its own, it is this that multiplies the slider force in the crank's equation of motion (the thesis's force problem),
-    whatever the shift's rate. The slider itself stops here only where the shift is constant; ``outer`` says that its
-    position would turn back from a maximum (on branch +1) if the shift were held.
+    kth is the derivative of the slider position by the crank angle at constant shift. If the shift has a drive of its own, kth
+    multiplies the slider force in the crank's equation of motion (the thesis's force problem), whatever the rate of the shift.
+    The slider itself stops here only if the shift is constant; ``outer`` is true where its position would have a maximum (on
+    branch +1) at constant shift.
     """
     p = parameters.constants()
     found = (_dead_centres(low, high, law, p, 0.0) for low, high in _assembled(law, p))

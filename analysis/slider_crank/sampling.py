@@ -152,8 +152,8 @@ class MonteCarlo:
     def linear_is_off(self, quantity: str) -> NDArray[np.bool_]:
         """Return where the linear estimate misses mean or standard deviation by more than 5 % of the latter (n,).
 
-        What five standard errors of the samples may account for is allowed on top. Near a dead centre, where there is no
-        estimate or there are no mean and deviation to estimate, it is off.
+        Five standard errors of the samples are allowed on top. Near a dead centre, without an estimate or without mean and
+        deviation, it is off.
         """
         check_names((quantity,), self.spreads, "quantity")
         spread, linear = self.spreads[quantity], self.estimates[quantity]
@@ -230,21 +230,21 @@ def monte_carlo(
     Parameters
     ----------
     turn : ForceTurn
-        The nominal mechanism; see `sensitivities` for what is held.
+        The nominal mechanism; see `sensitivities` for the quantities held constant.
     tolerances : sequence of Tolerance
     quantities : sequence of str
         Of `QUANTITIES`.
     samples : int
     seed : int
-        Of the random numbers: the same seed gives the same samples.
+        Seed of the random numbers: the same seed gives the same samples.
     n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
+        Number of processes, -1 for one per core; inside `joblib.parallel_config` all cores of the cluster are used.
 
     Raises
     ------
     InputError
-        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are no mechanism: a length
-        that is not above zero, or a crank whose inertia is less than its mass requires.
+        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are invalid: a length not above
+        zero, or a crank inertia below the least that its mass allows.
     ParameterError
         If there is no such quantity.
 
@@ -375,7 +375,7 @@ def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread
 def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
     """Make sure that every sample is a valid mechanism, by the rules of `SliderCrankParameters`.
 
-    Raises InputError if some are none: which tolerances make them, and how many.
+    Raises InputError if some are invalid, with the tolerances that make them so and their number.
     """
     values: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
     for name, x in drawn.items():

@@ -1,6 +1,6 @@
 """Laws of the axial shift over the crank's turn, on arrays, and the special configurations along them.
 
-The plant's functions on arrays are here too, as a groove's law is one of them.
+The plant's functions on arrays are here too, because the law of a groove is one of them.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ _PIECES = 1440
 class Course:
     """A mechanism whose shift follows a law over the crank angle.
 
-    ``speed`` is that of the crank (rad/s). The slope of the shift by the angle depends on it only under a law by time.
+    ``speed`` is the crank speed (rad/s); the derivative of the shift by the angle depends on it only for a law of time.
     """
 
     parameters: SliderCrankParameters

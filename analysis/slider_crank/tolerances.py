@@ -89,12 +89,12 @@ class Sensitivities:
     turn : ForceTurn
         The nominal mechanism and its motion.
     names : tuple of str
-        The m errors by which is derived.
+        The m errors of the derivatives.
     values : mapping
         Quantity to its nominal values, masked array (n,).
     derivatives : mapping
-        Quantity to masked array (m, n): the quantity's unit over the error's. What the load takes part in is masked at the
-        dead centres where that is sought.
+        Quantity to masked array (m, n): the quantity's unit over the error's. If the load is unknown, quantities that depend on
+        it are masked at the dead centres.
     """
 
     turn: ForceTurn
@@ -123,9 +123,9 @@ def sensitivities(
     Parameters
     ----------
     turn : ForceTurn
-        The nominal mechanism. The motion of the crank and the rates of the shift are held, and what is given of load and
-        torque. An error of the crank angle leaves the shift as it is, unless a groove in the shaft makes it; one of a length
-        leaves masses, centres of mass and moments of inertia as they are.
+        The nominal mechanism. The motion of the crank, the rates of the shift, and the given load or torque are held constant.
+        An error of the crank angle does not change the shift, unless a groove in the shaft makes it; an error of a length does
+        not change masses, centres of mass or moments of inertia.
     errors : sequence of str
         Of `ERRORS`; by default `DIMENSIONS`.
     quantities : sequence of str
@@ -134,7 +134,7 @@ def sensitivities(
     Raises
     ------
     ParameterError
-        If there is nothing of such a name.
+        If an error or a quantity does not exist.
     """
     check_names(errors, ERRORS, "error")
     check_names(quantities, QUANTITIES, "quantity")
@@ -171,7 +171,7 @@ class Varied:
     def evaluate(self, quantities: Collection[str]) -> tuple[dict[str, Any], Any]:
         """Compute the quantities, and the lever of the slider's force.
 
-        Only what the quantities need is calculated; the lever is zero where no force is asked for.
+        Only the needed parts are computed; the lever is zero if no force is asked for.
         """
         turn, p, moving = self.turn, self.p, self.moving
         w, e = turn.speed[self.at], turn.acceleration[self.at]
@@ -235,7 +235,7 @@ def undetermined(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
     """Make sure that quantities or errors of these names exist.
 
-    Raises UnknownNameError if one is not among the known.
+    Raises UnknownNameError if one does not.
     """
     for name in names:
         if name not in known:
@@ -259,7 +259,7 @@ class Tolerance:
     name : str
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
     half_width : float or str, optional
-        Half the width of the tolerance, in the SI unit of what is in error or with its unit, such as "0.1 mm". A normal
+        Half the width of the tolerance, in the SI unit of the erroneous quantity or with a unit, such as "0.1 mm". A normal
         distribution has three standard deviations in it and is not cut off there.
     standard_deviation : float, optional
         In place of the half width.
@@ -269,7 +269,7 @@ class Tolerance:
     Raises
     ------
     ParameterError
-        If there is nothing of that name to be in error.
+        If there is no such error.
     InputError
         If not one of half width and standard deviation is given, if it is not a finite number above zero, or if the
         distribution is none of the three.
@@ -330,12 +330,12 @@ class Estimate:
     worst : masked array, shape (n,)
         Greatest departure to first order: every error at its extent, with the sign that makes it worse.
     shares : masked array, shape (m, n)
-        Of each tolerance in the variance to first order; masked where that is zero but for rounding.
+        Share of each tolerance in the variance to first order; masked where the variance is zero but for rounding.
     second_mean, second_deviation : masked array, shape (n,)
         Mean and standard deviation to second order, from exact derivatives and their differences over one standard
         deviation; masked where the mechanism cannot be assembled there.
     second_shares : masked array, shape (m, n)
-        As ``shares``, to second order; what two errors do together counts half for each.
+        As ``shares``, to second order; the joint effect of two errors counts half for each.
 
     Where the slider's force is sought and the errors, all at their extents, reach a dead centre, everything but ``nominal``
     is masked: the quantity has a pole there, and neither mean nor variance.

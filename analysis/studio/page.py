@@ -30,14 +30,12 @@ TEMPLATE = ROOT / "studio" / "build" / "page.html"
 _MADE_OF = (
     "analysis/export/equations_c.py",
     "analysis/export/web.py",
+    "analysis/export/browser/*",
     "analysis/studio/*.py",
     "fmu_src/linkwork/**/*.py",
     "fmu_src/native/model.h",
     "fmu_src/native/plant.*",
-    "fmu_src/native/studio.*",
-    "fmu_src/native/orbits.c",
-    "fmu_src/native/numbers.c",
-    "fmu_src/native/driven.c",
+    "fmu_src/native/step.h",
     "studio/*.*",
     "studio/src/*",
 )

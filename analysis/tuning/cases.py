@@ -40,11 +40,11 @@ class TuneTable:
     Attributes
     ----------
     change : mapping
-        What may be changed, and how far: "5 %", "10 N/m", or ["1 kg", "3 kg"]
+        Parameters that may be changed, and how far: "5 %", "10 N/m", or ["1 kg", "3 kg"]
     peak : tuple of Limit
         Limits of outputs: { output = "pin.C", below = "14 N" }
     objective : str
-        What is made least: the changes, or a parameter, as in "least slider.damping"
+        Quantity to be minimised: "least change", or a parameter, as in "least slider.damping"
     """
 
     change: Mapping[str, Any] = entry(table_of)
@@ -70,7 +70,7 @@ class TuningCase:
     title : str
     wish : Wish
     tables : mapping
-        The file without what is wished: the mechanism, and what acts on it.
+        The file without the wish: the mechanism and its inputs.
     """
 
     title: str
@@ -105,7 +105,7 @@ def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or what it says is not usable.
+        If the file cannot be read, or an entry is not usable.
     """
     path = Path(path)
     return tuning_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)

@@ -258,7 +258,7 @@ class Place:
     wish : Wish
     row : Row
     spot : Spot
-        Where it is known.
+        A known motion to start from.
     """
 
     def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:

@@ -38,8 +38,8 @@ from .wishes import Wish
 _TOLERANCE, _ITERATIONS, VIOLATION = 1e-9, 60, 1e-8
 #: Points at which a place was not found, after which a program is given up.
 _PATIENCE = 4
-#: Weight of the other changes, in the squares of their tolerances, where one parameter is made least, and of all of them where
-#: violations are: what does not matter stays as it is.
+#: Weight of the squares of the other changes where one parameter is minimised, and of all changes where violations are: a
+#: parameter without effect keeps its value.
 _REST = 1e-6
 
 
@@ -53,7 +53,7 @@ class Answer:
         The changes in their tolerances.
     objective : float
     violations : mapping
-        By requirement, the greatest of its conditions' violations.
+        Greatest violation of the conditions of each requirement.
     """
 
     x: FloatArray
@@ -172,8 +172,8 @@ class _Values:
 _ROUNDS, _WAYS = 12, 8
 #: Value of a condition that is far from being active.
 _FAR = 0.05
-#: Changes, spread over their bounds, with which the range is looked at where no way leads to what is wished, a power of two;
-#: and halvings of the way to one with which nothing is missing.
+#: Changes spread over their bounds that are tried where no way meets the wish, a power of two; and halvings of the way from the
+#: present values to one of them that meets it.
 _SPREAD, _BISECTIONS = 4, 6
 #: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
 _BELOW, _ABOVE, _REMOVED = -1, 1, 0
@@ -196,7 +196,7 @@ class _Search:
     rounds: int = 0
     #: Places on branches that the response does not meet.
     more: list[Spot] = field(default_factory=list)
-    #: The best that was found: whether something is missing, how much, the objective; what lies in the range; second motions.
+    #: The best so far: rank (requirements missed, excess, objective), survey, and levels with two stable motions.
     best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def look(self, x: FloatArray) -> Survey:
@@ -236,10 +236,10 @@ class _Search:
 def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     """Find the least change of parameters that clears a range of speeds.
 
-    What lies in the range is held out of it by conditions at places of the response, whose derivatives are known; IPOPT finds
-    the least change that keeps them. The response is then followed anew, and what still lies in the range becomes a further
-    condition, until there is nothing. Regions of lost stability and resonances are led below the range, above it, or away, and
-    the least change of all ways is taken.
+    Conditions at motions of the response, with exact derivatives, keep unwanted regions and resonances out of the range; IPOPT
+    finds the least change that satisfies them. The response is then followed anew, and whatever still lies in the range becomes
+    a further condition, until nothing does. Regions of lost stability and resonances are moved below the range, above it, or
+    removed, and the least change of all combinations is taken.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     Returns
     -------
     Tuned
-        Verified; where the wish cannot be met, the nearest to it: the least sum of what is missing.
+        Verified; if the wish cannot be met, the changes with the least sum of excesses.
 
     Raises
     ------
@@ -299,8 +299,8 @@ def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
 def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     """Find changes within the bounds that meet the requirements, and return the survey just before them.
 
-    Where no way leads from the first changes to such as are wished, because places are lost on it, one may lead from there.
-    None where none of some changes, spread over the bounds, leaves nothing unwanted.
+    Where all ways from the first changes lose their motions, the ways from there may not. None if no changes of a sample spread
+    over the bounds meet the requirements.
     """
     wish = search.wish
     low, high = wish.scaled(wish.low), wish.scaled(wish.high)
@@ -425,7 +425,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
                 own, several = search.search_others(found)
                 if not own and (number > 0 or not wish.least):
                     return found, several
-            # what is far from being active is found again where it matters
+            # a condition far from active is found again if it matters
             conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
             answer = nearest(wish, conditions, answer.x)
             search.rounds += 1

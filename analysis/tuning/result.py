@@ -13,7 +13,7 @@ from .conditions import FloatArray
 from .survey import MARGINAL, Survey
 from .wishes import Wish
 
-#: Names of the requirements; that of a limit is its text.
+#: Names of the requirements; a limit is named by its text.
 RESONANCE, JUMP, STABLE = "no resonance", "no jump", "stable motion"
 #: Violation of a limit, relative to it, that counts as none.
 NO_EXCESS = 1e-6
@@ -26,12 +26,13 @@ class Reading:
     Attributes
     ----------
     text : str
-        In words, with units.
+        Description with units.
     excess : float
-        By how much it is missed: of places how far they are from the nearer end, relative to the range's middle, of the largest
-        multiplier as it is, of a limit relative to it. Zero where it is met.
+        Amount by which the requirement is missed, zero if it is met: distance of a resonance or jump from the nearer end, and
+        width without a stable motion, relative to the range's middle; excess of the largest multiplier; relative excess of a
+        limit.
     missed : str
-        The same in words; empty where it is met.
+        Description of the excess; empty if the requirement is met.
     """
 
     text: str
@@ -138,15 +139,15 @@ class Verification:
     Attributes
     ----------
     orbits : int
-        Of the response that was followed over the range.
+        Number of motions of the response over the range.
     charted, largest, place : int, float, str
-        Points of a chart's row over the range, the largest multiplier there, and where.
+        Points of a chart's row over the range, the largest multiplier on it, and its level.
     sought : int
-        Places at which all motions were sought.
+        Number of levels at which all motions were sought.
     several : str
-        Those with more than one stable motion.
+        Levels with more than one stable motion.
     problems : tuple of str
-        What could not be followed or verified; empty where everything was.
+        Failures of the verification; empty if there were none.
     """
 
     orbits: int
@@ -181,7 +182,7 @@ class Tuned(Shown):
     before, after : Survey
     verification : Verification
     rounds : int
-        Times that the program was solved, over all ways that were tried.
+        Number of solutions of the nonlinear program, over all ways.
     """
 
     wish: Wish

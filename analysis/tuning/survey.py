@@ -56,7 +56,7 @@ _NEAR = 0.5
 AT_THE_END, MARGINAL = 1e-7, 1e-6
 #: Width of a part of the range without a stable motion that counts as none, relative to the range's middle.
 NO_GAP = 1e-6
-#: Speeds of the range at which all motions are sought, and those of the chart.
+#: Numbers of speeds: of the search for all motions, and of the row of a chart.
 SOUGHT, _CHARTED = 5, 201
 #: Distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
 NEXT = 0.05
@@ -70,15 +70,15 @@ class Region:
     ----------
     kind : Crossing
     low, high : float
-        Least and greatest level of it, as far as it was followed.
+        Its least and greatest level, as far as it was followed.
     first, last : SpecialPoint or None
-        At these, where they were met.
+        Special points at its ends, if they were met.
     worst : Spot
-        Where the test function is least, on the way.
+        Motion with the least test function.
     across : Across
-        What picks that place.
+        Equation that picks that motion.
     value : float
-        The test function there.
+        Its test function.
     """
 
     kind: Crossing
@@ -120,18 +120,18 @@ class Survey:
     x : ndarray, shape (k,)
         The changes in their tolerances.
     response : Response
-        Of the range and of what is beside it.
+        Response over the range and beside it.
     regions : tuple of Region
-        That reach into the range.
+        Regions of lost stability that reach into the range.
     peaks : tuple of Spot
-        Resonances in it.
+        Resonances in the range or its margin.
     least : tuple of Least
     greatest : tuple of Greatest
-        For each limit the greatest ones, and where.
+        Greatest values of each limited output.
     largest : (float, float)
         The largest Floquet multiplier in the range, and its level.
     unstable : tuple of (float, float)
-        Parts of the range in which no stable motion was met.
+        Parts of the range without a stable motion.
     """
 
     wish: Wish
@@ -159,7 +159,7 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     x : ndarray, shape (k,)
         Changes in their tolerances.
     more : sequence of PeriodicOrbit
-        Motions on branches of their own, which are followed too.
+        Motions on other branches, which are followed too.
 
     Raises
     ------
@@ -391,7 +391,7 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
     for kind in _kinds(branch):
         tests = _tests(branch, kind, wish.radius)
         if kind is Crossing.FOLD:
-            # what lies between two folds is a region of its own
+            # the part between two folds is a region of its own
             tests = np.where(_tests(branch, kind) < 0.0, np.inf, tests)
         found = []
         within = np.where(_inside(wish, branch.parameter), tests, np.inf)

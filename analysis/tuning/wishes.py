@@ -42,13 +42,13 @@ class Change:
     Attributes
     ----------
     name : str
-        In the FMI contract, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``.
+        FMI name, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``.
     low, high : float
-        Between which it must lie (SI).
+        Bounds of its value (SI).
     tolerance : float
-        In which its change is measured (SI).
+        Unit in which its change is measured (SI).
     given : str or float
-        Tolerance from which the bounds follow, as it was written; empty where they were given.
+        The tolerance as written, if the bounds follow from it; else empty.
     """
 
     name: str
@@ -74,9 +74,9 @@ class Limit:
         An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C``, for the magnitude of the force in
         it; or ``amplitude of`` an output, for half its range.
     below : float
-        SI.
+        The bound (SI).
     unit : str
-        Of ``below``; filled in by `Wish`, as are the parts.
+        Unit of the bound; `Wish` fills in unit and parts.
     parts : tuple of str
         The output, or the components of the force in the joint.
     """
@@ -101,44 +101,44 @@ class Wish:
     Attributes
     ----------
     parameters : parameters of a mechanism
-        As they are now; or a published set or its name.
+        Present parameters; or a published set or its name.
     change : mapping or sequence of Change
-        What may be changed, by FMI name or by field: parameters of the mechanism, and what acts of the drive, such as a force
-        on the slider, a torque on the crank, or a motor's numbers. To each the tolerance, such as "5 %" or "10 N/m": how far it
-        may be changed either way, in which its change is measured too; or (least, greatest), half of which it is measured in;
-        or both, as a mapping with ``tolerance`` and ``between``.
+        Parameters that may be changed, by FMI name or by field, and acting drive quantities such as a force on the slider, a
+        torque on the crank, or a motor's numbers. Each has a tolerance, such as "5 %" or "10 N/m": the greatest change either
+        way, and the unit in which the change is measured; or a range (least, greatest), measured in half its width; or both, as
+        a mapping with ``tolerance`` and ``between``.
     speeds : (float, float), optional
-        The range, if it is of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
+        Range of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
     over : str
-        FMI name of what else of the drive the range is of, such as ``drive.torque`` or ``slider.force``, or of a motor's
-        numbers, such as ``drive.torque.synchronous_speed``.
+        FMI name of another drive quantity of the range, such as ``drive.torque`` or ``slider.force``, or of a motor's number,
+        such as ``drive.torque.synchronous_speed``.
     between : (float, float), optional
-        The range, if it is of this: in SI, or texts.
+        Range of that quantity: in SI, or texts.
     drive : Drive, optional
-        What acts beside that; without a range of speeds it is needed.
+        All that drives the mechanism; needed without a range of speeds.
     start : array_like, optional
-        Guess of the motion at the low end of the range, as `find_orbit` has it: needed under a torque without a motor.
+        Guess of the motion at the low end of the range, as for `find_orbit`: needed under a torque without a motor.
     turns : int
-        Motions of up to so many turns of the crank are looked at.
+        Greatest number of turns of the crank in a period that is examined.
     no_resonance : bool
         No maximum of the amplitude of a motion of one turn lies in the range, nor within ``resonance_margin`` of it.
     resonance_margin : float
         Distance of a resonance from either end of the range, as a share of the value at that end; 0.02 by default.
     no_jump : bool
-        No fold lies in the range, and nowhere in it there is a second stable motion.
+        No fold lies in the range, and nowhere in it is there a second stable motion.
     no_unstable : bool
         No unstable motion lies in the range. Without it unstable motions may lie beside stable ones, but everywhere in the
         range there must be a stable one.
     least_margin : float
-        The largest Floquet multiplier is at most one less this.
+        The largest Floquet multiplier is at most 1 - ``least_margin``.
     limits : sequence of Limit
     least : str
-        The parameter that is made least; without it the changes are: the sum of their squares, each in its tolerance.
+        Parameter to be minimised; without it the sum of the squares of the changes is minimised, each in its tolerance.
 
     Raises
     ------
     InputError, ParameterError
-        If what is wished is not usable.
+        If an argument is not usable.
     """
 
     parameters: Parameters
@@ -218,7 +218,9 @@ class Wish:
         """Return the name of the range's quantity after a check of the arguments about the range."""
         speed = speed_name(self.mechanism)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
-            raise InputError("give the range: speeds of the crank, or over what else and between which values of it")
+            raise InputError(
+                "give the range: either speeds of the crank, or over (a drive quantity) and between (its values)"
+            )
         driven = self.drive is not None and not self.drive.speed_drive
         if self.between is None and (speed is None or driven):
             why = (
@@ -227,12 +229,14 @@ class Wish:
                 else "its speed cannot be prescribed"
             )
             names = ", ".join(name for name in driving_names(self.mechanism) if name != speed)
-            raise InputError(f"the crank has no range of speeds: {why}; give over what it drives, one of {names}")
+            raise InputError(
+                f"the crank has no range of speeds: {why}; give over and between instead, over one of {names}"
+            )
         known = driving_names(self.mechanism)
         if self.over and self.over not in known:
             raise unknown_name(self.over, known)
         if self.between is not None and self.drive is None and self.over != speed:
-            raise InputError(f"the range is of {self.over}: say what drives the crank with drive=Drive(...)")
+            raise InputError(f"the range is of {self.over}: give the drive of the crank, drive=Drive(...)")
         return self.over or str(speed)
 
     @property

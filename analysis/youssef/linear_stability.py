@@ -12,7 +12,7 @@ from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
 from ..numerics.boundaries import Test
-from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, test_of, verdict
+from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, plane_test, verdict
 from ..run import takes_published
 from .hill import PeriodicEquation, monodromy
 from .linearisation import Load, Variant, slider_equation
@@ -60,8 +60,8 @@ def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> M
 
 
 def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """Return the stability test of a multiplier of the linear equation over a plane; see `analysis.periodic.test_of`."""
-    return test_of(linear_monodromy(operation, variant=variant), multiplier)
+    """Return the stability test of a multiplier of the linear equation over a plane; see `analysis.periodic.plane_test`."""
+    return plane_test(linear_monodromy(operation, variant=variant), multiplier)
 
 
 @takes_published()

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "tableau.h"
+#include "step.h"
 
 /* The least part of a step that is worth an early return. */
 #define LEAST_ADVANCE 1e-9
@@ -236,40 +236,20 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
     return GOOD;
 }
 
-/* The integrator: DOP853 of Hairer, Norsett and Wanner, with their error estimate and step size control */
+/* The integrator: see step.h */
 
-typedef double Stages[STAGES][STATES];
+/* What the slope of the state needs beside it: the plant, whose inputs change over the step. */
+static bool slope_of(const void *context, double t, const double x[], double result[], int length) {
+    (void)length;
+    const Plant *a = context;
+    double u[ROOM(INPUTS)];
+    inputs_after(a, t, u);
+    derivative_of(a, x, u, result);
+    return true; /* a slope that is not finite makes the result so */
+}
 
-/* One step of size h from x at a time after the beginning, with k[0] its slope there: the new state, and the error relative to
-   the scale, not a number where the equations are not defined. */
-static double attempt(const Plant *a, double t, const double x[STATES], double h, Stages k, double result[STATES]) {
-    double u[ROOM(INPUTS)], sum5 = 0.0, sum3 = 0.0;
-    for (int stage = 1; stage <= STAGES; stage++) {
-        double sum[STATES] = {0.0};
-        for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++)
-            for (int i = 0; i < STATES; i++) sum[i] += A_WEIGHT[w] * k[A_STAGE[w]][i];
-        for (int i = 0; i < STATES; i++) result[i] = x[i] + h * sum[i];
-        if (stage < STAGES) {
-            inputs_after(a, t + C[stage] * h, u);
-            derivative_of(a, result, u, k[stage]);
-        }
-    }
-    for (int i = 0; i < STATES; i++) {
-        double weight = 1.0 / (a->scale[i] + fmax(fabs(x[i]), fabs(result[i])));
-        double error5 = 0.0, error3 = 0.0;
-        for (int e = 0; e < ERROR_STAGES; e++) {
-            error5 += E5[e] * k[E_STAGE[e]][i];
-            error3 += E3[e] * k[E_STAGE[e]][i];
-        }
-        error5 *= weight;
-        error3 *= weight;
-        sum5 += error5 * error5;
-        sum3 += error3 * error3;
-    }
-    if (!all_finite(result, STATES)) return NAN; /* an infinite component has no error relative to itself */
-    double denominator = sum5 + 0.01 * sum3;
-    if (denominator == 0.0) return 0.0;
-    return fabs(h) * sum5 / sqrt(denominator * STATES);
+static double attempt(const Plant *a, double t, const double x[STATES], double h, double k[], double result[STATES]) {
+    return attempt_step(slope_of, a, t, x, h, k, a->scale, STATES, result);
 }
 
 /* A cautious first step: one hundredth of the time in which the state would change by its own size. */
@@ -280,7 +260,7 @@ static double first_step(const Plant *a, const double x[STATES], const double sl
 }
 
 /* The longest part of a step h from x that stays clear of the limit of assembly: it is written to x. */
-static double up_to_limit(const Plant *a, double t, double x[STATES], double h, Stages k) {
+static double up_to_limit(const Plant *a, double t, double x[STATES], double h, double k[]) {
     double low = 0.0, high = h, best[STATES], tried[STATES];
     memcpy(best, x, sizeof best);
     while (high - low > 1e-15 * h) {
@@ -325,15 +305,13 @@ static void look(Plant *a, double x[STATES], double time, double done, double *d
 /* Integrate x over a duration, which watch and limit may shorten. */
 static Reason integrate(Plant *a, double x[STATES], double time, double *duration, const Watch *watch, bool early,
                         Reason *ended, char sentence[SENTENCE]) {
-    Stages k;
-    double u[ROOM(INPUTS)], result[STATES], slope[STATES], done = 0.0;
+    double k[STAGES * STATES], result[STATES], slope[STATES], done = 0.0; /* k: the first row is the slope at x */
     char cause[SENTENCE];
     Digits first, second, third;
     Reason reason;
-    inputs_after(a, 0.0, u);
-    derivative_of(a, x, u, k[0]);
-    if (!all_finite(k[0], STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
-    double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k[0], *duration);
+    slope_of(a, 0.0, x, k, STATES);
+    if (!all_finite(k, STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
+    double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k, *duration);
     for (int steps = 1;; steps++) {
         double remaining = *duration - done;
         bool last = proposal >= remaining * (1.0 - 1e-10);
@@ -346,8 +324,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
         }
         double error = attempt(a, done, x, h, k, result) / a->tolerance;
         if (error <= 1.0 && !last) {
-            inputs_after(a, done + h, u);
-            derivative_of(a, result, u, slope);
+            slope_of(a, done + h, result, slope, STATES);
             if (!all_finite(slope, STATES)) error = NAN;
         }
         if (error <= 1.0) {
@@ -357,24 +334,22 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
                 snprintf(sentence, SENTENCE, "in the step from t = %s s: %s", digits(first, time), cause);
                 break;
             }
-            double factor = error == 0.0 ? GREATEST_FACTOR : fmin(GREATEST_FACTOR, SAFETY * pow(error, -1.0 / ORDER));
             /* a step cut short by the end of the interval does not shorten the one carried over */
-            proposal = h < proposal ? fmax(proposal, factor * h) : fmax(LEAST_FACTOR, factor) * h;
+            proposal = fmax(h < proposal ? proposal : 0.0, step_factor(error) * h);
             memcpy(x, result, sizeof result);
             a->step_size = proposal;
             if (last) return GOOD;
             done += h;
-            memcpy(k[0], slope, sizeof slope);
+            memcpy(k, slope, sizeof slope);
             if (watch) {
                 look(a, x, time, done, duration, watch);
                 if (*duration <= done) return GOOD;
                 reason = check_inputs(a, sentence);
                 if (reason != GOOD) return reason;
-                inputs_after(a, done, u);
-                derivative_of(a, x, u, k[0]);
+                slope_of(a, done, x, k, STATES);
             }
         } else {
-            proposal = h * (isfinite(error) ? fmax(LEAST_FACTOR, SAFETY * pow(error, -1.0 / ORDER)) : 0.25);
+            proposal = h * step_factor(error);
             if (proposal < LEAST_STEP * *duration) {
                 snprintf(cause, SENTENCE, "the step size fell to %s s, %s s into an interval of %s s", digits(third, proposal),
                          digits(first, done), digits(second, *duration));

@@ -1,6 +1,7 @@
-/** Which values of a parameter to avoid, from the branches over it: as analysis/periodic/arcs.py has it, of motions of one turn. */
+/** Which values of a parameter to avoid, from the branches over it: the twin, for motions of one turn, of
+    analysis/periodic/response/advice.py, which a browser cannot call; a test holds the two equal. */
 
-import type { Point } from "./explore";
+import type { Point } from "./motions";
 
 export type Interval = [number, number];
 

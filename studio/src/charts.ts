@@ -2,7 +2,7 @@
 
 import uPlot from "uplot";
 import uplotStyle from "uplot/dist/uPlot.min.css";
-import type { Rows } from "./core";
+import type { Rows } from "./motions";
 import { type Chart as Table, type Curve, type Mechanism, outputAt, rowLength, type Source } from "./tables";
 import { called, roundingOf } from "./words";
 

@@ -1,6 +1,6 @@
 /** The equations: the module of a mechanism, and what is read from its memory. */
 
-import type { Point } from "./explore";
+import type { Orbit, Point, Rows } from "./motions";
 import { type Mechanism, rowLength } from "./tables";
 import { plainly } from "./words";
 
@@ -23,26 +23,6 @@ interface Face {
   studio_amplitude(): number;
   studio_natural(reference: number): number;
   studio_drag(joint: number, first: number, second: number): number;
-}
-
-export interface Orbit {
-  found: boolean;
-  /** Why there is none. */
-  sentence: string;
-  size: number;
-  period: number;
-  start: number[];
-  /** In the state, of the first of what it starts with: whose amplitude is meant. */
-  place: number;
-  /** Real and imaginary parts, the largest modulus first. */
-  multipliers: [number, number][];
-}
-
-export interface Rows {
-  values: Float64Array;
-  count: number;
-  /** Why there are no more, if that is so. */
-  sentence: string;
 }
 
 export async function bytesOf(m: Mechanism): Promise<ArrayBuffer> {

@@ -1,16 +1,8 @@
 /** What takes seconds, in pieces: motions along a branch over one parameter, and verdicts over a plane of two. */
 
-import type { Core, Orbit } from "./core";
+import type { Core } from "./core";
+import type { Orbit, Point } from "./motions";
 import type { Range } from "./tables";
-
-/** A motion on a branch. */
-export interface Point {
-  value: number;
-  amplitude: number;
-  start: number[];
-  multipliers: [number, number][];
-  kind: "" | "fold" | "doubling";
-}
 
 /** A square of a chart: its place on the finest grid, its size there, and the motion at its place. */
 export interface Cell {

@@ -1,6 +1,6 @@
 /** What is taken out of the page: files, and a link that holds the state. */
 
-import type { Orbit, Rows } from "./core";
+import type { Orbit, Rows } from "./motions";
 import { dxfText } from "./dxf";
 import type { Drawn } from "./picture";
 import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables, valueOf } from "./tables";

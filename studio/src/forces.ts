@@ -1,6 +1,6 @@
 /** The force in a joint as a vector over the motion, with the envelope of all of them. */
 
-import type { Rows } from "./core";
+import type { Rows } from "./motions";
 import { hull } from "./hull";
 import { type Interval, Plane } from "./plane";
 import { type Chart, type Mechanism, outputAt, rowLength } from "./tables";

@@ -2,7 +2,8 @@
 
 import { Backdrop } from "./backdrop";
 import { by, Controls } from "./controls";
-import { bytesOf, Core, type Rows } from "./core";
+import { bytesOf, Core } from "./core";
+import type { Rows } from "./motions";
 import { Embed } from "./embed";
 import { linkOf, saveAs, stateIn } from "./exports";
 import { History } from "./history";

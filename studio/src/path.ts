@@ -1,6 +1,6 @@
 /** The form of a path: drawn, taken from the mechanism or written, and what is wanted of it. */
 
-import type { Rows } from "./core";
+import type { Rows } from "./motions";
 import { button, type Child, line, make, number, part, tick, Wrong } from "./elements";
 import { pointsOf, soundPath, textOf } from "./points";
 import { resampled, type Sketch } from "./sketch";

@@ -2,7 +2,7 @@
 
 import { shownIn, tableOf } from "./answer";
 import { compareIn, STEPS } from "./comparison";
-import type { Rows } from "./core";
+import type { Rows } from "./motions";
 import { button, line, make, part, tick, Wrong } from "./elements";
 import { pathPart } from "./path";
 import { type Answer, type Job, type Request, Server } from "./server";

@@ -1,7 +1,8 @@
 /** How far the slider swings over the speed, or over what else varies: stable and unstable motions, folds, doublings, what to avoid. */
 
 import { amplitudeAt, type Arc, arcsOf, type Avoided, type Interval, jumpsOf, rangesToAvoid } from "./avoid";
-import type { Found, Point } from "./explore";
+import type { Found } from "./explore";
+import type { Point } from "./motions";
 import { type Go, Search } from "./search";
 import { type Context, driving, swinging } from "./varied";
 import { type Given, valueOf } from "./tables";

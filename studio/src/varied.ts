@@ -1,6 +1,6 @@
 /** What can vary of a mechanism under the values that it has, and what swings then. */
 
-import type { Orbit } from "./core";
+import type { Orbit } from "./motions";
 import { type Given, type Mechanism, type Output, type Values, valueOf } from "./tables";
 
 export interface Context {

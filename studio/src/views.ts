@@ -1,7 +1,7 @@
 /** What stands beside the mechanism, one thing at a time: curves over the motion, forces, the response, stability. */
 
 import { Charts } from "./charts";
-import type { Rows } from "./core";
+import type { Rows } from "./motions";
 import { Forces } from "./forces";
 import { Response } from "./response";
 import type { Go } from "./search";

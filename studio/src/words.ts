@@ -1,6 +1,6 @@
 /** Numbers and verdicts in words. */
 
-import type { Orbit, Rows } from "./core";
+import type { Orbit, Rows } from "./motions";
 import { type Given, type Mechanism, type Output, outputAt, rowLength, type Values, valueOf } from "./tables";
 
 /** A number as people read it, with so many digits. */

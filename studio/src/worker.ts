@@ -1,6 +1,7 @@
 /** The work that takes longer than a frame: runs, periodic motions and their multipliers; and searches, in parts. */
 
-import { Core, type Orbit, type Rows } from "./core";
+import { Core } from "./core";
+import type { Orbit, Rows } from "./motions";
 import { type Exploration, follow, type Found, verdicts } from "./explore";
 import type { Mechanism, Source } from "./tables";
 

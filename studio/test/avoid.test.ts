@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { arcsOf, jumpsOf, rangesToAvoid } from "../src/avoid";
-import type { Point } from "../src/explore";
+import type { Point } from "../src/motions";
 import { hull } from "../src/hull";
 import { ticks } from "../src/plane";
 

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Orbit, Rows } from "../src/core";
+import type { Orbit, Rows } from "../src/motions";
 import type { Values } from "../src/tables";
 import { digits, motionInWords, multiplierInWords, plainly, shown, verdictInWords } from "../src/words";
 import { WHEEL } from "./wheel";

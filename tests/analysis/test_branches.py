@@ -24,7 +24,7 @@ from analysis.periodic import (
     follow,
     switch,
 )
-from analysis.periodic.response.branch import _of_a_turn
+from analysis.periodic.response.branch import _turn_columns
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -244,7 +244,7 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
     assert columns["harmonic 2 of u [m]"][20] == turn.harmonic("slider.position", 2)
     assert columns["greatest force in pin C [N]"][20] == np.hypot(turn["pin.C.fx"], turn["pin.C.fy"]).max()
     # the greatest of either way: that of the turn with all signs reversed is the same
-    of_a_turn, reversed_turn = _of_a_turn(orbit, turn), replace(turn, values=-turn.values)
+    of_a_turn, reversed_turn = _turn_columns(orbit, turn), replace(turn, values=-turn.values)
     for name, output in (("crank torque [N.m]", "drive.applied_torque"), ("guide force [N]", "slider.guide_force")):
         greatest = np.abs(turn[output]).max()
         assert of_a_turn[f"greatest {name}"](turn) == of_a_turn[f"greatest {name}"](reversed_turn) == greatest

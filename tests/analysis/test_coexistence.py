@@ -33,7 +33,7 @@ from analysis.periodic import (
     with_isolas,
 )
 from analysis.periodic.chart import chart as charts
-from analysis.periodic.chart.boundary import branches_on
+from analysis.periodic.chart.boundary import line_branches
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import InitialState
@@ -109,7 +109,7 @@ def ends(folder: Path, damping: float = 11.0) -> Basins:
     return basins(rig, Drive(speed=SPEED), points=3, position=(-0.02, 0.02), rate=(-1.0, 1.0), folder=folder)
 
 
-@pytest.mark.parametrize(("of", "work", "others"), [(motions, "_motions_of", 1), (ends, "_ends", 3)])
+@pytest.mark.parametrize(("of", "work", "others"), [(motions, "_compute_motions", 1), (ends, "_ends", 3)])
 def test_rows_are_kept_and_an_interrupted_picture_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of: Callable[..., Any], work: str, others: int
 ) -> None:
@@ -193,7 +193,7 @@ def test_an_isola_is_found_that_the_branch_from_the_ends_does_not_pass() -> None
     rig = replace(SETS["rig-2-spring-c"].parameters, slider_damping=1.0)
     low, high = 470.0 * RAD_S_PER_RPM, 600.0 * RAD_S_PER_RPM
     operation = plane(rig, Drive(speed=low), "drive.speed", "slider.damping")
-    branches, found, lost = branches_on(operation, (low, high), 1.0, name="drive.speed", unit="rad/s")
+    branches, found, lost = line_branches(operation, (low, high), 1.0, name="drive.speed", unit="rad/s")
     assert lost == []
     (isola,) = (branch for branch in branches if branch.closed)
     through = next(branch for branch in branches if branch.parameter[0] == low and branch.parameter[-1] == high)
@@ -238,11 +238,11 @@ def test_a_part_with_stable_motions_that_no_line_meets_gets_a_line() -> None:
         swing=("slider.position", "m"),
         computed=0,
     )
-    assert charts.unmet(beside, [0.0, 7.0], []) == [3.0]
-    assert charts.unmet(beside, [0.0, 3.5, 7.0], []) == []
+    assert charts.unmet_lines(beside, [0.0, 7.0], []) == [3.0]
+    assert charts.unmet_lines(beside, [0.0, 3.5, 7.0], []) == []
     around, away = np.array([[2.5, 3.5], [5.5, 3.5]]), np.array([[0.5, 6.5], [0.5, 0.5]])
-    assert charts.unmet(beside, [0.0, 7.0], [around]) == []
-    assert charts.unmet(beside, [0.0, 7.0], [away]) == [3.0]
+    assert charts.unmet_lines(beside, [0.0, 7.0], [around]) == []
+    assert charts.unmet_lines(beside, [0.0, 7.0], [away]) == [3.0]
 
 
 @pytest.fixture

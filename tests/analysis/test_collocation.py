@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis import find_orbit
-from analysis.periodic import Drive, orbit_of
+from analysis.periodic import Drive, OrbitEquations, orbit_of
 from analysis.periodic.chart.grid import largest_multipliers
 from analysis.periodic.motion.discretisation import Discretisation, collocation_serves
 from analysis.periodic.motion.variables import Family
@@ -67,3 +67,16 @@ def test_a_row_by_collocation_is_its_orbits_one_by_one() -> None:
         alone = orbit_of(SMOOTH, drives[k], start=starts[k])
         assert values[k] == pytest.approx(alone.largest, abs=1e-8)
         assert starts[k] == pytest.approx(alone.start, abs=1e-9)
+
+
+def test_a_point_of_a_branch_computes_the_numbers_of_its_drive_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
+    start = orbit_of(SMOOTH, family.drive).start
+    equations = OrbitEquations(family, 1, 29.0, 31.0)
+    calls, vector = [], Drive.vector
+    monkeypatch.setattr(Drive, "vector", lambda drive, mechanism: calls.append(drive) or vector(drive, mechanism))
+    orbit = equations(start, 30.0).data
+    assert orbit.residual < 1e-9
+    assert (orbit.scale > 0.0).all()
+    assert orbit.turn().amplitude == pytest.approx(orbit.amplitude)
+    assert len(calls) == 1

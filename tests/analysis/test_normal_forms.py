@@ -19,7 +19,7 @@ from analysis.periodic import (
     normal_form,
     orbit_of,
 )
-from analysis.periodic.stability.nonlinear import Forms, coefficient_of
+from analysis.periodic.stability.nonlinear import Forms, form_coefficient
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError
 from linkwork.five_bar.published import SETS
@@ -30,12 +30,12 @@ RPM = RAD_S_PER_RPM
 def test_period_doubling_of_the_logistic_map() -> None:
     """x -> r x (1 - x) at r = 3: f''^2/4 + f'''/6 = 9 (Kuznetsov, section 4.5)."""
     forms = Forms(lambda x: 3.0 * (2.0 / 3.0 + x) * (1.0 / 3.0 - x) - 2.0 / 3.0, np.array([[-1.0]]))
-    assert coefficient_of(forms, Crossing.PERIOD_DOUBLING, -1.0, 1e-3) == pytest.approx(9.0, rel=1e-6)
+    assert form_coefficient(forms, Crossing.PERIOD_DOUBLING, -1.0, 1e-3) == pytest.approx(9.0, rel=1e-6)
 
 
 def test_fold_of_a_parabola() -> None:
     forms = Forms(lambda x: x - 0.7 * x**2 + 3.0 * x**3, np.array([[1.0]]))
-    assert abs(coefficient_of(forms, Crossing.FOLD, 1.0, 1e-3)) == pytest.approx(0.7, rel=1e-6)
+    assert abs(form_coefficient(forms, Crossing.FOLD, 1.0, 1e-3)) == pytest.approx(0.7, rel=1e-6)
 
 
 def delayed(r: float, place: np.ndarray) -> np.ndarray:
@@ -49,7 +49,7 @@ def test_torus_of_the_delayed_logistic_map() -> None:
     """At r = 2 it is supercritical, as the radius of the closed curve beyond it confirms."""
     multiplier = 0.5 + 0.5j * sqrt(3.0)
     forms = Forms(lambda x: delayed(2.0, x), np.array([[1.0, -1.0], [1.0, 0.0]]))
-    coefficient = coefficient_of(forms, Crossing.TORUS, multiplier, 1e-3)
+    coefficient = form_coefficient(forms, Crossing.TORUS, multiplier, 1e-3)
     assert coefficient < 0.0
     r = 2.001
     place = np.array([1e-3, 0.0])

@@ -46,7 +46,7 @@ SHOWN = (
     [row if row[1] == "rahman-forces" else pytest.param(*row, marks=pytest.mark.slow) for row in SHOWN],
 )
 def test_what_fails_by_an_erratum(erratum: str, study: str, statement: str, size: float) -> None:
-    (verdict,) = (v for v in result(study).verdicts if v.statement.startswith(statement) and v.source == "text")
+    (verdict,) = (v for v in result(study).verdicts if v.statement.startswith(statement) and v.source.kind == "text")
     assert not verdict.holds
     assert verdict.why.startswith(f"erratum {erratum}")
     assert verdict.computed == pytest.approx(abs(size), rel=4e-4)

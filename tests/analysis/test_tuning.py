@@ -322,13 +322,13 @@ def test_what_is_met_already_is_not_changed():
         ({"no_jump": True, "speeds": None}, InputError, "give the range"),
         ({"no_jump": True, "speeds": None, "over": "drive.speed"}, InputError, "give the range"),
         ({"no_jump": True, "between": (1.0, 2.0), "over": "drive.torque"}, InputError, "give the range"),
-        ({"no_jump": True, "drive": Drive(torque=0.1)}, InputError, "speed follows from it; give over what it drives"),
+        ({"no_jump": True, "drive": Drive(torque=0.1)}, InputError, "speed follows"),
         (
             {"no_jump": True, "speeds": None, "over": "drive.torqe", "between": (1, 2)},
             UnknownNameError,
             r"drive\.torque",
         ),
-        ({"no_jump": True, "speeds": None, "over": "drive.torque", "between": (1, 2)}, InputError, "drives the crank"),
+        ({"no_jump": True, "speeds": None, "over": "drive.torque", "between": (1, 2)}, InputError, "Drive"),
         (
             {"no_jump": True, "speeds": None, "over": FIELD, "between": (1, 2), "drive": Drive(torque=0.1)},
             InputError,

@@ -2,8 +2,8 @@
 
 A fold, a period doubling or a torus point of a branch moves along a curve when one more parameter is set free: the boundary of
 the speeds at which a machine jumps, say, over the damping. `follow_crossing` follows it by arclength in orbit and both
-parameters together, so that it continues through the cusp where two folds meet and vanish; `branches_on` finds the branches on
-a line of a chart, isolas among them, from which such curves begin.
+parameters together, so that it continues through the cusp where two folds meet and vanish; `line_branches` finds the
+branches on a line of a chart, isolas among them, from which such curves begin.
 
 A test function of a point of a plane is negative in a region of instability and zero on its boundary, where a Floquet
 multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces where it is zero,
@@ -26,7 +26,7 @@ from ...numerics.boundaries import Test, lowest
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
 from ..motion.discretisation import OrbitError, operating_point
 from ..motion.floquet import Crossing, crossing_test
-from ..motion.orbit import PeriodicOrbit, orbit_of, orbit_through
+from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
 from ..motion.variables import Family, Plane
 from ..response.branch import GREATEST, Branch, follow_both, passes, reason_to_leave
 from .coexistence import Coexistence, coexistence
@@ -112,7 +112,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
 
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
         point = operating_point(*at(float(z[n]), float(z[n + 1])))
-        orbit, shift = orbit_through(point, z[:n], turns)
+        orbit, shift = trial_orbit(point, z[:n], turns)
         # the test has no dimension; it gets the scale of x, in whose row it stands
         return np.append(shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
@@ -138,7 +138,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
 POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 
 
-def branches_on(
+def line_branches(
     operation: Plane, x: tuple[float, float], y: float, *, name: str, unit: str, start: ArrayLike | None = None
 ) -> tuple[list[Branch], Coexistence, list[str]]:
     """Find all motions on the line y = const and follow them to both sides, until branches pass through all of them.
@@ -233,14 +233,14 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
     return matrix
 
 
-def test_of(matrix: Monodromy, crossing: Crossing | int) -> Test:
+def plane_test(matrix: Monodromy, crossing: Crossing | int) -> Test:
     """Return the test function `crossing_test` of a monodromy matrix over a plane."""
     return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
-    """Return the test function of the mechanism's own periodic orbit: see `test_of` and `orbit_monodromy`."""
-    return test_of(orbit_monodromy(operation, start=start), multiplier)
+    """Return the test function of the mechanism's own periodic orbit: see `plane_test` and `orbit_monodromy`."""
+    return plane_test(orbit_monodromy(operation, start=start), multiplier)
 
 
 # Removing damping

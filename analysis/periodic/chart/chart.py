@@ -31,7 +31,15 @@ from ..motion.variables import Plane, format_value, plane, require_variable, spe
 from ..response.branch import distance
 from ..response.frequency import first_freedom, natural_frequency
 from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
-from .boundary import BRANCH_POINTS, Monodromy, branches_on, follow_crossing, orbit_monodromy, removing_damping, test_of
+from .boundary import (
+    BRANCH_POINTS,
+    Monodromy,
+    follow_crossing,
+    line_branches,
+    orbit_monodromy,
+    plane_test,
+    removing_damping,
+)
 from .coexistence import Coexistence, coexistence
 from .grid import Grid, grid, points_to_confirm
 
@@ -299,7 +307,7 @@ class _Survey:
         self.follow_lines(np.linspace(*self.box.y, LINES[1]).tolist(), progress)
         if around is not None:
             true_ones = [traced.points for traced in self.traced if traced.motion in _MOTION]
-            self.follow_lines(unmet(around, self.lines, true_ones), progress)
+            self.follow_lines(unmet_lines(around, self.lines, true_ones), progress)
             self.most = max(self.most, int(around.stable.max()))
         self.run_three_points()
         return StabilityChart(
@@ -330,7 +338,7 @@ class _Survey:
 
     def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
         """Find and trace the boundaries of a kind by their test function."""
-        result = chart(test_of(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
+        result = chart(plane_test(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
         self.traced += [Traced(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries]
         if result.gaps:
             first = result.gaps[0]
@@ -344,7 +352,7 @@ class _Survey:
         lost: list[str] = []
         with shown(progress and bool(ys), float(len(ys)), "following branches") as show:
             for number, y in enumerate(ys, start=1):
-                branches, found, failed = branches_on(
+                branches, found, failed = line_branches(
                     self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start
                 )
                 self.lines.append(y)
@@ -375,7 +383,7 @@ class _Survey:
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return
-        own = np.mean([_is_of(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
+        own = np.mean([_belongs(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
         # of two folds that meet in a cusp only one ends the grid's motion; near a jump a coarse grid may have the other motion
         true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
         self.traced.append(
@@ -401,7 +409,7 @@ class _Survey:
             if distance(boundary.points / self.box.size, place / self.box.size) > SAME:
                 continue
             if boundary.starts is None:
-                same = _is_of(self.grid, orbit, place)
+                same = _belongs(self.grid, orbit, place)
             else:
                 near = int(np.linalg.norm((boundary.points - place) / self.box.size, axis=1).argmin())
                 same = float(np.linalg.norm((boundary.starts[near] - orbit.start) / scale)) < SAME_MOTION
@@ -449,7 +457,7 @@ class _Survey:
         # this region and no other
         margin = 0.25 * (high - low)
         x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
-        test = test_of(matrix, boundary.kind)
+        test = plane_test(matrix, boundary.kind)
         try:
             found = removing_damping(
                 lambda value, damping: test(value, damping) if which == 1 else test(damping, value),
@@ -462,7 +470,7 @@ class _Survey:
         return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 
 
-def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
+def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
     """Return a line y = const through each part of a plane, with one number of stable motions, that nothing has met so far.
 
     Parameters
@@ -487,7 +495,7 @@ def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDAr
     return found
 
 
-def _is_of(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
+def _belongs(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
     """Return whether an orbit belongs to the motion of a grid, by the starts at the points around its place."""
     scale = orbit.scale
     distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)

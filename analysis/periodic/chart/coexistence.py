@@ -25,7 +25,7 @@ from ..motion.orbit import PeriodicOrbit, first_guess, require_turns
 from ..motion.search import Orbits, orbits_of
 from ..motion.variables import Plane
 from . import kernels
-from .grid import Keeping, code_of, grid_points, row_name, row_points, row_search
+from .grid import Keeping, grid_points, row_code, row_name, row_points, row_search
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
 
 FloatArray = NDArray[np.float64]
@@ -144,9 +144,9 @@ def coexistence(
     first = rows[0][0]
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
-    code = code_of(kernels.solve_all)
+    code = row_code(kernels.solve_all)
     data, computed = Keeping(folder, n_jobs, progress, "motions").rows(
-        partial(_motions_of, guesses),
+        partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
         (len(xs), MOST_ORBITS, first.flow.size + 2),
@@ -162,7 +162,7 @@ def coexistence(
     )
 
 
-def _motions_of(guesses: FloatArray, row: Sequence[OperatingPoint]) -> FloatArray:
+def _compute_motions(guesses: FloatArray, row: Sequence[OperatingPoint]) -> FloatArray:
     """Return largest multiplier, amplitude and start of each motion of the points of a row, by amplitude; NaN after the last.
 
     The shape is (m, MOST_ORBITS, n + 2).
@@ -297,7 +297,7 @@ def basins(
     found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        raise InputError(f"there is no stable motion of {of_turns(turns)} here: no start ends in one")
+        raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one")
     first = motions[0].start
     extent, scale, half = extent_of(parameters, drive, first)[0], motions[0].scale, len(first) // 2
     spans = position or (-extent, extent), rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0))
@@ -308,7 +308,7 @@ def basins(
     # a motion of several turns is met at the beginning of any of them
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
-    point, code = motions[0].point, code_of(kernels.basins_of)
+    point, code = motions[0].point, row_code(kernels.settle_starts)
     ends, computed = Keeping(folder, n_jobs, progress, "starts").rows(
         partial(_ends, point, known, across),
         up.tolist(),
@@ -320,7 +320,7 @@ def basins(
     return Basins(position=across, rate=up, ends=met, found=found, computed=computed)
 
 
-def of_turns(turns: int) -> str:
+def format_turns(turns: int) -> str:
     """Return "one turn" or "up to ... turns"."""
     return "one turn" if turns == 1 else f"up to {turns} turns"
 
@@ -331,5 +331,5 @@ def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: fl
     starts[:, 0], starts[:, point.flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
     section = point.section(known[0], PLAIN, tolerance=_TOLERANCE)
-    kernels.basins_of(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
+    kernels.settle_starts(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
     return ends.astype(float)

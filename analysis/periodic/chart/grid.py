@@ -219,7 +219,7 @@ def grid(
     first = rows[0][0]
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
-    code = code_of(kernels.solve_row, multipliers)
+    code = row_code(kernels.solve_row, multipliers)
     data, computed = Keeping(folder, n_jobs, progress, "filling in the stability chart").rows(
         partial(_compute_row, guesses, tolerance),
         rows,
@@ -260,7 +260,7 @@ def grid_points(
     return xs, ys, [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
 
 
-def code_of(*functions: Any) -> tuple[str, ...]:
+def row_code(*functions: Any) -> tuple[str, ...]:
     """Return the code that computes a row: fingerprints of compiled functions, and all Python sources of this package."""
     sources = (path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parents[1].rglob("*.py")))
     return *map(fingerprint, functions), *sources
@@ -283,7 +283,7 @@ def row_name(
     functions : sequence of int
         Numbers of the flow's functions that are called.
     code : sequence of str
-        See `code_of`.
+        See `row_code`.
     *numbers : float
         Further numbers that the row depends on.
     """

@@ -377,7 +377,7 @@ LOST, UNSETTLED = -1, -2
 
 
 @kernel(types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]), purpose="basins of attraction")
-def basins_of(section, turn, near, most, starts, known, ends):
+def settle_starts(section, turn, near, most, starts, known, ends):
     """Follow each start turn by turn until it settles on one of the known motions.
 
     Parameters

@@ -328,7 +328,7 @@ class PeriodicOrbit(Shown):
         return np.array(passed)
 
 
-def orbit_at(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
+def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
     """Return an orbit at an operating point, which it keeps; the other arguments are those of `PeriodicOrbit`."""
     orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
     orbit._kept["point"] = point
@@ -374,7 +374,7 @@ def orbit_of(
         if not settle:
             raise
         failure = error
-    status, settled = settle_from(point, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
+    status, settled = settle_motion(point, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
     if status is Status.DONE:
         try:
             return solve_orbit(point, turns, settled)
@@ -392,7 +392,7 @@ def orbit_of(
     raise failure
 
 
-def settle_from(
+def settle_motion(
     point: OperatingPoint, start: FloatArray, *, tolerance: float, change: float, turns: int
 ) -> tuple[Status, FloatArray]:
     """Follow the motion from ``start`` until a turn changes y by less than ``change``, or for so many turns."""
@@ -498,7 +498,7 @@ def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> Periodi
     residual, iterations = float(report[0]), int(report[1])
     if status != Status.DONE:
         raise orbit_error(status, point.flow, start, residual, iterations)
-    return orbit_at(
+    return make_orbit(
         point,
         turns=turns,
         start=start,
@@ -508,14 +508,16 @@ def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> Periodi
     )
 
 
-def orbit_through(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[PeriodicOrbit, FloatArray]:
+def trial_orbit(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[PeriodicOrbit, FloatArray]:
     """Follow one period from a start; return it as an orbit, though it may not close, and y(T) - y(0).
 
     Raises OrbitError if the period cannot be followed.
     """
     period = point.period(start, turns)
     residual = float(np.abs(period.shift / point.scale(start)).max())
-    made = orbit_at(point, turns=turns, start=start.copy(), monodromy=period.monodromy, residual=residual, iterations=1)
+    made = make_orbit(
+        point, turns=turns, start=start.copy(), monodromy=period.monodromy, residual=residual, iterations=1
+    )
     return made, period.shift
 
 
@@ -572,7 +574,7 @@ class OrbitEquations:
         stations = None
         if k > 1:
             stations = Stations(self.angles, starts, float(growths(ends.matrices, scale).max()))
-        orbit = orbit_at(
+        orbit = make_orbit(
             point,
             turns=self.turns,
             start=starts[0].copy(),

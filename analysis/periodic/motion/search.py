@@ -34,7 +34,7 @@ from .orbit import (
     first_guess,
     orbit_of,
     require_turns,
-    settle_from,
+    settle_motion,
     solve_orbit,
 )
 
@@ -142,7 +142,7 @@ def sweep(
     flags: list[str] = []
     jumps: list[Jump] = []
     drive = drive or Drive(speed=float(grid[0]))
-    first = _at_speed(drive, float(grid[0]))
+    first = _speed_drive(drive, float(grid[0]))
     state = first_guess(first.flow(mechanism_of(parameters)), drive, start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
@@ -150,7 +150,7 @@ def sweep(
         flag = ""
         if orbit is None:
             try:
-                orbit = _settled(operating_point(parameters, _at_speed(drive, speed)), state)
+                orbit = _settled(operating_point(parameters, _speed_drive(drive, speed)), state)
             except OrbitError as error:
                 flag = str(error)
             if orbit is not None and last is not None:
@@ -173,7 +173,7 @@ def sweep(
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 
-def _at_speed(drive: Drive, speed: float) -> Drive:
+def _speed_drive(drive: Drive, speed: float) -> Drive:
     """Return the drive at a prescribed speed."""
     return replace(drive, speed=speed, torque=0.0, motor=None)
 
@@ -187,7 +187,7 @@ def _continued(
     """
     assert last.drive.speed is not None
     try:
-        orbit = orbit_of(parameters, _at_speed(last.drive, speed), turns=last.turns, start=last.start, settle=False)
+        orbit = orbit_of(parameters, _speed_drive(last.drive, speed), turns=last.turns, start=last.start, settle=False)
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -202,7 +202,7 @@ def _continued(
 
 def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
     """Return the steady motion on which the mechanism settles from a state at crank angle 0."""
-    status, start = settle_from(point, state, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
+    status, start = settle_motion(point, state, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
     if status is not Status.DONE:
         raise orbit_error(status, point.flow, start)
     for turns in PERIODS:
@@ -409,7 +409,7 @@ def orbits_of(
     for orbit in known:
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
-    settled = settle_from(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
+    settled = settle_motion(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
     if settled[0] is Status.DONE:
         places.append(settled[1])
     for number in range(ROUNDS):
@@ -505,7 +505,7 @@ def _met(found: Orbits, first: PeriodicOrbit | None, start: ArrayLike | None) ->
         if last is not None and last.turns == 1:
             arrived = last.start
     if arrived is None:
-        status, settled = settle_from(point, guess, tolerance=1e-8, change=1e-6, turns=2000)
+        status, settled = settle_motion(point, guess, tolerance=1e-8, change=1e-6, turns=2000)
         arrived = settled if status is Status.DONE else None
     if arrived is None:
         return stable[0]

@@ -127,10 +127,10 @@ class Arc:
 
 def arcs(branches: Iterable[Branch]) -> tuple[Arc, ...]:
     """Return the arcs of branches, in their order."""
-    return tuple(arc for branch in branches for arc in _arcs_of(branch))
+    return tuple(arc for branch in branches for arc in _branch_arcs(branch))
 
 
-def _arcs_of(branch: Branch) -> list[Arc]:
+def _branch_arcs(branch: Branch) -> list[Arc]:
     places = [special.after + 1 for special in branch.special]
     special = [special.orbit for special in branch.special]
     parameter = np.insert(branch.parameter, places, [s.parameter for s in branch.special])
@@ -309,14 +309,14 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
         # at a fold the parameter turns back: it is no extremum over the parameter
         if not a < branch.parameter[i] < c:
             continue
-        place, orbit = _at_rest(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
+        place, orbit = _locate_extremum(branch.family, branch.orbits[i], a, float(branch.parameter[i]), c, sign)
         found.append(
             Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability, orbit=orbit)
         )
     return tuple(found)
 
 
-def _at_rest(
+def _locate_extremum(
     family: Family, orbit: PeriodicOrbit, a: float, begin: float, c: float, sign: int
 ) -> tuple[float, PeriodicOrbit]:
     """Find the extremum between a and c and the motion there, from a motion between them."""

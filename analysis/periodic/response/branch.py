@@ -102,7 +102,7 @@ class Branch(Shown):
         """
         if not self._table:
             turns = [orbit.turn() for orbit in self.orbits]
-            values = _of_a_turn(self.orbits[0], turns[0])
+            values = _turn_columns(self.orbits[0], turns[0])
             self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in values.items()})
         unit = f" [{self.family.unit}]" if self.family.unit else ""
         largest = self.largest_multiplier
@@ -124,7 +124,7 @@ class Branch(Shown):
 FORCE = "greatest force in "
 
 
-def _of_a_turn(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
+def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
     """Return the columns that come from the outputs over a period, each with the function that computes it."""
     mechanism = mechanism_of(orbit.parameters)
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)

@@ -402,7 +402,7 @@ class _Search:
             self.branches.append(branch)
             strayed = turns > 1 and max(branch.orbits[end].largest for end in (0, -1)) > limit
             if not (branch.reached or strayed):
-                self.problems.append(ended(branch))
+                self.problems.append(ending(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
         """Return whether a branch passes through a motion, begun with any of its turns."""
@@ -414,10 +414,10 @@ class _Search:
         self.branches.append(branch)
         left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
         if not (branch.reached or left):
-            self.problems.append(ended(branch))
+            self.problems.append(ending(branch))
 
 
-def ended(branch: Branch) -> str:
+def ending(branch: Branch) -> str:
     """Return a sentence on a branch that was not followed to its end."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
     period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "

@@ -126,7 +126,7 @@ class Forms(NamedTuple):
                 + self.third(u - v - w, h)
             ) / 24.0
 
-        return _of_complex(b_real, 2), _of_complex(c_real, 3)
+        return _complex_form(b_real, 2), _complex_form(c_real, 3)
 
 
 def _forms(orbit: PeriodicOrbit) -> Forms:
@@ -139,7 +139,7 @@ def _forms(orbit: PeriodicOrbit) -> Forms:
     return Forms(after, orbit.monodromy * scale / scale[:, None])
 
 
-def _of_complex(form: Callable[..., FloatArray], count: int) -> Form:
+def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
     """Extend a real multilinear form to complex vectors."""
 
     def of(*vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -177,7 +177,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
     if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
         return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
-    coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
+    coefficient, uncertainty = _extrapolated(lambda h: form_coefficient(of, special.kind, multiplier, h))
     if not uncertainty < UNSETTLED * abs(coefficient):
         words = _UNSETTLED
     elif special.kind is Crossing.FOLD:
@@ -212,7 +212,7 @@ def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
     return min(found, key=lambda pair: pair[1] / max(abs(pair[0]), 1e-300))
 
 
-def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
+def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:
     """Compute the coefficient of a normal form by Kuznetsov's (5.25), (5.27) or (5.28): see `NormalForm`.
 
     Parameters

@@ -21,7 +21,7 @@ from ...files import unknown_name
 from ...mechanisms import mechanism_of
 from ..motion.discretisation import operating_point
 from ..motion.floquet import Crossing
-from ..motion.orbit import PeriodicOrbit, orbit_of, orbit_through
+from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
 from ..motion.variables import along_parameters, gradient_names, require_variable, stacked, value_of, with_values
 from .variations import Place, Variations
 
@@ -329,7 +329,7 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
 
 def extremum_orbit(orbit: PeriodicOrbit, along: str) -> PeriodicOrbit:
     """Return the motion at an extremum of the amplitude over a parameter, from a motion near it; see `extremum_gradient`."""
-    return _located(orbit, along, _to_extremum, "extremum of the amplitude")
+    return _locate_motion(orbit, along, _extremum_step, "extremum of the amplitude")
 
 
 def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None) -> PointGradient:
@@ -382,7 +382,9 @@ def crossing_gradient(
         two folds meet, or two branches cross.
     """
     others = _others(orbit, along, names)
-    orbit = _located(orbit, along, _to_fold if kind is Crossing.FOLD else partial(_to_crossing, kind=kind), kind.value)
+    orbit = _locate_motion(
+        orbit, along, _fold_step if kind is Crossing.FOLD else partial(_crossing_step, kind=kind), kind.value
+    )
     motion = MotionGradient(orbit, (*others, along))
     test = _test(motion, kind)
     if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
@@ -430,7 +432,7 @@ def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tu
 _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 
 
-def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
+def _locate_motion(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
     """Find the special point near a motion by Newton's method and return the motion there.
 
     Raises LinkworkError if Newton's method goes elsewhere.
@@ -448,8 +450,8 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
             break
         parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
         start = orbit.start + change
-        if step_of is _to_fold:
-            orbit, _ = orbit_through(operating_point(parameters, drive), start, orbit.turns)
+        if step_of is _fold_step:
+            orbit, _ = trial_orbit(operating_point(parameters, drive), start, orbit.turns)
         else:
             orbit = orbit_of(parameters, drive, turns=orbit.turns, start=start, settle=False)
         if abs(step) <= _LAST * abs(value):
@@ -457,7 +459,7 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
     raise LinkworkError(f"no {what} along {along} was found near {begun:.9g}")
 
 
-def _to_extremum(motion: MotionGradient) -> tuple[FloatArray, float]:
+def _extremum_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     (along,) = motion.names
     size, slope, curvature = motion.amplitude.value, motion.amplitude[along], motion.amplitude_curvature(along)[along]
     # near a resonance 1 / amplitude^2 is nearly a parabola, near a minimum amplitude^2 is
@@ -466,13 +468,13 @@ def _to_extremum(motion: MotionGradient) -> tuple[FloatArray, float]:
     return motion.start[:, 0] * step, step
 
 
-def _to_crossing(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, float]:
+def _crossing_step(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, float]:
     test = motion.test(kind)
     step = -test.value / float(test.by[0])
     return motion.start[:, 0] * step, step
 
 
-def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
+def _fold_step(motion: MotionGradient) -> tuple[FloatArray, float]:
     """Step to the fold: the map over a period has a fixed point, and the matrix M - I the singular value zero."""
     v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
     left, right = _null_vectors(v)

@@ -126,9 +126,15 @@ class Variations:
         found = self.orbit.sample(self.angles.ravel())
         return found[:, self.flow.places].reshape(*self.angles.shape, self.flow.size)
 
-    def _call(self, name: str, rows_of_arguments: FloatArray, along: FloatArray, size: int) -> FloatArray:
-        """Evaluate a function of `_code` at the nodes; shape (k s, size)."""
-        count, d = len(rows_of_arguments), self.flow.drive_size
+    def _call(
+        self, name: str, size: int, direction: FloatArray | None = None, along: FloatArray | None = None
+    ) -> FloatArray:
+        """Evaluate a function of `_code` at the nodes, along a direction of y and of the constants; shape (k, s, size)."""
+        direction = np.zeros_like(self.y) if direction is None else direction
+        along = np.zeros(self.constants) if along is None else along
+        arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1)
+        rows_of_arguments = arguments.reshape(self.angles.size, -1)
+        count, d = self.angles.size, self.flow.drive_size
         drive = np.concatenate([self._drive, along[:d]])
         values = np.empty((count, size))
         rows(
@@ -139,7 +145,7 @@ class Variations:
             np.tile(drive, (count, 1)),
             values,
         )
-        return values
+        return values.reshape(*self.angles.shape, size)
 
     @property
     def constants(self) -> int:
@@ -148,11 +154,9 @@ class Variations:
 
     def _first(self) -> tuple[FloatArray, FloatArray]:
         """Return the rates at the nodes and their first derivatives."""
-        n, shape = self.flow.size, self.angles.shape
-        arguments = np.concatenate([self.y, np.zeros_like(self.y), self.angles[..., None]], axis=-1)
-        width = n + self.constants
-        found = self._call("first", arguments.reshape(-1, 2 * n + 1), np.zeros(self.constants), n * (1 + width))
-        return found[:, :n].reshape(*shape, n), found[:, n:].reshape(*shape, width, n).swapaxes(-1, -2)
+        n, width = self.flow.size, self.flow.size + self.constants
+        found = self._call("first", n * (1 + width))
+        return found[..., :n], found[..., n:].reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
 
     def second(self, direction: FloatArray, along: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of ``by_y`` and of ``by_constant`` along a direction.
@@ -164,11 +168,9 @@ class Variations:
         along : ndarray, shape (c,), optional
             Of the numbers of the drive and the constants.
         """
-        n, shape = self.flow.size, self.angles.shape
-        arguments = np.concatenate([self.y, direction, self.angles[..., None]], axis=-1).reshape(-1, 2 * n + 1)
-        width = n + self.constants
-        along = np.zeros(self.constants) if along is None else along
-        found = self._call("second", arguments, along, n * width).reshape(*shape, width, n).swapaxes(-1, -2)
+        n, width = self.flow.size, self.flow.size + self.constants
+        found = self._call("second", n * width, direction, along)
+        found = found.reshape(*self.angles.shape, width, n).swapaxes(-1, -2)
         return found[..., :n], found[..., n:]
 
     # Linear equations
@@ -235,7 +237,7 @@ class Variations:
         LinkworkError
             If there is none, exactly at a fold.
         """
-        starts = _round(self.steps, self._gains(forcing))
+        starts = _solve_cyclic(self.steps, self._gains(forcing))
         return self._at_nodes(starts, forcing), starts[0]
 
     # Results
@@ -276,10 +278,7 @@ class Variations:
 
     def outputs(self) -> FloatArray:
         """Return all outputs at the nodes, shape (k, s, outputs)."""
-        n, count = self.flow.size, len(self.flow.mechanism.output_names)
-        arguments = np.concatenate([self.y, np.zeros_like(self.y), self.angles[..., None]], axis=-1)
-        found = self._call("outputs", arguments.reshape(-1, 2 * n + 1), np.zeros(self.constants), count)
-        return found.reshape(*self.angles.shape, count)
+        return self._call("outputs", len(self.flow.mechanism.output_names))
 
     def output_derivatives(self, panel: int, number: int) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of an output at the nodes of a panel by y, (s, n), and by constants, (s, c)."""
@@ -292,7 +291,7 @@ class Variations:
         return np.array(found)[:, :n], np.array(found)[:, n:]
 
 
-def _round(steps: FloatArray, gains: FloatArray) -> FloatArray:
+def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
     """Solve for d at the beginning of each panel, shape (k, n, m), so that each panel ends where the next one begins.
 
     Two panels at a time become one: rotations eliminate d between them, so that neither growth nor decay accumulates.

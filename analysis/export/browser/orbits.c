@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "tableau.h"
+#include "step.h"
 
 enum {
     LENGTH = MOST + 1 + MOST * (MOST + 1), /* y, the time, the derivatives of y by y at the start and by what is varied */
@@ -49,58 +49,6 @@ static struct {
     int reference;
     double x[STATES], u[ROOM(INPUTS)], p[CONSTANTS], motor[MOTOR], along[MOST];
 } varied;
-
-/* The integrator over an angle: DOP853 for any number of components */
-
-typedef bool Slope(double angle, const double z[], double result[], int length);
-typedef double Columns[STAGES][LENGTH];
-
-static double attempt(Slope *slope, double angle, const double z[], double h, Columns k, const double scale[], int length,
-                      double result[]) {
-    double sum5 = 0.0, sum3 = 0.0;
-    for (int stage = 1; stage <= STAGES; stage++) {
-        for (int i = 0; i < length; i++) {
-            double sum = 0.0;
-            for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++) sum += A_WEIGHT[w] * k[A_STAGE[w]][i];
-            result[i] = z[i] + h * sum;
-        }
-        if (stage < STAGES && !slope(angle + C[stage] * h, result, k[stage], length)) return NAN;
-    }
-    for (int i = 0; i < length; i++) {
-        double weight = 1.0 / (scale[i] + fmax(fabs(z[i]), fabs(result[i]))), error5 = 0.0, error3 = 0.0;
-        for (int e = 0; e < ERROR_STAGES; e++) {
-            error5 += E5[e] * k[E_STAGE[e]][i];
-            error3 += E3[e] * k[E_STAGE[e]][i];
-        }
-        sum5 += error5 * weight * (error5 * weight);
-        sum3 += error3 * weight * (error3 * weight);
-    }
-    double denominator = sum5 + 0.01 * sum3;
-    return denominator == 0.0 ? 0.0 : fabs(h) * sum5 / sqrt(denominator * length);
-}
-
-/* Take z from one angle to another; `proposal` is the step to begin with, and then that to go on with. */
-static bool across(Slope *slope, double from, double to, double z[], const double scale[], int length, double tolerance,
-                   double *proposal) {
-    static Columns k;
-    double result[LENGTH], done = 0.0, whole = to - from;
-    for (int steps = 0; steps < MAX_STEPS && done < whole; steps++) {
-        double h = fmin(*proposal, whole - done);
-        bool last = h >= whole - done;
-        if (!slope(from + done, z, k[0], length)) return false;
-        double error = attempt(slope, from + done, z, h, k, scale, length, result) / tolerance;
-        double factor = error == 0.0 ? GREATEST_FACTOR : SAFETY * pow(error, -1.0 / ORDER);
-        if (error <= 1.0) {
-            memcpy(z, result, (size_t)length * sizeof *z);
-            done = last ? whole : done + h;
-            *proposal = fmax(h < *proposal ? *proposal : 0.0, h * fmin(GREATEST_FACTOR, factor));
-        } else {
-            *proposal = h * (isfinite(error) ? fmax(LEAST_FACTOR, factor) : 0.25);
-            if (*proposal < LEAST_STEP * whole) return false;
-        }
-    }
-    return done >= whole;
-}
 
 /* The motion over the crank's angle */
 
@@ -151,7 +99,8 @@ static void accelerations(const double x[STATES], const double by_state[], const
 }
 
 /* Rates with respect to the angle, of y, of the time, and of as many columns as there are. */
-static bool slope(double angle, const double z[], double result[], int length) {
+static bool slope(const void *context, double angle, const double z[], double result[], int length) {
+    (void)context; /* the plant is one: see studio.h */
     int n = section.size, columns = (length - n - 1) / (n ? n : 1);
     double x[STATES], f[STATES], by_state[2 * FREEDOMS * FREEDOMS];
     locate(angle, z, x);
@@ -179,6 +128,26 @@ static bool slope(double angle, const double z[], double result[], int length) {
     return true;
 }
 
+/* Take z from one angle to another; `proposal` is the step to begin with, and then that to go on with. */
+static bool across(double from, double to, double z[], const double scale[], int length, double tolerance, double *proposal) {
+    static double k[STAGES * LENGTH];
+    double result[LENGTH], done = 0.0, whole = to - from;
+    for (int steps = 0; steps < MAX_STEPS && done < whole; steps++) {
+        double h = fmin(*proposal, whole - done);
+        bool last = h >= whole - done;
+        if (!slope(NULL, from + done, z, k, length)) return false;
+        double error = attempt_step(slope, NULL, from + done, z, h, k, scale, length, result) / tolerance;
+        *proposal = fmax(error <= 1.0 && h < *proposal ? *proposal : 0.0, h * step_factor(error));
+        if (error <= 1.0) {
+            memcpy(z, result, (size_t)length * sizeof *z);
+            done = last ? whole : done + h;
+        } else if (*proposal < LEAST_STEP * whole) {
+            return false;
+        }
+    }
+    return done >= whole;
+}
+
 static void scale_of(double scale[LENGTH]) {
     int n = section.size;
     double *along = scale + n + 1 + n * n;
@@ -199,7 +168,7 @@ static bool once_round(double y[], int columns, double tolerance, double *propos
     for (int i = 0; i < n && i < columns; i++) z[n + 1 + i * n + i] = 1.0;
     for (int part = 0; part < quarters; part++) {
         double to = PERIOD * (part + 1) / quarters;
-        bool good = across(slope, PERIOD * part / quarters, to, z, scale, length, tolerance, proposal);
+        bool good = across(PERIOD * part / quarters, to, z, scale, length, tolerance, proposal);
         locate(good ? to : PERIOD * part / quarters, z, x);
         reason = plant_check_assembly(&plant, x, sentence);
         if (reason == GOOD && !good) {
@@ -346,7 +315,7 @@ int FACE(studio_turn)(int steps) {
         if (reason == GOOD) reason = write_row(&shown, number);
         if (reason != GOOD) return number;
         if (number == steps) return number + 1;
-        if (!across(slope, PERIOD * number / steps, PERIOD * (number + 1) / steps, z, scale, length, FINE, &proposal)) {
+        if (!across(PERIOD * number / steps, PERIOD * (number + 1) / steps, z, scale, length, FINE, &proposal)) {
             reason = TOLERANCE_NOT_MET;
             return number + 1;
         }
@@ -542,7 +511,7 @@ double FACE(studio_amplitude)(void) {
     for (int i = 0; i < SAMPLES; i++) {
         double from = PERIOD * i / SAMPLES, to = PERIOD * (i + 1) / SAMPLES;
         samples[i] = z[0];
-        if (!across(slope, from, to, z, scale, section.size + 1, FINE, &proposal)) return NAN;
+        if (!across(from, to, z, scale, section.size + 1, FINE, &proposal)) return NAN;
     }
     return swing_of(samples);
 }

@@ -1,0 +1,30 @@
+/** Motions as the module computes them: rows of a run, a periodic motion, a point of a branch of them. */
+
+export interface Orbit {
+  found: boolean;
+  /** Why there is none. */
+  sentence: string;
+  size: number;
+  period: number;
+  start: number[];
+  /** In the state, of the first of what it starts with: whose amplitude is meant. */
+  place: number;
+  /** Real and imaginary parts, the largest modulus first. */
+  multipliers: [number, number][];
+}
+
+export interface Rows {
+  values: Float64Array;
+  count: number;
+  /** Why there are no more, if that is so. */
+  sentence: string;
+}
+
+/** A motion on a branch. */
+export interface Point {
+  value: number;
+  amplitude: number;
+  start: number[];
+  multipliers: [number, number][];
+  kind: "" | "fold" | "doubling";
+}
