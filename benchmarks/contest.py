@@ -24,9 +24,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.numerics.overlap import symmetric_difference
 from analysis.studies.youssef.problems import AREA_N, PACKAGING_FLATNESS, PACKAGING_ROTATION, PACKAGING_TRAVEL, N
 from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
-from analysis.synthesis.linkage.kernels import symmetric_difference
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import Constraint
 from analysis.synthesis.task.limits import Limits, make_limits

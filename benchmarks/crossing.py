@@ -27,8 +27,9 @@ from rich.console import Console
 from scipy.optimize import OptimizeResult
 from threadpoolctl import threadpool_limits
 
+from analysis.numerics.overlap import nearest, symmetric_difference
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
-from analysis.synthesis.linkage.kernels import coupler_path, nearest, symmetric_difference
+from analysis.synthesis.linkage.kernels import coupler_path
 from analysis.synthesis.search.refine import divided
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import USUAL, Constraint

@@ -32,9 +32,7 @@ from ...files import (
 )
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
-from ..linkage.kind import Kind
-from ..linkage.linkage import ANGLES
-from ..linkage.machine import PINS, Make, PinForces, pin_forces
+from ..linkage import ANGLES, PINS, Kind, Make, PinForces, pin_forces
 from ..result.solution import Solution
 from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from ..search.start import Search
@@ -74,7 +72,7 @@ def _cores(value: Any, name: str) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchTable:
-    """How it is searched, and among what; see `Search` and `synthesize`."""
+    """The table ``[search]``: kinds of linkages and effort; see `Search` and `synthesize`."""
 
     seed: int = entry(Whole(0), 0)
     candidates: int = entry(Whole(1), 1 << 16)
@@ -225,7 +223,7 @@ def _trade_off(value: Any, name: str) -> TradeOffTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SynthesisCase:
-    """What a case file asks for."""
+    """A synthesis as a case file describes it."""
 
     title: str = entry(text)
     task: Task = entry(unchanged)

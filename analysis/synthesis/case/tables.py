@@ -1,4 +1,4 @@
-"""The task of a synthesis case: its table, of points, files and formulas, and the task that it describes."""
+"""The table of the task in a synthesis case, with its points, files and formulas."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Targets that are weighted: from one crank rotation, or number of a point, to another."""
+    """A window of targets with a weight: from one crank rotation, or number of a point, to another."""
 
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
@@ -165,7 +165,7 @@ def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Formula:
-    """What is made small, and the range of the parameter of a formula: how many points of it, from where to where."""
+    """The objective, and the range of a formula's parameter with its number of points."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -181,7 +181,7 @@ class _Formula:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Curve(_Formula):
-    """Points of a target: written down, of a file, or by formulas; then scaled, turned and shifted."""
+    """Points of a target as a list, from a file, or by formulas; then scaled, turned and shifted."""
 
     points: Any = entry(unchanged, None)
     file: str | None = entry(text, None)
