@@ -66,7 +66,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--objective",
             type=click.Choice(("error", "worst")),
-            help="What is made small: the quality function of the task, or the greatest error; in place of the case's.",
+            help="The objective: the quality function of the task, or the greatest error; in place of the case's.",
         ),
     ):
         command = option(command)

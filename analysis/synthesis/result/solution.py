@@ -1,4 +1,4 @@
-"""A linkage that was found, and everything a designer asks of it."""
+"""Solutions: a linkage for a task, its errors and its verdicts."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ CURVE = 360
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evaluation:
-    """How well a linkage does a task.
+    """The errors of a linkage in a task.
 
     Attributes
     ----------
     error : float
         The task's quality function: m2, of a rocker function rad2.
     value : float
-        What the task's objective makes small: the quality function, or the greatest error (m, of a rocker function rad).
+        The value of the task's objective: the quality function, or the greatest error (m, of a rocker function rad).
     errors : ndarray, shape (n,)
         At each target: distance (m), of an untimed path from the target's point to the curve; of a rocker function, angle
         (rad).
@@ -159,7 +159,7 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """Whether a linkage really does its task.
+    """The defects of a linkage in its task, and its transmission angle.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """The straight part of a path as it is traced, evaluated densely.
+    """The straight part of a path as the linkage traces it, evaluated densely.
 
     Attributes
     ----------
