@@ -85,7 +85,7 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
 
     headings = ["", *quality_headings(solutions[0].task), "largest link [mm]", "transmission angle [deg]"]
     rows = [
-        [str(rank), *quality_cells(s), f"{1e3 * s.linkage.largest_link:.6g}", format_transmission(s.verdicts)]
+        [str(rank), *quality_cells(s), f"{1e3 * s.largest_link:.6g}", format_transmission(s.verdicts)]
         for rank, s in enumerate(solutions, start=1)
     ]
     if forces:

@@ -67,7 +67,7 @@ def _means(parameters: Parameters) -> tuple[float, float]:
         x = [0.0] * mechanism.size
         x[crank] = angle
         mechanism.check_assembly(parameters, x)
-    mass, stiffness = symbolic.over(
+    mass, stiffness = symbolic.evaluate_arrays(
         at_rest(mechanism, crank, first_freedom(mechanism)), angles, list(parameters.constants())
     )
     return float(mass.mean()), float(stiffness.mean())

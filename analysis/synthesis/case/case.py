@@ -21,14 +21,14 @@ from ...files import (
     Range,
     Table,
     Whole,
-    as_it_is,
+    as_table,
     entry,
     flag,
     overridden,
     read,
     read_tables,
-    table_of,
     text,
+    unchanged,
 )
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
@@ -193,7 +193,7 @@ class TradeOffTable:
     """The table ``[trade_off]``: arguments of `trade_off`."""
 
     over: Any = entry(Choice(OVER))
-    limits: tuple[float, ...] = entry(Many(as_it_is, least=2))
+    limits: tuple[float, ...] = entry(Many(unchanged, least=2))
     starts: int = entry(Whole(1), 12)
 
 
@@ -216,7 +216,7 @@ def _constraints(value: Any, name: str) -> tuple[Constraint | Stroke, ...]:
 
 
 def _trade_off(value: Any, name: str) -> TradeOffTable:
-    over = table_of(value, name).get("over")
+    over = as_table(value, name).get("over")
     limit = Quantity(OVER[over].unit if isinstance(over, str) and over in OVER else "m")
     return read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
 
@@ -226,7 +226,7 @@ class SynthesisCase:
     """A synthesis as a case file describes it."""
 
     title: str = entry(text)
-    task: Task = entry(as_it_is)
+    task: Task = entry(unchanged)
     bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
     constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
     search: SearchTable = entry(Table(SearchTable), SearchTable())

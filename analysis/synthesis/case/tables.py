@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ...files import Choice, Kinds, Many, Quantity, Table, Whole, as_it_is, entry, flag, read, read_points, text
+from ...files import Choice, Kinds, Many, Quantity, Table, Whole, entry, flag, read, read_points, text, unchanged
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..task.formula import function_from_formula, path_from_formula
@@ -129,7 +129,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
     if value is None:
         return None
     name = "task.weights"
-    rows = Many(as_it_is)(value, name)
+    rows = Many(unchanged)(value, name)
     if not any(isinstance(row, Mapping) for row in rows):
         return np.array(Many(Quantity("1"))(value, name))
     at = np.arange(n, dtype=float) if rotation is None else rotation
@@ -183,7 +183,7 @@ class _Formula:
 class _Curve(_Formula):
     """Points of a target as a list, from a file, or by formulas; then scaled, turned and shifted."""
 
-    points: Any = entry(as_it_is, None)
+    points: Any = entry(unchanged, None)
     file: str | None = entry(text, None)
     name: str | None = entry(text, None)
     closed: bool | None = entry(flag, None)
@@ -192,7 +192,7 @@ class _Curve(_Formula):
     y: str | None = entry(text, None)
     scale: float | None = entry(Quantity("1", above=0.0), None)
     turn: float | None = entry(Quantity("rad"), None)
-    shift: Any = entry(as_it_is, None)
+    shift: Any = entry(unchanged, None)
 
     def _placed(self, folder: Path) -> tuple[FloatArray, bool]:
         """Return the points in m, and whether their curve is closed."""
@@ -223,7 +223,7 @@ class TimedPathTable(_Curve):
     """The table of a `TimedPath`."""
 
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         points, _ = self._placed(folder)
@@ -240,7 +240,7 @@ class UntimedPathTable(_Curve):
     samples: int = entry(Whole(8), 72)
     smoothing: Smoothing | None = entry(_smoothing, None)
     straight: Straight | None = entry(_STRAIGHT, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         points, closed = self._placed(folder)
@@ -265,7 +265,7 @@ class UntimedPathTable(_Curve):
 class PrecisionPointsTable(_Curve):
     """The table of a `PrecisionPoints`."""
 
-    angle: Any = entry(as_it_is, None)
+    angle: Any = entry(unchanged, None)
     angle_unit: str | None = entry(_angle_unit, None)
     rotation: Any = entry(_steps_or_list, None)
     length: float | None = entry(Quantity("m"), None)
@@ -290,7 +290,7 @@ class PrecisionPointsTable(_Curve):
 class MotionTable(PrecisionPointsTable):
     """The table of a `Motion`."""
 
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         body = self._body(folder)
@@ -303,11 +303,11 @@ class MotionTable(PrecisionPointsTable):
 class RockerFunctionTable(_Formula):
     """The table of a `RockerFunction`."""
 
-    angle: Any = entry(as_it_is, None)
+    angle: Any = entry(unchanged, None)
     angle_unit: str | None = entry(_angle_unit, None)
     file: str | None = entry(text, None)
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
     mounting: bool = entry(flag, False)
     spacing: Any = entry(Choice(("even", "chebyshev")), "even")
 
@@ -338,10 +338,10 @@ class RockerFunctionTable(_Formula):
 class SliderFunctionTable(_Formula):
     """The table of a `SliderFunction`."""
 
-    position: Any = entry(as_it_is)
+    position: Any = entry(unchanged)
     unit: str | None = entry(_length_unit, None)
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         if isinstance(self.position, str):

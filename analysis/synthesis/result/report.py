@@ -363,7 +363,7 @@ def headline(solution: Solution) -> str:
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
     return (
         f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
-        f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
+        f"largest link {1e3 * solution.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")
         + (f"\n{', '.join(v.defects)}" if v.defects else "")
     )
@@ -407,7 +407,7 @@ class Assessment:
             f"{quality_name(task)}: {error} {quality_unit(task)[1]}; "
             f"rms error {rms} {error_unit(task)[1]}, worst {worst} {error_unit(task)[1]}\n"
             f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
-            f"largest link {1e3 * linkage.largest_link:.6g} mm"
+            f"largest link {1e3 * solution.largest_link:.6g} mm"
         )
         if pivot is None:
             head += _slider_line(linkage) + _limits(linkage, solution.rotation)

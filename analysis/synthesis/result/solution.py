@@ -283,7 +283,7 @@ class Solution(Shown):
         found = self.evaluation
         return (
             f"error {self.error:.4g} {unit}2, rms {found.rms:.4g} {unit}, worst {found.worst:.4g} {unit}; largest link "
-            f"{self.linkage.largest_link:.4g} m; {self.verdicts}"
+            f"{self.largest_link:.4g} m; {self.verdicts}"
         )
 
     @classmethod
@@ -342,6 +342,12 @@ class Solution(Shown):
     def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
         """Return the parameters of the plant and its FMU; see `Linkage.to_five_bar`."""
         return self.linkage.to_five_bar(**made_of)
+
+    @property
+    def largest_link(self) -> float:
+        """Return the greatest length that `LargestLink` bounds: of the links and, with target points, from B to P (m)."""
+        point = 0.0 if target_points(self.task) is None else self.linkage.point_distance
+        return max(self.linkage.largest_link, point)
 
     @property
     def direction(self) -> float:

@@ -345,12 +345,12 @@ class Polisher:
         def solve(start: Start, places: Sequence[FloatArray] | None = None) -> Answer:
             return program.solve(start, size=size, places=places)
 
-        as_it_is = replace(answer, start=replace(answer.start, quality=size))
+        unchanged = replace(answer, start=replace(answer.start, quality=size))
         if self.normal.exact and size**2 < EXACT:
-            return as_it_is
+            return unchanged
         found = solve(answer.start)
         if not (found.feasible and found.start.quality < size):
-            return as_it_is
+            return unchanged
         return program.exact(found, solve)
 
     @property

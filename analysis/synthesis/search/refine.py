@@ -168,8 +168,8 @@ class Refinement:
         first = self.value(z0, parameters, curve)
         if not (np.isfinite(self.measure(curve)) and np.isfinite(slopes).all()):
             return replace(answer, feasible=False)
-        as_it_is = program.judged(z0, parameters, answer.start)
-        best = [(first if as_it_is.feasible else inf, z0)]
+        unchanged = program.judged(z0, parameters, answer.start)
+        best = [(first if unchanged.feasible else inf, z0)]
 
         def seen(z: FloatArray) -> None:
             value = self.value(z, parameters, down.curve(z)[0])
@@ -192,8 +192,8 @@ class Refinement:
             seen(down.unknowns(found.x))
         value, z = best[0]
         if not np.isfinite(value):
-            more = {} if self.limit is None or not as_it_is.feasible else program.excess(self.over(curve))
-            return replace(as_it_is, feasible=False, start=replace(answer.start, quality=first), **more)
+            more = {} if self.limit is None or not unchanged.feasible else program.excess(self.over(curve))
+            return replace(unchanged, feasible=False, start=replace(answer.start, quality=first), **more)
         ended = program.judged(z, parameters, answer.start)
         quality = value if self.limit is None else ended.start.quality
         start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=quality)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ...numerics.fourier import FourierSeries
-from ...numerics.workers import check_jobs, cores_of, interruptible, over_workers
+from ...numerics.workers import check_jobs, interruptible, over_workers, worker_count
 from ...run import shown
 from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
@@ -65,7 +65,7 @@ class Search:
     @property
     def cores(self) -> int:
         """Return the number of workers."""
-        return cores_of(self.n_jobs)
+        return worker_count(self.n_jobs)
 
 
 USUAL_SEARCH = Search()
