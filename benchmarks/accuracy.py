@@ -1,4 +1,4 @@
-"""Times at equal accuracy: each solver at its loosest setting that reaches it."""
+"""Compare times at equal accuracy: each solver at its loosest setting that reaches the accuracy."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from analysis.run import Inputs, encode, machine
 from analysis.run.compiled import rows
 from analysis.run.equations import DERIVATIVE
 
-#: Error that is asked for, relative to the largest value.
+#: Required error, relative to the largest value.
 ACCURACY = 1e-6
 TOLERANCES = 10.0 ** np.arange(-3.0, -11.0, -0.1)
 SCIPY_METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
 
 
 class Choice(NamedTuple):
-    """A setting, such as a tolerance or a time step, its error, and whether that is within `ACCURACY`."""
+    """A setting, such as a tolerance or a time step, with its error, and whether it reaches `ACCURACY`."""
 
     setting: float
     error: float
@@ -29,10 +29,9 @@ class Choice(NamedTuple):
 
 
 def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
-    """First of the settings, loose to tight, that reaches the accuracy, or the most accurate one if none does.
+    """Find the first of the settings, from loose to tight, that reaches the accuracy; if none does, the most accurate one.
 
-    A setting counts only if the next tighter one, where there is one, reaches the accuracy as well: a lucky cancellation is not
-    an accuracy.
+    A setting counts only if the next tighter one reaches the accuracy as well, to exclude lucky cancellation.
     """
     tried: list[Choice] = []
     for setting in settings:
@@ -45,18 +44,18 @@ def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choic
     return min(tried, key=lambda choice: choice.error)._replace(reached=False)
 
 
-def best_time(run: Callable[[], object], repeats: int = 7) -> float:
-    """Shortest of several runs (s)."""
+def best_time(run: Callable[[], object], repeats: int = 7, timer: Callable[[], float] = perf_counter) -> float:
+    """Return the shortest time of several runs (s), by the clock or another timer."""
     times = []
     for _ in range(repeats):
-        begun = perf_counter()
+        begun = timer()
         run()
-        times.append(perf_counter() - begun)
+        times.append(timer() - begun)
     return min(times)
 
 
 def right_hand_side(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
-    """Time of one compiled right-hand side, along states without forces (s)."""
+    """Return the time of one compiled right-hand side (s), along states without forces."""
     mechanism = mechanism_of(parameters)
     p = parameters.constants()
     equation = machine(mechanism, mechanism.switched(p)).addresses[DERIVATIVE]

@@ -6,9 +6,9 @@ The quality is that of the task in normal form. A path without crank rotations i
 shares of both lengths, in both directions of travel, so that a curve that collapses onto a piece of the target, or makes
 detours, is far from it. Constraints are those of the benchmarks: bounds, transmission angle, full turn, a straight part.
 
-Links that cannot be joined are stretched until they meet: C lies then on the line through B and D, where the circles of
-coupler and rocker have equal power, so that the quality has no cliff there. The gap between them is a violated constraint
-and, as every other inequality, counts in proportion.
+Links that cannot be joined are stretched until they meet: C then lies on the line through B and D, where the circles of
+coupler and rocker have equal power, so that the quality stays continuous. The gap between them is a violated constraint, with
+a proportional penalty like every other inequality.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _joined = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(squa
 
 
 def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
-    """The regular simplex of n + 1 vertices about a first one, all edges of one length; shape (n + 1, n).
+    """Return the regular simplex with a given first vertex and edge length, shape (n + 1, n).
 
     The thesis's rule (6.11). Its formula is not legible in the copy at hand; this is the regular simplex of Spendley, Hext and
     Himsworth (Technometrics 4 (1962), p 441), which its description fits: the vertex k is off by p in the unknown k and by q
@@ -75,9 +75,9 @@ def evolve(
     maxiter: int = GENERATIONS,
     tol: float = 1e-8,
 ) -> OptimizeResult:
-    """SciPy's differential evolution of a quality, by default the box's, over whole generations.
+    """Minimise a quality, by default the box's, by SciPy's differential evolution over whole generations.
 
-    ``callback(intermediate_result)`` sees each, and ends it by a true answer.
+    ``callback(intermediate_result)`` is called after each generation, and ends the search if it returns true.
     """
     measure = quality or box.quality
 
@@ -105,13 +105,13 @@ def evolve(
 def descend(
     box: BlackBox, random: np.random.Generator, score: Callable[[FloatArray], float] | None = None
 ) -> OptimizeResult:
-    """Nelder and Mead's simplex on a score, by default `BlackBox.charge`, from the best of `DRAWS` random linkages."""
+    """Minimise a score, by default `BlackBox.charge`, by Nelder and Mead's simplex from the best of `DRAWS` random linkages."""
     draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
     return descend_from(box, draws[np.argmin(box.charged(draws))], score or box.charge)
 
 
 def descend_from(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
-    """Nelder and Mead's simplex from a linkage, regular at the start and away from the nearer bounds."""
+    """Minimise a score by Nelder and Mead's simplex from a linkage, regular and away from the nearer bounds."""
     away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
     simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)
     return minimize(
@@ -153,12 +153,12 @@ class BlackBox:
             self.low, self.high = np.append(self.low, SPAN), np.append(self.high, 2.0 * pi)
 
     def quality(self, x: FloatArray) -> FloatArray:
-        """Sum of weighted squared errors at the stations, shape (m,), in units squared."""
+        """Return the sums of weighted squared errors at the stations, shape (m,), in units squared."""
         q = self._linkages(x)
         return self._errors(q, self._rotations(x, q))
 
     def charged(self, x: FloatArray) -> FloatArray:
-        """The quality and, in proportion, every violated constraint, shape (m,)."""
+        """Return the quality plus proportional penalties for violated constraints, shape (m,)."""
         q = self._linkages(x)
         rotation = self._rotations(x, q)
         charge = sum(np.maximum(value, 0.0) for _, value in self._inequalities(q, rotation))
@@ -166,19 +166,19 @@ class BlackBox:
         return charged
 
     def charge(self, x: FloatArray) -> float:
-        """`charged` of one linkage."""
+        """Return `charged` for one linkage."""
         return float(self.charged(x[None, :])[0])
 
     def violations(self, x: FloatArray) -> FloatArray:
-        """Left sides of the inequalities g(x) <= 0, shape (m, number of them)."""
+        """Return the left sides of the inequalities g(x) <= 0, shape (m, number of inequalities)."""
         q = self._linkages(x)
-        # what holds over a turn does not ask for the stations' rotations, which take most of the time
+        # constraints over a whole turn do not need the stations' rotations, which take most of the time
         needed = self.limits.turn is None or self.normal.straight is not None
         rotation = self._rotations(x, q) if needed else np.zeros((len(q), 1))
         return np.column_stack([value for _, value in self._inequalities(q, rotation)])
 
     def answer(self, result: OptimizeResult) -> Answer:
-        """Where a search ended."""
+        """Return the answer of a search from its result."""
         x = np.asarray(result.x)[None, :]
         q = self._linkages(x)
         rotation = self._rotations(x, q)
@@ -207,12 +207,12 @@ class BlackBox:
         return q
 
     def _pins(self, q: FloatArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Components of the vector from B to D, in the frame of the ground link; shape (m, n)."""
+        """Return the components of the vector from B to D in the frame of the ground link, shape (m, n)."""
         th2 = rotation + q[:, 8, None]
         return q[:, 2, None] - q[:, 3, None] * np.cos(th2), -q[:, 3, None] * np.sin(th2)
 
     def _directions(self, q: FloatArray, rotation: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Directions of coupler and rocker, shape (m, n); of other length than one where the links are stretched."""
+        """Return the directions of coupler and rocker, shape (m, n); no unit vectors if the links are stretched."""
         dx, dy = self._pins(q, rotation)
         with np.errstate(divide="ignore", invalid="ignore"):
             g = _joined(0.0, 0.0, dx, dy, q[:, 4, None], q[:, 5, None], float(self.branch))
@@ -242,13 +242,13 @@ class BlackBox:
     def _turned(
         self, q: FloatArray, rotation: FloatArray, coupler: ComplexArray, rocker: ComplexArray, angle: FloatArray
     ) -> FloatArray:
-        """Errors of angle, as lengths; where a link is stretched, its error is that of its direction."""
+        """Return the errors of angle as lengths; for a stretched link, of its direction."""
         own = rocker if self.normal.of_rocker else coupler * np.exp(1j * q[:, 7])[:, None]
         left: FloatArray = self.normal.leverage * np.angle(own * np.exp(1j * (q[:, 10, None] - angle)))
         return left
 
     def _rotations(self, x: FloatArray, q: FloatArray) -> FloatArray:
-        """Crank rotations of the stations, shape (m, n)."""
+        """Return the crank rotations at the stations, shape (m, n)."""
         if self.normal.rotation is not None:
             return np.broadcast_to(self.normal.rotation, (len(q), self.normal.n))
         span = x[:, -1] if self._open else np.full(len(q), 2.0 * pi)
@@ -257,7 +257,7 @@ class BlackBox:
         return np.where(forward[:, None], *found)
 
     def _paired(self, q: FloatArray, span: FloatArray) -> FloatArray:
-        """Rotations at the stations' shares of the length of the curve."""
+        """Return the rotations at the stations' shares of the length of the curve."""
         normal = self.normal
         assert normal.points is not None
         steps = np.abs(np.diff(np.append(normal.points, normal.points[0]) if normal.closed else normal.points))
@@ -270,7 +270,7 @@ class BlackBox:
     # Constraints
 
     def _inequalities(self, q: FloatArray, rotation: FloatArray) -> list[tuple[str, FloatArray]]:
-        """Names and left sides of the inequalities g <= 0, each shape (m,)."""
+        """Return the names and left sides of the inequalities g <= 0, each of shape (m,)."""
         limits, normal = self.limits, self.normal
         l1, l2, l3, l4 = (q[:, k] for k in range(2, 6))
         found: list[tuple[str, FloatArray]] = []

@@ -1,12 +1,12 @@
-"""A problem of synthesis in the form that all searches share, and the searches other than `synthesize`, over their time.
+"""A synthesis problem in the form that all searches share, and the searches other than `synthesize`.
 
-All have the same unknowns, bounds and constraints, and all are measured alike: where one improves, its clock is stopped, the
-linkage evaluated by the task's own measure, and left out if it violates a constraint.
+All searches have the same unknowns, bounds and constraints and the same measure: when a search improves, its clock is stopped
+and the linkage is evaluated by the task's own measure, unless it violates a constraint.
 
-pylinkage (extra ``bench``) counts link lengths alone as dimensions: `PlacedFourBar` opens the others to its optimisers. They
-see the coupler curve by its own compiled solver; the constraints as charges in proportion, as our simplex does; and infinity,
-as is its custom, where the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual
-advises. Its swarm takes no seed.
+pylinkage (extra ``bench``) optimises link lengths only: `PlacedFourBar` gives its optimisers the other dimensions. They see the
+coupler curve of its own compiled solver, proportional penalties for violated constraints, as our simplex does, and infinity if
+the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual advises. Its swarm takes no
+seed.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.numerics.overlap import symmetric_difference
 from analysis.studies.youssef.problems import AREA_N, PACKAGING_FLATNESS, PACKAGING_ROTATION, PACKAGING_TRAVEL, N
 from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
-from analysis.synthesis.linkage.kernels import symmetric_difference
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import Constraint
 from analysis.synthesis.task.limits import Limits, make_limits
@@ -38,18 +38,18 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Score = Callable[[FloatArray], float]
 
-#: Phases over which pylinkage's function generation is tried.
+#: Number of phases for which pylinkage's function generation is tried.
 PHASES = 360
-#: Share by which a score must improve on the last that was measured to be measured, too: measuring takes long.
+#: Relative improvement of a score from which on a linkage is measured, as measuring takes long.
 SLIGHT = 1e-4
-#: Populations of the evolution strategy, each twice the last, before it is begun afresh.
+#: How often the population of the evolution strategy is doubled before a new start.
 DOUBLED = 8
 
-# A problem, and what is found of it over time
+# A problem, and the progress of a search
 
 
 class Problem(Protocol):
-    """What is asked: of chapter VI, or one of `targets.TARGETS`."""
+    """A problem of chapter VI, or one of `targets.TARGETS`."""
 
     @property
     def task(self) -> Task: ...
@@ -58,23 +58,23 @@ class Problem(Protocol):
     @property
     def constraints(self) -> tuple[Constraint, ...]: ...
     def convert(self, error: float) -> float:
-        """An error from SI to the unit in which it is reported."""
+        """Convert an error from SI to the reported unit."""
         ...
 
 
 class TimeUp(Exception):
-    """A search has used its time, or found enough."""
+    """A search has used its time, or reached its goal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Contest:
     """A problem in the form that all searches share.
 
-    It has a `BlackBox` for each assembly, and a plain one that asks nothing of a straight part: a `BlackBox` has its stations
-    at equal shares of the length, and asks there for more than the task does.
+    It has a `BlackBox` for each assembly, and a plain one without requirements for a straight part: a `BlackBox` has its
+    stations at equal shares of the length, where these requirements are stricter than the task's.
 
-    With ``on_area`` the searches of a path whose measure is the area end on that: stations at equal shares of the length, which
-    they begin with, only stand for it.
+    With ``on_area``, searches for a path whose measure is the area first use stations at equal shares of the length, and then
+    minimise the area itself.
     """
 
     problem: Problem
@@ -86,7 +86,7 @@ class Contest:
 
     @classmethod
     def of(cls, problem: Problem, *, on_area: bool = False) -> Contest:
-        """The contest on a problem."""
+        """Prepare the contest for a problem."""
         normal = normal_form(problem.task)
         limits = make_limits(problem.task, normal, problem.bounds, problem.constraints)
         boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
@@ -96,30 +96,30 @@ class Contest:
         return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain, on_area=on_area)
 
     def area(self, curve: ComplexArray) -> float:
-        """The area between a closed curve and the target, in units squared."""
+        """Return the area between a closed curve and the target, in units squared."""
         assert self.normal.outline is not None
         place, target = (np.ascontiguousarray([z.real, z.imag]) for z in (curve, self.normal.outline))
         return float(symmetric_difference(place, target, np.empty_like(place)))
 
     def unknowns(self, x: FloatArray) -> FloatArray:
-        """All of `constraints.UNKNOWNS`, from those that are free."""
+        """Complete the free unknowns to all of `constraints.UNKNOWNS`."""
         q = self.limits.low.copy()
         q[self.limits.high > self.limits.low] = x
         return q
 
     def charged_area(self, box: BlackBox, x: FloatArray) -> float:
-        """The area and, in proportion, every violated constraint: the task's own measure as a score."""
+        """Return the area plus proportional penalties for violated constraints."""
         if (x < box.low).any() or (x > box.high).any():
             return inf
         curve = Linkage.from_vector(self.unknowns(x)[:10], box.branch).path(turn(AREA_N)) @ np.array([1.0, 1j])
         return self.area(curve) + self.charge(box, x) if np.isfinite(curve).all() else inf
 
     def charge(self, box: BlackBox, x: FloatArray) -> float:
-        """Of every violated constraint, in proportion, beside an area."""
+        """Return the proportional penalties for violated constraints that are added to an area."""
         return PENALTY * float(np.maximum(self.plain[box.branch].violations(x[None, :]), 0.0).sum())
 
     def error(self, box: BlackBox, x: FloatArray) -> float:
-        """Error by the task's own measure, in the unit of print; infinite where a constraint is violated."""
+        """Return the error by the task's own measure, in the reported unit; infinite if a constraint is violated."""
         plain = self.plain[box.branch]
         answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
         linkage = make_linkage(answer.start, self.normal)
@@ -129,7 +129,7 @@ class Contest:
 
 
 def packs(linkage: Linkage) -> bool:
-    """Whether somewhere within the crank rotation asked the coupler point has the travel and flatness asked, to a degree."""
+    """Return whether the coupler point has the required travel and flatness within the required crank rotation, to a degree."""
     x, y = linkage.path(turn(360)).T
     window = (np.arange(360)[:, None] + np.arange(round(degrees(PACKAGING_ROTATION)) + 1)) % 360
     across, travel = y[window], np.abs(x[window] - x[:, None])
@@ -138,7 +138,7 @@ def packs(linkage: Linkage) -> bool:
 
 
 class Trace:
-    """The best so far over the time of a search, its clock stopped while that is measured.
+    """Best error of a search over its time; the clock is stopped while a linkage is measured.
 
     Parameters
     ----------
@@ -146,9 +146,9 @@ class Trace:
     budget : float
         Time after which the search ends (s).
     enough : float
-        Error at which it ends, in the unit of print.
+        Error at which it ends, in the reported unit.
     clock : callable
-        Of the time (s): of the wall, or of the processor.
+        Returns the time (s), of the wall or of the processor.
     """
 
     def __init__(
@@ -160,16 +160,16 @@ class Trace:
 
     @property
     def best(self) -> float:
-        """Least error so far, in the unit of print."""
+        """Least error so far, in the reported unit."""
         return self.points[-1][1] if self.points else inf
 
     def tick(self) -> float:
-        """Time that the search has taken (s).
+        """Return the time that the search has taken (s).
 
         Raises
         ------
         TimeUp
-            If that is all it has.
+            If its time is over.
         """
         seconds = self.clock() - self._begun - self._measuring
         if seconds > self.budget:
@@ -177,7 +177,7 @@ class Trace:
         return seconds
 
     def offer(self, box: BlackBox, x: FloatArray) -> None:
-        """Measure a linkage, and take it down if it is the best.
+        """Measure a linkage, and record it if it is the best.
 
         Raises
         ------
@@ -193,7 +193,7 @@ class Trace:
             raise TimeUp
 
     def watched(self, box: BlackBox, score: Score) -> Score:
-        """A function to be minimised, each improvement of it by `SLIGHT` offered."""
+        """Wrap a function to be minimised so that each improvement by `SLIGHT` is offered."""
         least = inf
 
         def value(x: FloatArray) -> float:
@@ -209,26 +209,26 @@ class Trace:
         return value
 
     def at(self, seconds: float) -> float:
-        """Least error when so much time had passed, in the unit of print; infinite if there was none."""
+        """Return the least error after some time (s), in the reported unit; infinite if there was none."""
         return min((value for passed, value in self.points if passed <= seconds), default=inf)
 
     def time_to(self, error: float) -> float:
-        """When an error was reached (s); infinite if it was not."""
+        """Return the time at which an error was reached (s); infinite if it was not."""
         return next((seconds for seconds, value in self.points if value <= error), inf)
 
 
-# The other searches: one run each, from a box, with random numbers; `TimeUp` ends them
+# The other searches: each function makes one run with random numbers; `TimeUp` ends it
 
 
 def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """SciPy's differential evolution over whole generations, as `synthesize` does by the method of that name."""
+    """Run SciPy's differential evolution over whole generations."""
     found = evolve(box, random, lambda intermediate_result: trace.offer(box, intermediate_result.x))
     if trace.contest.on_area:
         descend_from(box, found.x, trace.watched(box, partial(trace.contest.charged_area, box)))
 
 
 def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Hansen's evolution strategy by its own package; in turn of the assemblies, then with twice as many members."""
+    """Run Hansen's evolution strategy by its own package, for each assembly, then with twice as many members."""
     import cma
 
     contest = trace.contest
@@ -260,7 +260,7 @@ def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
 
 
 def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """The thesis's simplex, from the best of some random linkages."""
+    """Run the thesis's simplex from the best of some random linkages."""
     descend(box, random, trace.watched(box, box.charge))
 
 
@@ -268,18 +268,18 @@ def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None
 
 
 class PlacedFourBar:
-    """pylinkage's four-bar whose dimensions are all unknowns of a problem: place, phase and direction as well.
+    """pylinkage's four-bar with all unknowns of a problem as dimensions, including place, phase and direction.
 
-    pylinkage's optimisers take any container that has its linkage's methods; they count and set what it gives as constraints.
+    pylinkage's optimisers take any object with its linkage's methods, and set the values that it returns as constraints.
 
     Parameters
     ----------
     fixed : ndarray, shape (11,)
-        Of `constraints.UNKNOWNS`; those that are free are set by `set_constraints`.
+        Values of `constraints.UNKNOWNS`; `set_constraints` sets the free ones.
     free : ndarray of int
-        Their places.
+        Indices of the free unknowns.
     branch : int
-        Assembly: pylinkage goes on from where C is put.
+        Assembly; pylinkage continues from the place of C.
     n : int
         Steps in a turn.
     """
@@ -299,16 +299,16 @@ class PlacedFourBar:
 
     @classmethod
     def of(cls, linkage: Linkage, n: int) -> PlacedFourBar:
-        """A given linkage."""
+        """Return the four-bar of a given linkage."""
         return cls(np.append(linkage.vector, 0.0), np.arange(10), linkage.branch, n)
 
     def get_constraints(self) -> list[float]:
-        """The free unknowns."""
+        """Return the free unknowns."""
         values: list[float] = self.q[self.free].tolist()
         return values
 
     def get_coords(self) -> list[tuple[float | None, float | None]]:
-        """Places of A, D, B, C, P."""
+        """Return the places of A, D, B, C, P."""
         coords: list[tuple[float | None, float | None]] = self.linkage.get_coords()
         return coords
 
@@ -320,36 +320,36 @@ class PlacedFourBar:
         a = complex(x, y)
         d = a + l1 * np.exp(1j * a1)
         b = a + l2 * np.exp(1j * (a1 + th20 - tau / self.n))
-        # C on its side of BD; where the links cannot be joined, pylinkage finds out
+        # C on its side of BD; pylinkage finds out whether the links can be joined
         bd = abs(d - b)
         along = 0.5 * (bd * bd + l3 * l3 - l4 * l4) / bd
         c = b + (along + 1j * self.branch * max(l3 * l3 - along * along, 0.0) ** 0.5) * (d - b) / bd
         self.linkage.set_coords([(z.real, z.imag) for z in (a, d, b, c, b)])
 
     def track(self) -> ComplexArray:
-        """Joints A, D, B, C, P over the turn, shape (n, 5), by pylinkage's compiled solver; NaN where it cannot join them."""
+        """Return A, D, B, C, P over the turn by pylinkage's compiled solver, shape (n, 5); NaN where it cannot join them."""
         track: ComplexArray = self.linkage.step_fast(self.n) @ np.array([1.0, 1j])
         return track
 
 
 class PylinkageScore:
-    """A problem's quality function and charges on pylinkage's own curve, in the form in which its optimisers take them."""
+    """A problem's quality function and penalties on pylinkage's own curve, in the form that its optimisers take."""
 
     def __init__(self, contest: Contest, box: BlackBox) -> None:
         self.contest, self.normal, self.box = contest, contest.normal, box
         low, high = contest.limits.low, contest.limits.high
-        # in longer steps pylinkage goes over to the other assembly: it takes the nearer place of C
+        # with longer steps pylinkage changes to the other assembly, as it takes the nearer place of C
         steps = AREA_N
         if self.normal.rotation is not None:
             own = round(tau / float(np.abs(np.diff(self.normal.rotation)).min()))
             steps = own * -(-N // own)
             self.at = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
         self.four_bar = PlacedFourBar(0.5 * (low + high), np.nonzero(high > low)[0], box.branch, steps)
-        # what is asked of the straight part is taken from pylinkage's curve
+        # the straight part is judged on pylinkage's curve
         self.plain = contest.plain[box.branch]
 
     def __call__(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
-        """Score to be minimised."""
+        """Return the score to be minimised."""
         x = np.asarray(values, dtype=float)
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
@@ -363,7 +363,7 @@ class PylinkageScore:
         return quality + PENALTY * float(self.normal.weights.sum()) * excess
 
     def charged_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
-        """`Contest.charged_area` on pylinkage's own curve."""
+        """Return `Contest.charged_area` on pylinkage's own curve."""
         x = np.asarray(values, dtype=float)
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
@@ -372,7 +372,7 @@ class PylinkageScore:
         return self.contest.area(curve) + self.contest.charge(self.box, x) if np.isfinite(curve).all() else inf
 
     def measured(self, track: ComplexArray, mounting: float) -> tuple[float, float]:
-        """Weighted squared errors, and by how much the straight part misses what is asked of it."""
+        """Return the weighted squared errors, and the violation of the straight part's requirements."""
         normal = self.normal
         if normal.angle is not None:
             left = np.angle((track[:, 3] - track[:, 1]) * np.exp(1j * (mounting - normal.angle)))
@@ -383,7 +383,7 @@ class PylinkageScore:
         return min(self._paired(track[:, 4], way) for way in (1, -1))
 
     def _paired(self, curve: ComplexArray, way: int) -> tuple[float, float]:
-        """The same at equal shares of the lengths of curve and target, as `BlackBox` compares closed paths."""
+        """Return the same at equal shares of the lengths of curve and target, as `BlackBox` compares closed paths."""
         normal = self.normal
         points = normal.points
         assert points is not None
@@ -478,7 +478,7 @@ SEARCHES: dict[str, BlackBoxSearch] = {
 def searched(
     search: BlackBoxSearch, contest: Contest, budget: float, enough: float, clock: Callable[[], float] = perf_counter
 ) -> Trace:
-    """Runs of a search, in turn of either assembly, until its time is over or it has found enough."""
+    """Repeat a search, alternating the assemblies, until its time is over or its goal is reached."""
     trace = Trace(contest, budget, enough, clock)
     with suppress(TimeUp):
         for number in count():

@@ -1,11 +1,11 @@
-"""Targets that cross themselves: `synthesize` as it comes, beside a long differential evolution on the area itself.
+"""Targets that cross themselves: `synthesize` with its defaults, beside a long differential evolution on the area.
 
     python -m benchmarks.crossing                           # runs all, writes the results, prints the table
     python -m benchmarks.crossing --budget 60 --target eight
 
 Each target is asked for with a transmission angle of 40 degrees over a full turn, and with a full turn alone. SciPy's
 differential evolution has the same unknowns, bounds and constraints, the measure compiled and a generation at a time; it is
-begun afresh, in turn of either assembly, until its time of the processor is over, and each run ends by a simplex. Both are
+restarted, alternating the assemblies, until its processor time is over, and each run ends with a simplex. Both are
 measured alike, by `analysis.synthesis.evaluate`. The results are a row for each target and constraint.
 """
 
@@ -27,8 +27,9 @@ from rich.console import Console
 from scipy.optimize import OptimizeResult
 from threadpoolctl import threadpool_limits
 
+from analysis.numerics.overlap import nearest, symmetric_difference
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
-from analysis.synthesis.linkage.kernels import coupler_path, nearest, symmetric_difference
+from analysis.synthesis.linkage.kernels import coupler_path
 from analysis.synthesis.search.refine import divided
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.constraint import USUAL, Constraint
@@ -41,28 +42,28 @@ FloatArray = NDArray[np.float64]
 
 RESULTS = Path("out/crossing.csv")
 BUDGET = 10.0
-#: Points of the curves that evolution compares, generations of one run, and by how much a constraint may be violated.
+#: Points of the curves that evolution compares, generations of one run, and allowed violation of a constraint.
 CURVE, GENERATIONS, KEPT = 120, 800, 1e-4
 ASKED: Mapping[str, tuple[Constraint, ...]] = {"40 degrees": USUAL, "full turn": (FullTurn(),)}
 
 
 def eight(t: FloatArray) -> FloatArray:
-    """Of Gerono, twice as long as wide."""
+    """Return points of Gerono's eight, twice as long as wide."""
     return np.column_stack([0.5 * np.sin(t), 0.25 * np.sin(2.0 * t)])
 
 
 def lemniscate(t: FloatArray) -> FloatArray:
-    """Of Bernoulli."""
+    """Return points of Bernoulli's lemniscate."""
     return np.column_stack([np.cos(t), np.sin(t) * np.cos(t)]) / (1.0 + np.sin(t)[:, None] ** 2)
 
 
 def limacon(t: FloatArray) -> FloatArray:
-    """With a loop inside the other."""
+    """Return points of a limaçon with an inner loop."""
     return (0.5 + np.cos(t))[:, None] * np.column_stack([np.cos(t), np.sin(t)])
 
 
 def targets() -> dict[str, TargetPath]:
-    """The targets by their name; the open ones but for the last come to their first point again."""
+    """Return the targets by name; all open ones except the last return to their first point."""
     round_, there = turn(40), np.linspace(0.0, tau, 41)
     s = np.linspace(-1.3, 1.3, 41)
     return {
@@ -93,7 +94,7 @@ _path, _nearest, _difference = (njit()(kernel.py_func) for kernel in _KERNELS)
 
 @njit
 def _areas(rows, spans, branch, target, middles, lengths, closed, areas):
-    """Areas between the curves of linkages and a target, by its points or its pieces; infinite where links cannot be joined."""
+    """Compute the areas between curves of linkages and a target; infinite if the links cannot be joined."""
     n, m = CURVE, middles.shape[1]
     zero, out, gradient, half = np.zeros(n), np.empty((2, n)), np.empty((2, n)), np.empty((2, n - 1))
     distance, segment, share = np.empty(max(n, m)), np.empty(max(n, m), np.int64), np.empty(max(n, m))
@@ -127,7 +128,7 @@ class Evolution:
         self._lengths = np.hypot(*np.diff(line, axis=1))
 
     def areas(self, x: FloatArray) -> FloatArray:
-        """Of rows of unknowns, in units squared."""
+        """Compute the areas for rows of unknowns, in units squared."""
         q, areas = np.ascontiguousarray(self.box._linkages(x)[:, :10]), np.empty(len(x))
         spans = np.full(len(x), tau) if self.normal.closed else np.ascontiguousarray(x[:, -1])
         branch = float(self.box.branch)
@@ -135,13 +136,13 @@ class Evolution:
         return areas
 
     def charge(self, x: FloatArray) -> float:
-        """The area of one linkage and, in proportion, every violated constraint."""
+        """Return the area of one linkage plus proportional penalties for violated constraints."""
         if (x < self.box.low).any() or (x > self.box.high).any():
             return inf
         return float(self.areas(x[None, :])[0]) + PENALTY * float(self.box.violations(x[None, :]).clip(min=0.0).sum())
 
     def error(self, x: FloatArray) -> float:
-        """By the task's own measure (m2); infinite where a constraint is violated."""
+        """Return the error by the task's own measure (m2); infinite if a constraint is violated."""
         if self.box.violations(x[None, :]).max() > KEPT:
             return inf
         start = self.box.answer(OptimizeResult(x=x, success=True, message="", nit=0)).start
@@ -149,7 +150,7 @@ class Evolution:
         return evaluate(self.task, make_linkage(start, self.normal), np.linspace(0.0, span, self.normal.n)).error
 
     def run(self, random: np.random.Generator, over: Callable[[], bool]) -> float:
-        """One run, stopped where its time is over, and a simplex from where it ended."""
+        """Make one run, stopped when its time is over, and continue with a simplex."""
         found = evolve(
             self.box,
             random,
@@ -162,7 +163,7 @@ class Evolution:
 
 
 def by_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:
-    """The least error of all runs within the time (m2)."""
+    """Return the least error of all runs within the time (m2)."""
     normal = normal_form(task)
     limits = make_limits(task, normal, None, constraints)
     searches = [Evolution(task, normal, BlackBox(normal, limits, branch)) for branch in limits.branches]
@@ -180,7 +181,7 @@ def by_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: f
 
 
 def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
-    """Both searches on a target."""
+    """Run both searches on a target."""
     task, constraints = UntimedPath(path=path), ASKED[asked]
     with threadpool_limits(1):
         begun = process_time()
@@ -193,7 +194,7 @@ def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
 
 
 def read(path: Path) -> list[Row]:
-    """The rows of a file."""
+    """Read the rows of a file."""
     with path.open(newline="", encoding="utf-8") as file:
         _, *rows = csv.reader(file)
     return [Row(row[0], row[1], *map(float, row[2:])) for row in rows]
@@ -209,7 +210,7 @@ def write(path: Path, rows: Iterable[Row]) -> None:
 
 
 def markdown(rows: Iterable[Row]) -> str:
-    """The table of a page."""
+    """Write the table of a page."""
     lines = [
         f"| {row.target} | {row.asked} | {row.ours:.4g} | {row.evolution:.4g} | {row.ours / row.evolution - 1.0:+.1%} |"
         for row in rows

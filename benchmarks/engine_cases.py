@@ -79,7 +79,7 @@ CASES: tuple[Case, ...] = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineRun:
-    """What a run took and how good it was.
+    """Time and accuracy of a run.
 
     ``seconds`` is the wall time of the integration alone, ``error`` the largest error of u on the sample grid relative to
     the largest magnitude of u (infinite where the engine failed), ``steps`` the number of time steps.
@@ -93,16 +93,16 @@ class EngineRun:
 
 @cache
 def reference(case: Case) -> np.ndarray:
-    """Slider position (m) at `Case.times`: the reduced equations by DOP853 at rtol 1e-13."""
+    """Compute the slider position (m) at `Case.times`, from the reduced equations by DOP853 at rtol 1e-13."""
     result = by_scipy(case, "DOP853", 1e-13, 1e-15)
     result.setflags(write=False)
     return result
 
 
 def by_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> np.ndarray:
-    """Slider position (m) by `solve_ivp` on the reduced equations in plain Python, the torque switched at an event.
+    """Compute the slider position (m) by `solve_ivp` on the reduced equations in plain Python; NaN if the method fails.
 
-    The four mechanical states alone; NaN where the method fails.
+    It integrates the four mechanical states only, and switches the torque at an event.
     """
     p = case.parameters.constants()
     speed_drive = 0.0 if case.crank_speed is None else 1.0
@@ -139,7 +139,7 @@ def by_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> 
 
 
 def relative_error(case: Case, u: np.ndarray) -> float:
-    """Largest |u - u_ref| on the sample grid over the largest |u_ref|; infinite where u is not finite."""
+    """Return the largest |u - u_ref| on the sample grid over the largest |u_ref|; infinite if u is not finite."""
     expected = reference(case)
     error = float(np.max(np.abs(u - expected)) / np.max(np.abs(expected)))
     return error if isfinite(error) else inf
@@ -155,12 +155,12 @@ class Start(NamedTuple):
 
 
 def start(case: Case, p: Constants) -> Start:
-    """How the case starts."""
+    """Return the start of a case."""
     g = position(0.0, 0.0, p)
     k = coefficients(g, p)
     return Start(coupler_angle(g), rocker_angle(g), k.k32 * case.start_speed, k.k42 * case.start_speed)
 
 
 def centre(distance: float, angle: float) -> tuple[float, float]:
-    """Centre of mass in the frame of its link (m)."""
+    """Return the centre of mass in the frame of its link (m)."""
     return distance * cos(angle), distance * sin(angle)

@@ -83,7 +83,7 @@ _NEGLIGIBLE = 1e-12
 
 
 def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tuple[Any, Any]:
-    """Model and data at the start of the run."""
+    """Build the model, and its data at the start of the run."""
     import mujoco
 
     q = case.parameters
@@ -112,8 +112,7 @@ def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tup
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.iterations = iterations
     # The constraint is softened in proportion to the bodies' inverse weight by (1 - d)/d, where the impedance d ends at
-    # 0.9999: an error of 3e-5 in u. A smaller weight stiffens it. What one Newton iteration loses to rounding then, a second
-    # one wins back.
+    # 0.9999: an error of 3e-5 in u. A smaller weight stiffens it; a second Newton iteration removes the rounding error of that.
     if stiffened:
         model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-6
     data = mujoco.MjData(model)
@@ -189,7 +188,7 @@ def run_mujoco(case: Case, time_step: float, *, iterations: int = 1, stiffened: 
 
 
 def _import_exudyn() -> tuple[Any, Any]:
-    """Exudyn's fast build, without range checks, and its item classes; it announces itself on import."""
+    """Import Exudyn's fast build, without range checks, and its item classes, silently."""
     if "exudyn" not in sys.modules:
         sys.exudynFast = True  # type: ignore[attr-defined]
     with contextlib.redirect_stdout(io.StringIO()):
@@ -211,7 +210,7 @@ _EXUDYN_CRANK, _EXUDYN_SLIDER = 0, 1
 
 
 class _Assembly:
-    """A system of Exudyn's in the plane, and what it is put together from."""
+    """A planar system of Exudyn, and its parts."""
 
     def __init__(self, gx: float, gy: float) -> None:
         self.exu, self.items = _import_exudyn()
@@ -228,7 +227,7 @@ class _Assembly:
     def bar(
         self, x: float, angle: float, speed: float, w: float, m: float, inertia: float, g: tuple[float, float]
     ) -> _Bar:
-        """Link whose frame is at ``x``, with ``speed`` along y, at ``angle``; ``g`` is its centre of mass."""
+        """Add a link whose frame is at ``x`` and ``angle``, with ``speed`` along y; ``g`` is its centre of mass."""
         rx, ry = cos(angle) * g[0] - sin(angle) * g[1], sin(angle) * g[0] + cos(angle) * g[1]
         node = self.mbs.AddNode(
             self.items.NodeRigidBody2D(
@@ -245,7 +244,7 @@ class _Assembly:
         self.mbs.AddObject(self.items.ObjectJointRevolute2D(markerNumbers=[a, b]))
 
     def spring(self, node: Any, **constants: float) -> Any:
-        """A spring and damper between a node's coordinate and the ground."""
+        """Add a spring and damper between a node's coordinate and the ground."""
         return self.mbs.AddObject(
             self.items.ObjectConnectorCoordinateSpringDamper(
                 markerNumbers=[self.ground, self.coordinate(node)], **constants
@@ -253,7 +252,7 @@ class _Assembly:
         )
 
     def crank(self, case: Case, p: Constants) -> tuple[Any, Any]:
-        """Node and body of the crank."""
+        """Add the crank; return its node and body."""
         q = case.parameters
         node = self.mbs.AddNode(self.items.Node1D(initialVelocities=[case.start_speed]))
         body = self.mbs.AddObject(self.items.ObjectRotationalMass1D(inertia=q.crank_inertia, nodeNumber=node))
@@ -264,7 +263,7 @@ class _Assembly:
         return node, body
 
     def slider(self, p: Constants) -> tuple[Any, Any]:
-        """Node and body of the slider, with its spring and damper."""
+        """Add the slider with its spring and damper; return its node and body."""
         node = self.mbs.AddNode(self.items.Node1D())
         body = self.mbs.AddObject(
             self.items.ObjectMass1D(
@@ -294,7 +293,7 @@ class _Assembly:
 
 
 def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
-    """System at the start of the run, the sensor of the slider position, and the spring of the torque drive or None.
+    """Build the system at the start of the run; return it, the sensor of the slider position, and the torque drive's spring.
 
     Crank and slider have one coordinate each, a rotation and a translation, coupler and rocker three: eight coordinates and
     six pin conditions. Four planar bodies with a prismatic joint (twelve coordinates, ten conditions) give the same numbers
@@ -362,7 +361,7 @@ class _ExudynSolver:
             raise ArithmeticError(f"Exudyn stopped between t = {start:g} s and {end:g} s")
 
     def state(self, which: str = "Current") -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates and velocities, now or, ``Initial``, from which the next leg starts."""
+        """Return the current coordinates and velocities, or with ``Initial`` those from which the next leg starts."""
         data, configuration = self.mbs.systemData, getattr(self.exu.ConfigurationType, which)
         return data.GetODE2Coordinates(configuration), data.GetODE2Coordinates_t(configuration)
 
@@ -374,7 +373,7 @@ class _ExudynSolver:
 
 
 def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_step: float) -> list[float]:
-    """Slider positions up to the first sample after the switch of the torque, located by Newton's method on a leg's end."""
+    """Return the slider positions up to the first sample after the torque's switch, which Newton's method locates."""
     interval = case.duration / case.samples
     n = steps_in(interval, time_step)
     u: list[float] = [0.0]
@@ -434,7 +433,7 @@ def run_exudyn(case: Case, time_step: float, *, newton_tolerance: float = 1e-6) 
 
 
 def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25) -> Iterator[float]:
-    """Geometric series of time steps (s) from ``first`` to ``last``, each shortened to divide a sample interval."""
+    """Yield a geometric series of time steps (s) from ``first`` to ``last``, each shortened to divide a sample interval."""
     interval = case.duration / case.samples
     count = ceil(log(last / first) / log(ratio) * (1.0 - 1e-9))
     fitted = (steps_in(interval, first * ratio**i) for i in range(count + 1))
@@ -442,12 +441,12 @@ def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25)
 
 
 def fastest(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
-    """The shortest of several equal runs: the one that the machine disturbed least."""
+    """Return the shortest of several equal runs, which the machine disturbed least."""
     return min((run(case, time_step) for _ in range(repeats)), key=lambda result: result.seconds)
 
 
 class Engine(NamedTuple):
-    """An engine as benchmarked: its run, its first and last step (s), and a run set for the least error, with its last step."""
+    """An engine: its run, the first and last step (s), and a run with the least error and its step (s)."""
 
     run: Run
     first_step: float

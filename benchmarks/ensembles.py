@@ -3,9 +3,8 @@
     python -m benchmarks.ensembles --runs 3000
     python -m benchmarks.ensembles --runs 100000 --disk
 
-Runs of 0.1 s of the five-bar slider of Table 3.1 with varying springs: at commanded speeds, and under torques. Times a run and
-the ratio to `simulate` are of the processor, so that they hold on a machine that is busy; so does what two threads need of it
-more than one. That of two threads by the clock needs two free cores.
+Runs of 0.1 s of the five-bar slider of Table 3.1 with varying springs, at commanded speeds and under torques. Times and ratios
+are of the processor, so that they hold on a busy machine; the speed-up of two threads by the clock needs two free cores.
 """
 
 from __future__ import annotations
@@ -15,40 +14,31 @@ import resource
 from collections.abc import Callable
 from dataclasses import replace
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import process_time
 
 from rich.console import Console
 from rich.table import Table
 
 from analysis import Inputs, simulate, simulate_many
 from analysis.run import compiled
+from benchmarks.accuracy import best_time
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import TABLE_3_1
 
 REPEATS = 7
-#: Runs that are solved one by one.
+#: Number of runs solved one by one.
 FEW = 300
 OPTIONS = {"stop_time": 0.1, "step": 1e-3}
 
 
-def best(run: Callable[[], object], timer: Callable[[], float], repeats: int = REPEATS) -> float:
-    """Shortest of several runs (s)."""
-    times = []
-    for _ in range(repeats):
-        begun = timer()
-        run()
-        times.append(timer() - begun)
-    return min(times)
-
-
 def best_of_each(runs: list[Callable[[], object]]) -> list[float]:
-    """Shortest time by the clock of each of several (s), taken in turn: others may use the machine."""
-    times = [[best(run, perf_counter, 1) for run in runs] for _ in range(REPEATS)]
+    """Return the shortest time by the clock of each run (s), taken in turn, as other programs may use the machine."""
+    times = [[best_time(run, 1) for run in runs] for _ in range(REPEATS)]
     return [min(column) for column in zip(*times)]
 
 
 def times_of(run: Callable[[], object]) -> tuple[float, float]:
-    """CPU time of the shortest of several runs, and how much of it is inside the compiled solver (s)."""
+    """Return the CPU time of the shortest of several runs, and the part inside the compiled solver (s)."""
     kernel, spent = compiled.run, []
 
     def timed(*arguments: object) -> None:
@@ -61,7 +51,7 @@ def times_of(run: Callable[[], object]) -> tuple[float, float]:
     try:
         for _ in range(REPEATS):
             spent.clear()
-            whole = best(run, process_time, 1)
+            whole = best_time(run, 1, process_time)
             times.append((whole, sum(spent)))
     finally:
         compiled.run = kernel
@@ -69,7 +59,7 @@ def times_of(run: Callable[[], object]) -> tuple[float, float]:
 
 
 def report_memory(springs: list[FiveBarParameters]) -> None:
-    """Print the peak of memory of an ensemble with a folder, and of this process before it."""
+    """Print the peak memory of an ensemble that is kept in a folder, and of this process before it."""
 
     def peak() -> float:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
@@ -108,9 +98,9 @@ def main() -> None:
         def one_by_one(inputs: list[Inputs] = inputs) -> object:
             return [simulate(springs[i], inputs[i], **OPTIONS) for i in some]
 
-        alone = best(one_by_one, process_time) / len(some)
+        alone = best_time(one_by_one, REPEATS, process_time) / len(some)
         cpu, inside = times_of(together)
-        of_two = best(lambda: together(2), process_time)
+        of_two = best_time(lambda: together(2), REPEATS, process_time)
         clock = best_of_each([lambda jobs=jobs: together(jobs) for jobs in (1, 2)])
         table.add_row(
             name,

@@ -1,8 +1,8 @@
-"""What one waits for: imports, the first numbers on an empty cache of compiled code, and the same again.
+"""Waiting times: imports, first results on an empty cache of compiled code, and the same again.
 
     python -m benchmarks.first
 
-Each is a process of its own; times by the clock, and of the processor, which others on the machine change less.
+Each is a process of its own; times are by the clock, and of the processor, which other programs change less.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WAITS = {
 
 
 def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
-    """Seconds by the clock and of the processor, and how many compilations were announced."""
+    """Measure seconds by the clock and of the processor, and count the announced compilations."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     environment = os.environ | {"LINKWORK_CACHE_DIR": folder}
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Cost of a communication step: of every kind of FMU, from a host in C and through FMPy, beside what is bare.
+"""Cost of a communication step of every kind of FMU, from a host in C and through FMPy, beside the bare equations.
 
     python -m benchmarks.fmu
 
@@ -64,12 +64,12 @@ class Trivial(Fmi2Slave):
 
 
 def best(measure: Callable[[], float]) -> float:
-    """Least of several measurements."""
+    """Return the least of several measurements."""
     return min(measure() for _ in range(REPEATS))
 
 
 def by_fmpy(fmu: Path) -> float:
-    """Time of a step through FMPy, inputs set and outputs read (s)."""
+    """Measure a step through FMPy, with inputs set and outputs read (s)."""
     description = read_model_description(str(fmu))
     fmi3 = description.fmiVersion == "3.0"
     reals = [v for v in description.modelVariables if v.type in ("Real", "Float64")]
@@ -96,14 +96,14 @@ def by_fmpy(fmu: Path) -> float:
     took = (time.perf_counter() - begun) / STEPS
     slave.terminate()
     if hasattr(slave.dll, "finalizePythonInterpreter"):
-        # else PythonFMU's library uses, when it is unloaded, what it has freed; our slaves see to it themselves
+        # otherwise PythonFMU's library uses freed memory when it is unloaded; our slaves prevent that themselves
         slave.dll.finalizePythonInterpreter()
     slave.freeInstance()
     return took
 
 
 def by_host(host: Path, fmu: Path, folder: Path) -> float:
-    """Best time of a step from the host in C, inputs set and outputs read (s)."""
+    """Measure a step from the host in C, with inputs set and outputs read (s)."""
     unpacked = unpack(fmu, folder / fmu.stem)
     inputs = {s.name: float(s.attributes["start"]) for s in unpacked.reals("input")}
     native = (unpacked.folder / "sources").is_dir()
@@ -119,7 +119,7 @@ def by_host(host: Path, fmu: Path, folder: Path) -> float:
 
 
 def right_hand_sides(folder: Path) -> tuple[float, float]:
-    """How many right-hand sides a step makes, and the best time of a bare one (s)."""
+    """Count the right-hand sides of a step, and measure a bare one (s)."""
     files = source_files(MECHANISM, NATIVE)
     driver = Path(__file__).with_name("right_hand_sides.c")
     for name, text in files.items():
@@ -136,7 +136,7 @@ def right_hand_sides(folder: Path) -> tuple[float, float]:
 
 
 def plain_step() -> float:
-    """Time of a step and its outputs of the plant in plain Python (s)."""
+    """Measure a step of the plant in plain Python, with its outputs (s)."""
     entry = MECHANISM.published["table-3.1"]
     plant = Plant(MECHANISM, entry.parameters, entry.initial, inputs={"drive.speed": entry.crank_speed}, drive_mode=1)
     begun = time.perf_counter()
@@ -147,7 +147,7 @@ def plain_step() -> float:
 
 
 def compiled_step() -> float:
-    """Time of a step in process, inputs held as the FMU's (s)."""
+    """Measure a step in process, with inputs held as in the FMU (s)."""
     entry = MECHANISM.published["table-3.1"]
     begun = time.perf_counter()
     run = simulate(entry.parameters, Inputs(speed=entry.crank_speed), stop_time=STEPS * STEP, step=STEP, hold=STEP)

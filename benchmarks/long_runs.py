@@ -1,4 +1,4 @@
-"""What holds in long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns. The tables of docs/solvers.md.
+"""Accuracy of long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns. The tables of docs/solvers.md.
 
     python -m benchmarks.long_runs turns --turns 1e5
     python -m benchmarks.long_runs turns --turns 1e6 --tolerances 1e-9
@@ -7,7 +7,7 @@
     python -m benchmarks.long_runs fmu
     python -m benchmarks.long_runs built
 
-Both mechanisms without damping, drive and load, set going: what they have of energy they keep. Residuals are relative to the
+Both mechanisms run freely, without damping, drive and load, so that their energy is constant. Residuals are relative to the
 kinetic energy at the start.
 """
 
@@ -36,7 +36,7 @@ from linkwork.five_bar.published import TABLE_3_1
 from linkwork.plant import Plant
 from linkwork.slider_crank.published import OFFSET_CASE
 
-#: By name: parameters, start, crank speed there (rad/s).
+#: Parameters, start, and crank speed there (rad/s), by name.
 FREE: Mapping[str, tuple[Any, Any, float]] = {
     "five-bar": (replace(TABLE_3_1, slider_damping=0.0), InitialState(crank_speed=44.0), 44.0),
     "slider-crank": (*OFFSET_CASE, OFFSET_CASE[1].crank_speed),
@@ -47,7 +47,7 @@ TOLERANCES = (1e-9, 1e-12)
 #: Frequency (rad/s) and amplitude (N) of a force.
 _WAVE = (30.0, 5.0)
 
-#: What acts on the five-bar from a time on.
+#: Inputs of the five-bar from a time on.
 ACTING: Mapping[str, Callable[[float], Inputs]] = {
     "constant speed": lambda t0: Inputs(speed=44.0),
     "ramp of the speed": lambda t0: Inputs(speed=ramp(0.0, 44.0, t0, t0 + 0.25)),
@@ -61,7 +61,7 @@ ACTING: Mapping[str, Callable[[float], Inputs]] = {
 
 
 def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any) -> tuple[float, float]:
-    """A run of so many turns at the speed of the start, from an angle of ``begun`` turns on.
+    """Run a number of turns at the speed of the start, from an angle of ``begun`` turns on.
 
     Returns
     -------
@@ -79,8 +79,13 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
 
 
 def shifted(what: str, late: float = LATE, **options: Any) -> tuple[float, float]:
-    """A run of half a second that begins at ``late`` beside the one at zero: largest difference of the slider's position
-    relative to its largest, and how many times as many steps."""
+    """Compare a run of half a second that begins at ``late`` with one that begins at zero.
+
+    Returns
+    -------
+    difference, steps : float
+        Largest difference of the slider's position relative to its largest, ratio of the numbers of steps.
+    """
     # samples that are exact at both times
     samples = np.arange(513) * 2.0**-10
     runs = [simulate(TABLE_3_1, ACTING[what](t0), samples=t0 + samples, **options) for t0 in (0.0, late)]
@@ -91,7 +96,7 @@ def shifted(what: str, late: float = LATE, **options: Any) -> tuple[float, float
 
 
 def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, tolerance: float = 1e-9) -> tuple[float, float]:
-    """300 steps of 1 ms of the plant that the Python FMU holds: the residual of the energy, and the turned angle (rad)."""
+    """Make 300 steps of 1 ms of the Python FMU's plant; return the residual of the energy and the turned angle (rad)."""
     parameters, start, _ = FREE[mechanism]
     start = replace(start, crank_angle=2.0 * pi * begun)
     plant = Plant(MECHANISMS[mechanism], parameters, start, tolerance=tolerance, time=time)
@@ -105,7 +110,7 @@ def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, toleranc
 def late_fmu(
     file: str | Path, mechanism: str, step: float, interface: str = "co-simulation", late: float = LATE
 ) -> tuple[float, float]:
-    """512 steps of a built FMU from ``late`` on beside those from zero.
+    """Compare 512 steps of a built FMU from ``late`` on with those from zero.
 
     Returns
     -------
@@ -125,7 +130,7 @@ def late_fmu(
 
 
 def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table:
-    """Energy and angle after many turns; the angle beside that of the balanced method at the tightest tolerance."""
+    """Tabulate energy and angle after many turns, the angle relative to the balanced method at the tightest tolerance."""
     out = Table("mechanism", "tolerance", "method", "energy residual", "angle, off (rad)", title=f"{turns:g} turns")
     for mechanism in FREE:
         reference = None
@@ -141,7 +146,7 @@ def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table
 
 
 def times_table() -> Table:
-    """A start at 1e9 s."""
+    """Tabulate runs that start at 1e9 s."""
     out = Table("what acts", "tolerance", "difference", "times the steps", title=f"from {LATE:g} s on, beside from 0")
     for what in ACTING:
         for tolerance in TOLERANCES:
@@ -151,7 +156,7 @@ def times_table() -> Table:
 
 
 def angles_table() -> Table:
-    """Runs of 1000 turns that begin with many turns behind them."""
+    """Tabulate runs of 1000 turns that begin after many turns."""
     out = Table("mechanism", "begun after", "tolerance", "energy residual", title="1000 turns")
     for mechanism in FREE:
         for tolerance in TOLERANCES:
@@ -162,7 +167,7 @@ def angles_table() -> Table:
 
 
 def fmu_table() -> Table:
-    """The same of the FMU's plant."""
+    """Tabulate runs of the FMU's plant that begin late."""
     out = Table(
         "mechanism", "from", "energy residual", "angle, difference (rad)", title="300 steps of 1 ms of the plant"
     )
@@ -176,7 +181,7 @@ def fmu_table() -> Table:
 
 
 def built_table() -> Table:
-    """Every kind of FMU, built and run through FMPy, from 1e9 s on."""
+    """Tabulate runs of every kind of FMU from 1e9 s on, through FMPy."""
     out = Table(
         "FMU", "interface", "step", "angle, difference (rad)", "slider (m)", title=f"512 steps from {LATE:g} s on"
     )

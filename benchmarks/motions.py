@@ -1,11 +1,11 @@
-"""Is a stable motion missed? All that long runs end in, beside what `periodic.find_orbits` finds.
+"""Check whether `periodic.find_orbits` misses a stable motion in which long runs end.
 
     python -m benchmarks.motions --mechanisms 20
     python -m benchmarks.motions --light 77
 
 The first draws five-bars at random about the published rigs, with weak dampers; the second takes rig 1 with spring B and a
-damper of 2 N.s/m at so many speeds from 1120 to 2640 rpm. From 129 starts each the mechanism is run for 600 turns; where it
-repeats itself after one to four turns, Newton's method confirms the motion, and it must be among those of the finder.
+damper of 2 N.s/m at a number of speeds from 1120 to 2640 rpm. The mechanism runs for 600 turns from 129 starts; if it repeats
+itself after one to four turns, Newton's method confirms the motion, which `find_orbits` must have found.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from linkwork.errors import LinkworkError
 from linkwork.five_bar.published import SETS
 
 STARTS, TURNS, MOST = 128, 600, 4
-#: Change of y over a period, relative to its scale, at which a run has come to rest; distance of two starts of one motion.
+#: Relative change of y over a period below which a run is settled; relative distance of two starts of one motion.
 SETTLED, SAME = 1e-4, 1e-3
 RIGS = [known.parameters for known in SETS.values() if known.parameters.slider_stiffness > 0.0]
 
 
 def drawn(random: np.random.Generator):
-    """A five-bar about a published one, with a speed about its natural frequency."""
+    """Draw a five-bar near a published one, and a speed near its natural frequency."""
     rig = RIGS[random.integers(len(RIGS))]
     while True:
         changed = {}
@@ -51,7 +51,7 @@ def drawn(random: np.random.Generator):
 
 
 def ends_of(parameters, drive):
-    """Where runs come to rest: the turns after which they repeat themselves, and y there."""
+    """Yield the turns after which a settled run repeats itself, and y there."""
     point, guess = operating_point(parameters, drive), np.zeros(2)
     scale, turn = point.scale(guess), np.array([0.0, point.flow.period])
     section = point.section(guess, PLAIN, tolerance=1e-8)
@@ -68,7 +68,7 @@ def ends_of(parameters, drive):
 
 
 def compare(parameters, drive) -> tuple[Counter, int]:
-    """Runs by the turns of the motion they end in, and how many of these motions the finder has not."""
+    """Count runs by the turns of their final motion, and the final motions that `find_orbits` has missed."""
     scale, seen, missed = scale_of(parameters, drive, np.zeros(2)), Counter(), 0
     known = {turns: orbits_of(parameters, drive, turns=turns).orbits for turns in range(1, MOST + 1)}
     starts = {turns: np.array([p for o in found for p in o.passages()]) for turns, found in known.items()}

@@ -4,17 +4,15 @@
     python -m benchmarks.race --again Linkwork             # runs a search afresh on all targets
     python -m benchmarks.race --budget 1 --target square --results out/few.csv
 
-pylinkage's differential evolution is SciPy's, which is in the race with all of a generation at a time.
+pylinkage's differential evolution is SciPy's, which takes part with whole generations at a time.
 
-Every search has the same unknowns, bounds, constraints and measure (`benchmarks.contest`), and the same time of the processor
-on one thread: a machine that does other work as well takes longer, and decides nothing. What is compiled once on a machine is
-compiled before. No search knows when to stop: each is begun afresh until its time is over. `synthesize` is called with `FIRST`,
-then with other seeds and twice the candidates and starts each time; the answer of a call counts from its end on, and not at
-all where that comes too late.
+Every search has the same unknowns, bounds, constraints and measure (`benchmarks.contest`), and the same processor time on one
+thread, so that other work on the machine does not matter. Code is compiled before. No search knows when to stop: each is
+restarted until its time is over. `synthesize` is called with `FIRST`, then with other seeds and twice the candidates and starts
+each time; the answer of a call counts from its end on, if that is in time.
 
-The results are a row for each target and search: the least error when `TIMES` have passed, infinite while there is no linkage
-that keeps the constraints. The file is replaced as a whole after every row: a run that is stopped keeps what it had, and goes
-on with what is missing.
+The results are a row for each target and search: the least error after `TIMES`, infinite as long as no linkage satisfies the
+constraints. The file is rewritten after every row: a run that is stopped keeps its rows, and the next one continues.
 """
 
 from __future__ import annotations
@@ -52,19 +50,19 @@ from .targets import TARGETS, Target
 
 OURS = "Linkwork"
 RESULTS = Path("out/race.csv")
-#: When the error is taken down (s), and the time given to each search.
+#: Times at which the error is recorded (s), and the time for each search.
 TIMES = (0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
 BUDGET = 3.0
 #: The first call of `synthesize`, and how often its effort is doubled.
 FIRST, DOUBLED = Search(candidates=1 << 11, starts=1), 5
-#: Share by which errors may differ and still be level; error per target, in sizes, below which one is as good as exact.
+#: Relative difference of errors that count as level; error, in sizes of the target, that counts as exact.
 LEVEL, EXACT = 1e-3, 1e-6
-#: "Found": within so much of the least error that any search had at the end.
+#: Relative distance from the least error of all searches at the end that counts as found.
 FOUND = 0.05
 
 
 class Row(NamedTuple):
-    """What a search had of a target over the time; errors in m2, of a function rad2."""
+    """Errors of a search on a target over the time, in m2, for a function in rad2."""
 
     kind: str
     target: str
@@ -73,7 +71,7 @@ class Row(NamedTuple):
     errors: tuple[float, ...]
 
     def at(self, seconds: float) -> float:
-        """Least error when so much time has passed; what is as good as exact is all the same."""
+        """Return the least error after some time (s), at least the one that counts as exact."""
         return max(self.exact, self.errors[TIMES.index(seconds)])
 
 
@@ -81,7 +79,7 @@ class Row(NamedTuple):
 
 
 def by_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Calls of `synthesize`, each of more effort; what they return is measured as what the others find."""
+    """Call `synthesize` with growing effort, and measure its answers as those of the other searches."""
     contest = trace.contest
     problem, limits = contest.problem, contest.limits
     for k in count():
@@ -106,7 +104,7 @@ RACERS: Mapping[str, BlackBoxSearch] = {
 
 
 def run(target: Target, search: str, budget: float) -> Row:
-    """One search on a target."""
+    """Run one search on a target."""
     contest = Contest.of(target, on_area=True)
     normal = contest.normal
     with threadpool_limits(1):
@@ -117,7 +115,7 @@ def run(target: Target, search: str, budget: float) -> Row:
 
 
 def prepared() -> None:
-    """Compile and load what every search needs, once."""
+    """Compile and load everything that the searches need."""
     for target in {target.kind: target for target in TARGETS}.values():
         for search in RACERS:
             run(target, search, 0.2)
@@ -127,7 +125,7 @@ def prepared() -> None:
 
 
 def read(path: Path) -> list[Row]:
-    """The rows of a file; none where there is no file."""
+    """Read the rows of a file, none if there is no file."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -136,7 +134,7 @@ def read(path: Path) -> list[Row]:
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:
-    """Put a file in the place of the old one."""
+    """Replace a file as a whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f"{path.name}.new")
     with beside.open("w", newline="", encoding="utf-8") as file:
@@ -147,7 +145,7 @@ def write(path: Path, rows: Iterable[Row]) -> None:
 
 
 def ordered(rows: Iterable[Row]) -> list[Row]:
-    """Rows in the order of targets and searches."""
+    """Sort rows by targets and searches."""
     targets = [(target.kind, target.name) for target in TARGETS]
     return sorted(rows, key=lambda row: (targets.index(row[:2]), list(RACERS).index(row.search)))
 
@@ -155,7 +153,7 @@ def ordered(rows: Iterable[Row]) -> list[Row]:
 def completed(
     path: Path, targets: Sequence[Target], searches: Sequence[str], budget: float, say: Callable[..., Any]
 ) -> None:
-    """Run what is missing of a file."""
+    """Run the searches that are missing in a file."""
     rows = {row[:3]: row for row in read(path)}
     wanted = [(target, search) for target in targets for search in searches]
     missing = [(t, s) for t, s in wanted if (t.kind, t.name, s) not in rows]
@@ -172,12 +170,12 @@ def completed(
 
 
 def last(rows: Iterable[Row]) -> float:
-    """The last time at which all rows have an error."""
+    """Return the last time at which all rows have an error (s)."""
     return max(seconds for k, seconds in enumerate(TIMES) if not any(np.isnan(row.errors[k]) for row in rows))
 
 
 def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
-    """Rows of each target, by search, where all searches have run."""
+    """Return the rows of each target by search, for targets on which all searches have run."""
     found: dict[tuple[str, str], dict[str, Row]] = {}
     for row in rows:
         found.setdefault(row[:2], {})[row.search] = row
@@ -185,28 +183,28 @@ def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
 
 
 def rival(of: Mapping[str, Row], seconds: float) -> float:
-    """The least error of the other searches."""
+    """Return the least error of the other searches."""
     return min(row.at(seconds) for search, row in of.items() if search != OURS)
 
 
 def ahead(of: Mapping[str, Row], seconds: float) -> bool:
-    """Whether we have a linkage, and no other search has less than its error, but for `LEVEL`."""
+    """Return whether no other search has a smaller error than ours, within `LEVEL`."""
     ours = of[OURS].at(seconds)
     return isfinite(ours) and ours <= (1.0 + LEVEL) * rival(of, seconds)
 
 
 def level(of: Mapping[str, Row], seconds: float) -> bool:
-    """Whether we are ahead, and another search is as good but for `LEVEL`."""
+    """Return whether we are ahead, and another search is as good within `LEVEL`."""
     return ahead(of, seconds) and rival(of, seconds) <= (1.0 + LEVEL) * of[OURS].at(seconds)
 
 
 def found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
-    """Whether a search is within `FOUND` of the least error of all at the end."""
+    """Return whether a search is within `FOUND` of the least error of all at the end."""
     return of[search].at(seconds) <= (1.0 + FOUND) * min(row.at(end) for row in of.values())
 
 
 def standings(rows: Sequence[Row]) -> list[list[str]]:
-    """By time: on how many targets Linkwork is ahead, or level with another, and how many each search has found."""
+    """Count, at each time, the targets on which Linkwork is ahead or level, and the targets that each search has found."""
     targets, end = by_target(rows).values(), last(rows)
     return [
         [
@@ -221,7 +219,7 @@ def standings(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def finals(rows: Sequence[Row]) -> list[list[str]]:
-    """By target: the error of each search at the end, the least in bold."""
+    """List the errors of each search at the end by target, the least in bold."""
     end = last(rows)
     lines = []
     for (kind, name), of in by_target(rows).items():
@@ -237,7 +235,7 @@ def finals(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def lost(rows: Sequence[Row]) -> list[str]:
-    """The targets on which another search has less than our error at the end, and by how much ours is above it."""
+    """List the targets on which another search has a smaller error at the end, and the difference."""
     end = last(rows)
     return [
         f"- {kind}, {name}: {of[OURS].at(end) / rival(of, end) - 1.0:.2%} above "
@@ -248,7 +246,7 @@ def lost(rows: Sequence[Row]) -> list[str]:
 
 
 def markdown(rows: Sequence[Row], of: str) -> str:
-    """A part of a page: the tables "standings" and "targets", or the list "lost"."""
+    """Write a part of a page: the table "standings" or "targets", or the list "lost"."""
     if of == "lost":
         return "\n".join(lost(rows) or ["None."])
     headings, lines = {
@@ -259,7 +257,7 @@ def markdown(rows: Sequence[Row], of: str) -> str:
 
 
 def picture(rows: Sequence[Row]) -> Any:
-    """Quality over time: how many targets each search has found, and how near it is to the best at the end."""
+    """Plot the number of targets that each search has found over time, and its distance from the best at the end."""
     from analysis.figures import Curve, Panel, plot_curves
 
     targets, end = by_target(rows).values(), last(rows)
@@ -293,7 +291,7 @@ def picture(rows: Sequence[Row]) -> Any:
 
 
 def main(path: Path, targets: Sequence[Target], searches: Sequence[str], budget: float, again: Sequence[str]) -> None:
-    """Run what is missing, and print."""
+    """Run the missing searches, and print the tables."""
     console = Console(width=200)
     write(path, [row for row in read(path) if row.search not in again])
     completed(path, targets, searches, budget, lambda text: console.print(text, highlight=False))

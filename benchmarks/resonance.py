@@ -28,7 +28,7 @@ RANGE, DOUBLINGS = (0.15, 2.3), 3
 
 
 def command(name: str, folder: str) -> float:
-    """Processor time of the command (s)."""
+    """Measure the processor time of the command (s)."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     arguments = [sys.executable, "-m", "analysis.cli", "resonance", "--published", name, "--out", folder]
     subprocess.run(arguments, capture_output=True, check=False)
@@ -37,7 +37,7 @@ def command(name: str, folder: str) -> float:
 
 
 def parts(name: str, folder: str) -> dict[str, float]:
-    """Processor time (s) of each of the things that the command does."""
+    """Measure the processor time of each part of the command (s)."""
     times: dict[str, float] = {}
 
     def timed(what: str, does: Callable[[], Any]) -> Any:

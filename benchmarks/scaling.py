@@ -1,10 +1,10 @@
-"""How work goes over cores: each kind of it on one worker and on two, as processes and as a Dask cluster on this machine.
+"""Parallel speed: each kind of work on one worker and on two, as processes and as a Dask cluster on this machine.
 
     python -m benchmarks.scaling
 
-A worker is a process. Times are by the clock, and of the processors in all processes together: what two workers need more than
-one is what it costs to spread the work, and holds on a machine that is busy; the clock needs as many free cores as there are
-workers. Each is the best of several, taken in turn. The results are compared bit by bit.
+A worker is a process. Times are by the clock, which needs as many free cores as workers, and of the processors in all processes
+together, which show the cost of distributing the work even on a busy machine. Each is the best of several, taken in turn. The
+results are compared bit by bit.
 """
 
 from __future__ import annotations
@@ -67,13 +67,13 @@ WORK: dict[str, Callable[[], Any]] = {
 
 
 def processor_time() -> float:
-    """Of this process and of those that it started (s)."""
+    """Return the processor time of this process and of those that it started (s)."""
     own = psutil.Process()
     return sum(sum(process.cpu_times()[:2]) for process in [own, *own.children(recursive=True)])
 
 
 def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, Any]:
-    """Times by the clock and of the processors (s), and the result, on one worker or on two of a backend."""
+    """Run work on one worker or on two of a backend; return clock time, processor time (s) and the result."""
     with joblib.parallel_config(backend, n_jobs=2) if backend else nullcontext():
         begun, spent = perf_counter(), processor_time()
         result = work()
@@ -81,7 +81,7 @@ def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, A
 
 
 def nothing(_: int) -> None:
-    """Work that makes the workers import what they need."""
+    """Make a worker import the packages that it needs."""
     import analysis.periodic.chart.grid
     import analysis.run.compiled
     import analysis.slider_crank

@@ -29,18 +29,18 @@ ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)
 
 
 def in_process(tolerance: float) -> Trajectory:
-    """The run by the compiled solver."""
+    """Run the compiled solver."""
     inputs = Inputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 
 def acting(torque: float) -> dynamics.Inputs:
-    """What acts on the plant: a torque on the crank, the shift held."""
+    """Return the plant's inputs: a torque on the crank, the shift held."""
     return dynamics.applied((0.0, 1.0), (torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), PARAMETERS.constants())
 
 
 def by_scipy(method: str, tolerance: float) -> np.ndarray:
-    """Slider position at `TIMES` by one of SciPy's methods on the plain-Python right-hand side."""
+    """Compute the slider position at `TIMES` by one of SciPy's methods on the plain-Python right-hand side."""
     p, inputs = PARAMETERS.constants(), acting(TORQUE)
     start = [INITIAL.crank_angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0]
 
@@ -53,12 +53,12 @@ def by_scipy(method: str, tolerance: float) -> np.ndarray:
 
 @cache
 def reference() -> np.ndarray:
-    """Slider position at `TIMES` at a tolerance of 1e-13."""
+    """Compute the slider position at `TIMES` at a tolerance of 1e-13."""
     return in_process(1e-13)["slider.position"]
 
 
 def error(position: np.ndarray) -> float:
-    """Error of a slider position, relative to the stroke."""
+    """Return the error of a slider position relative to the stroke."""
     return float(np.abs(position - reference()).max() / np.ptp(reference()))
 
 

@@ -28,7 +28,7 @@ from tests.oracles.multipliers import SpeedDrive, simulate_redundant
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
-    """Time of a solver at its loosest setting that reaches the accuracy (s), its error, and what it did."""
+    """Time (s) and error of a solver at its loosest setting that reaches the accuracy, with a note."""
 
     solver: str
     seconds: float
@@ -37,7 +37,7 @@ class Timing:
 
 
 def in_process(case: Case) -> tuple[list[Timing], str]:
-    """The compiled solver: the whole call of `simulate`, the integration inside it, and the bare right-hand sides."""
+    """Time the compiled solver: the whole call of `simulate`, the integration inside it, and the bare right-hand sides."""
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
 
     def run(tolerance: float) -> Any:
@@ -69,14 +69,14 @@ def in_process(case: Case) -> tuple[list[Timing], str]:
 
 
 def _states(case: Case) -> np.ndarray:
-    """States like those of the case, for its right-hand side."""
+    """Return states like those of the case, for its right-hand side."""
     angles = np.linspace(0.0, 2.0 * np.pi, 20_000)
     none, speed = np.zeros_like(angles), np.full_like(angles, case.crank_speed or 70.0)
     return np.column_stack([angles, 0.01 * np.sin(angles), speed, 0.2 * np.cos(angles), none, none])
 
 
 def with_scipy(case: Case) -> Timing:
-    """`solve_ivp` on the plain-Python right-hand side, by the method that is fastest at the accuracy."""
+    """Time `solve_ivp` on the plain-Python right-hand side, by the method that is fastest at the accuracy."""
     length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
     scale = np.array([1.0, length, speed, length * 40.0])
     timings = []
@@ -99,7 +99,7 @@ def with_scipy(case: Case) -> Timing:
 
 
 def with_multipliers(case: Case) -> Timing:
-    """The redundant form under SciPy's DOP853; under the torsion bar the time of release is given to it for nothing."""
+    """Time the redundant form under SciPy's DOP853, which gets the torsion bar's time of release for free."""
     rtol, error, reached = loosest(lambda rtol: relative_error(case, _multipliers(case, rtol)), TOLERANCES[::5])
     assert reached, "the multiplier form does not reach the accuracy"
     seconds = best_time(lambda: _multipliers(case, rtol), 2)
@@ -143,7 +143,7 @@ def _release_time(case: Case) -> float:
 
 
 def with_engine(engine: engines.Engine, case: Case) -> Timing:
-    """A multibody engine at its largest step that reaches the accuracy."""
+    """Time a multibody engine at its largest step that reaches the accuracy."""
     steps = engines.time_steps(case, engine.first_step, engine.last_step)
     choice = loosest(lambda step: engine.run(case, step).error, steps)
     run = engines.fastest(engine.run, case, choice.setting)

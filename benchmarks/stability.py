@@ -34,14 +34,14 @@ POINTS = 200
 ROWS, RUN = 4, 10
 SPEEDS = np.linspace(200.0, 1200.0, POINTS) * RAD_S_PER_RPM
 DAMPINGS = np.linspace(3.0, 40.0, POINTS)
-#: Difference of the neighbours' starts, relative to crank length and speed: what balances truncation and rounding.
+#: Difference of the neighbours' starts, relative to crank length and speed; it balances truncation and rounding.
 STEP = 1e-6
 
 
 def scipy_orbit(
     parameters: FiveBarParameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Start of the orbit and its largest multiplier, by shooting with SciPy on the plain equations."""
+    """Find the start of the orbit and its largest multiplier, by shooting with SciPy on the plain equations."""
     p = parameters.constants()
     speed = drive.speed
     assert speed is not None
@@ -76,7 +76,7 @@ def scipy_orbit(
 
 
 def scipy_row(operation: Plane, damping: float, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest multipliers of a piece of a row, each begun by the secant through the last two."""
+    """Find the largest multipliers along a piece of a row, with the secant through the last two orbits as the first guess."""
     starts: list[NDArray[np.float64]] = []
     values = []
     for speed in speeds.tolist():

@@ -63,12 +63,12 @@ _FRAMES = """() => {
 
 
 def chromium() -> str | None:
-    """The system's Chromium."""
+    """Return the path of the system's Chromium."""
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 def measured(browser: Any, seconds: float = 4.0) -> Figures:
-    """The figures of the built page in a browser of Playwright."""
+    """Measure the built page in a browser of Playwright."""
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     page.goto(PAGE.as_uri())
     page.wait_for_function("document.documentElement.dataset.ready", timeout=120_000)
@@ -109,7 +109,7 @@ def _spread(values: np.ndarray) -> tuple[float, float, float]:
 
 
 def _work(events: list[dict[str, Any]]) -> np.ndarray:
-    """Processor time of the page's own thread between the frames that it gave to the display (ms), by the browser's trace."""
+    """Return the processor time of the page's own thread for each frame (ms), from the browser's trace."""
     commits = [e for e in events if e["name"] == "Commit"]
     thread = max((e["pid"], e["tid"]) for e in commits)
     ends = np.sort([e["ts"] for e in commits if (e["pid"], e["tid"]) == thread])
@@ -119,7 +119,7 @@ def _work(events: list[dict[str, Any]]) -> np.ndarray:
 
 
 def report(found: Figures) -> str:
-    """The figures in words."""
+    """Write the figures as a sentence."""
     return (
         f"first sight {found.first:.0f} ms; Floquet verdict {found.verdict[0]:.1f} ms after a change (greatest "
         f"{found.verdict[1]:.1f}); frames of a drag {found.frame[0]:.1f} ms, p95 {found.frame[1]:.1f}, greatest "

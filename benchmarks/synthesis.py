@@ -84,7 +84,7 @@ _path, _jacobian = (njit(error_model="numpy")(kernel.py_func) for kernel in _KER
 def _curves(repeats, c, s, zero, q, out):
     total = 0.0
     for _ in range(repeats):
-        # never the same linkage twice, and a result that is used: nothing to be left out by the compiler
+        # a new linkage each time and a result that is used, so that the compiler cannot drop the call
         q[8] += 1e-9
         _path(c, s, zero, zero, q, 1.0, out)
         total += out[0, 0]
@@ -102,7 +102,7 @@ def _jacobians(repeats, c, s, zero, q, out, jacobian):
 
 
 def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
-    """The coupler curve over arrays, by the plant's own loop closure with NumPy's square root."""
+    """Compute the coupler curve over arrays, by the plant's own loop closure with NumPy's square root."""
     joined = rebound((kinematics,), {"sqrt": np.sqrt}).of(kinematics.joined)
     q = linkage
     th2 = rotation + q.crank_phase
@@ -117,7 +117,7 @@ def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
 
 
 def per_call(run: Callable[[int], object], calls: int) -> float:
-    """Median time of one call, of `REPEATS` measurements of so many (s)."""
+    """Return the median time of one call (s), from `REPEATS` measurements of a number of calls."""
     run(1)
     times = []
     for _ in range(REPEATS):
@@ -128,7 +128,7 @@ def per_call(run: Callable[[int], object], calls: int) -> float:
 
 
 def kernel_times(linkage: Linkage, n: int = N) -> dict[str, float]:
-    """Times of a coupler curve of n points and of its Jacobian (s), ours first."""
+    """Return the times of a coupler curve of n points and of its Jacobian (s), ours first."""
     rotation = turn(n)
     c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
     q, out, jacobian = linkage.vector, np.empty((2, n)), np.empty((12, 2, n))
@@ -169,7 +169,7 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
 
 
 def ours(contest: Contest, search: Search) -> Trace:
-    """`synthesize`, its answer at the end of the call."""
+    """Run `synthesize`, whose answer counts from the end of the call."""
     problem = contest.problem
     trace = Trace(contest, inf)
     begun = perf_counter()
@@ -179,7 +179,7 @@ def ours(contest: Contest, search: Search) -> Trace:
 
 
 def contested(contest: Contest, budget: float) -> dict[str, Trace]:
-    """Every search on a problem, ours first; those of pylinkage left out where it is not installed."""
+    """Run every search on a problem, ours first; without those of pylinkage if it is not installed."""
     traces = {
         "synthesize": ours(contest, Search()),
         "synthesize, 2 cores": ours(contest, Search(n_jobs=2)),
@@ -201,7 +201,7 @@ def contested(contest: Contest, budget: float) -> dict[str, Trace]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statistics:
-    """Of the runs of a method from some starts: their qualities, and the mean time of one (s)."""
+    """Qualities of the runs of a method from some starts, and the mean time of a run (s)."""
 
     method: str
     qualities: tuple[float, ...]
@@ -209,7 +209,7 @@ class Statistics:
 
 
 def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Statistics]:
-    """Ellipse a with bounds alone, from starts of the scan or from the best of some random linkages each."""
+    """Fit ellipse a, with bounds only, from starts of the scan or from the best of some random linkages each."""
     phi = turn(N)
     weights = np.where((np.degrees(phi) >= 60.0) & (np.degrees(phi) <= 260.0), WEIGHT, 1.0) if weighted else np.ones(N)
     task = TimedPath(points=ellipse(10.0, N), weights=weights)
@@ -259,7 +259,7 @@ def _random_starts(boxes: dict[int, BlackBox], normal: Normal, number: int) -> I
 
 
 def kernel_table() -> Table:
-    """The first table."""
+    """Measure the first table."""
     times = kernel_times(PROBLEMS["ellipse-a"].linkage)
     table = Table(title=f"coupler curve of {N} points")
     for heading in ("", "microseconds", "times the compiled curve"):
@@ -271,7 +271,7 @@ def kernel_table() -> Table:
 
 
 def contest_table(names: Sequence[str], budget: float, console: Console) -> Table:
-    """The second table."""
+    """Measure the second table."""
     table = Table(
         title=f"problems of chapter VI; {budget:g} s for each search but ours; one core but where two are named"
     )
@@ -304,7 +304,7 @@ def _seconds(value: float) -> str:
 
 
 def start_table() -> Table:
-    """The third table."""
+    """Measure the third table."""
     table = Table(title=f"ellipse a with bounds alone, {STARTS} starts")
     for heading in ("path", "starts", "method", "at the optimum", "ms a start", "times least squares"):
         table.add_column(heading, justify="left" if heading in ("path", "starts", "method") else "right")

@@ -1,10 +1,10 @@
-"""Fifty targets of five kinds, ten of each: what `benchmarks.race` lets the searches run for.
+"""The fifty targets of `benchmarks.race`, ten of each of five kinds.
 
 The published ones are Youssef's (chapter VI), the 18 points of Acharyya and Mandal, Mech. Mach. Theory 44 (2009), and the six
 points of a vertical line of the same literature. Youssef's and the vertical line keep the bounds and constraints under which
 they are posed; all others have the defaults of `synthesize`: a least transmission angle of 40 degrees over a full turn, no
 link longer than five sizes of the target. The drawn ones are the example's drawing and nine curves from the seeds 1 to 9; the
-last two functions come from the seeds 1 and 2. None was left out or changed for what a search made of it.
+last two functions come from the seeds 1 and 2. No target was removed or changed because of a result.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Points = Sequence[tuple[float, float]]
 #: Points of a timed path, and of an untimed one; noise of a hand that draws, in sizes.
 TIMED, CURVE, TREMOR = 36, 72, 0.01
 HAND_DRAWN = Path(__file__).parents[1] / "examples" / "hand-drawn.svg"
-#: Of Acharyya and Mandal: a closed curve, 20 degrees of the crank apart.
+#: Closed curve of Acharyya and Mandal, at crank angles 20 degrees apart.
 EIGHTEEN: Points = (
     (0.5, 1.1), (0.4, 1.1), (0.3, 1.1), (0.2, 1.0), (0.1, 0.9), (0.05, 0.75), (0.02, 0.6), (0.0, 0.5), (0.0, 0.4),
     (0.03, 0.3), (0.1, 0.25), (0.15, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.7), (0.6, 0.9), (0.6, 1.0),
@@ -61,12 +61,12 @@ class Target:
     constraints: tuple[Constraint, ...] = USUAL
 
     def convert(self, error: float) -> float:
-        """An error in the unit in which it is reported: as it is."""
+        """Return an error in the reported unit, which is SI."""
         return error
 
 
 def curves(n: int) -> dict[str, FloatArray]:
-    """Simple closed curves at n even steps of their parameter, each shape (n, 2)."""
+    """Return simple closed curves at n even steps of their parameter, each of shape (n, 2)."""
     t = turn(n)
     c, s = np.cos(t), np.sin(t)
     bean = 1.0 + 0.5 * c**3 + 0.5 * s**3
@@ -82,14 +82,14 @@ def curves(n: int) -> dict[str, FloatArray]:
 
 
 def outlined(corners: ArrayLike, n: int = CURVE) -> FloatArray:
-    """n points at even steps along a closed line."""
+    """Return n points at even steps along a closed line."""
     line = ring(np.asarray(corners, dtype=float), True)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     return along(line, np.linspace(0.0, length, n, endpoint=False))
 
 
 def drawn(seed: int) -> TargetPath:
-    """A closed curve of random harmonics, drawn with a tremor and smoothed."""
+    """Draw a closed curve of random harmonics with a tremor, and smooth it."""
     random = np.random.default_rng(seed)
     t, order = turn(120), np.array([-3, -2, -1, 2, 3])
     wave = random.normal(size=(5, 2)) @ [1.0, 1j] * 0.5 / np.abs(order) ** 1.5
@@ -98,10 +98,10 @@ def drawn(seed: int) -> TargetPath:
 
 
 def waves(seed: int) -> RockerFunction:
-    """A periodic function of two random harmonics, 40 degrees from its least to its greatest."""
+    """Draw a periodic function of two random harmonics, with a range of 40 degrees."""
     random = np.random.default_rng(seed)
     t = turn(TIMED)
-    # the second harmonic a quarter of the first, but for chance
+    # the second harmonic is about a quarter of the first
     a, b = random.normal(size=(2, 2)) / np.array([1.0, 4.0])
     both = np.outer([1.0, 2.0], t)
     angle = a @ np.cos(both) + b @ np.sin(both)
@@ -109,7 +109,7 @@ def waves(seed: int) -> RockerFunction:
 
 
 def over(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
-    """y = f(x) from low to high: 90 degrees of the crank, so many of the rocker, both scales even, zeros free."""
+    """Return y = f(x) as a function of the rocker: 90 degrees of the crank, both scales linear, zeros free."""
     x = np.linspace(low, high, 31)
     y = function(x)
     return RockerFunction(
@@ -118,7 +118,7 @@ def over(function: Any, low: float, high: float, output_deg: float = 60.0) -> Ro
 
 
 def dwelling() -> RockerFunction:
-    """Rise by 40 degrees over 120, dwell over 60, return over 120, dwell over 60: cycloids."""
+    """Return a cycloidal rise of 40 degrees over 120, a dwell over 60, a return over 120, and a dwell over 60."""
     t = np.degrees(turn(72))
     up = np.clip(t / 120.0, 0.0, 1.0) - np.clip((t - 180.0) / 120.0, 0.0, 1.0)
     return RockerFunction(angle=radians(40.0) * (up - np.sin(tau * up) / tau), mounting=True)

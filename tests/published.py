@@ -113,15 +113,16 @@ class ThesisAndRight(NamedTuple):
     right: float
 
 
-# undamped resonance (rad/s) by I4: the determinant vanishes at two speeds near each other, and this is the lower one, but the
-# upper one of the thesis's at I4 = 1.5
+# undamped resonance (rad/s) by I4: the lower of two neighbouring speeds at which the determinant vanishes
 RESONANCE: Mapping[float, ThesisAndRight] = MappingProxyType(
     {
         0.5: ThesisAndRight(31.0763, 31.0975),
         1.0: ThesisAndRight(30.5572, 30.5979),
-        1.5: ThesisAndRight(30.0645, 30.1220),
+        1.5: ThesisAndRight(30.0632, 30.1220),
     }
 )
+# the upper one at I4 = 1.5 by the thesis's code
+UPPER_RESONANCE_THESIS = 30.0645
 # the same at I4 = 1 with the printed coefficients of (4.21) in the program's place
 RESONANCE_PRINTED = 30.6120
 # lower and upper end in lambda_k^2 of the first unstable region by I4: thesis's appendix 3, and about the periodic orbit

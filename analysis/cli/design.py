@@ -66,7 +66,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--objective",
             type=click.Choice(("error", "worst")),
-            help="What is made small: the quality function of the task, or the greatest error; in place of the case's.",
+            help="The objective: the quality function of the task, or the greatest error; in place of the case's.",
         ),
     ):
         command = option(command)
@@ -85,7 +85,7 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
 
     headings = ["", *quality_headings(solutions[0].task), "largest link [mm]", "transmission angle [deg]"]
     rows = [
-        [str(rank), *quality_cells(s), f"{1e3 * s.linkage.largest_link:.6g}", format_transmission(s.verdicts)]
+        [str(rank), *quality_cells(s), f"{1e3 * s.largest_link:.6g}", format_transmission(s.verdicts)]
         for rank, s in enumerate(solutions, start=1)
     ]
     if forces:

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from linkwork.errors import InputError
 
-from ..files import free, record
+from ..files import free_path, record_output
 from .style import Figure
 
 
@@ -28,7 +28,7 @@ def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tu
     A command that may not write over the file writes one beside it. The figure is laid out once, for the first picture: its
     panels must not move from picture to picture.
     """
-    path = free(path)
+    path = free_path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=frames_per_second, metadata={})
@@ -41,4 +41,4 @@ def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tu
             writer.grab_frame()
 
         yield path, add
-    record(path)
+    record_output(path)

@@ -23,7 +23,7 @@ from linkwork.errors import InputError, ParameterError
 from ..libraries import require
 from ..units import LENGTHS
 from .outputs import output, write_text
-from .paths import ending_of
+from .paths import checked_ending
 from .reader import unknown_name
 
 Point = tuple[float, float]
@@ -454,7 +454,7 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
         If the format does not have the unit.
     """
     path = Path(path)
-    text = to_dxf(drawing, unit) if ending_of(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
+    text = to_dxf(drawing, unit) if checked_ending(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
     return write_text(path, text)
 
 

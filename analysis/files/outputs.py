@@ -56,10 +56,10 @@ def written_by(command: str, force: bool = False) -> Iterator[Writing]:
 @contextmanager
 def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
     """Yield a path to write to and the final path, where the file then appears complete, or not at all."""
-    path = free(path)
+    path = free_path(path)
     with whole(path) as part:
         yield part, path
-    record(path)
+    record_output(path)
 
 
 def write_text(path: str | Path, text: str) -> Path:
@@ -69,7 +69,7 @@ def write_text(path: str | Path, text: str) -> Path:
     return path
 
 
-def free(path: str | Path) -> Path:
+def free_path(path: str | Path) -> Path:
     """Return the path, or one beside it if the command may not overwrite the file there."""
     path, writing = Path(path), _CURRENT.get()
     if writing is None or writing.force or _is_own(path, writing.command):
@@ -82,7 +82,7 @@ def free(path: str | Path) -> Path:
     return beside
 
 
-def record(path: Path) -> None:
+def record_output(path: Path) -> None:
     """Record that the command wrote a file."""
     writing = _CURRENT.get()
     if writing is None:

@@ -50,7 +50,7 @@ def prepare(path: str | Path) -> Path:
     return path
 
 
-def ending_of(path: Path, known: Sequence[str]) -> str:
+def checked_ending(path: Path, known: Sequence[str]) -> str:
     """Return the ending of a path in lower case; raise InputError unless it is among those ``known``."""
     ending = path.suffix.lower()
     if ending not in known:

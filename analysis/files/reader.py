@@ -72,7 +72,7 @@ def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapp
     return {keys.get(name, name): _Entry(name, reader, name in needed) for name, reader in named.items()}
 
 
-def names_of(kind: type) -> tuple[str, ...]:
+def entry_names(kind: type) -> tuple[str, ...]:
     """Return the names of the entries of a table that is read into a dataclass."""
     return tuple(_entries(kind, {}, {}))
 
@@ -116,7 +116,7 @@ def read(
     UnknownNameError, MissingParameterError, ParameterError
         If an entry is unknown, missing or wrong.
     """
-    table = table_of(value, name)
+    table = as_table(value, name)
     entries = _entries(kind, readers or {}, keys or {})
     check_names(table, name, entries)
     prefix = f"{name}." if name else ""
@@ -134,7 +134,7 @@ def read(
 # Readers without options
 
 
-def as_it_is(value: Any, name: str) -> Any:
+def unchanged(value: Any, name: str) -> Any:
     """Return any value unchanged, for a later check."""
     return value
 
@@ -153,7 +153,7 @@ def flag(value: Any, name: str) -> bool:
     return value
 
 
-def table_of(value: Any, name: str) -> Mapping[str, Any]:
+def as_table(value: Any, name: str) -> Mapping[str, Any]:
     """Read a table without looking inside."""
     if not isinstance(value, Mapping):
         raise ParameterError(name, value, "be a table")
@@ -293,7 +293,7 @@ class Kinds:
     readers: Mapping[str, Reader]
 
     def __call__(self, value: Any, name: str) -> Any:
-        table = table_of(value, name)
+        table = as_table(value, name)
         if "kind" not in table:
             raise MissingParameterError(f"{name}.kind")
         kind = Choice(self.readers)(table["kind"], f"{name}.kind")

@@ -13,8 +13,8 @@ import tomli_w
 from linkwork.errors import InputError
 
 from .outputs import write_text
-from .paths import ending_of, first_line, read_text
-from .reader import table_of
+from .paths import checked_ending, first_line, read_text
+from .reader import as_table
 
 ENDINGS = (".toml", ".json")
 #: Limits of a file of tables, which no case file exceeds: depth of nesting, characters of a text and of a name, bits of a whole
@@ -31,7 +31,7 @@ def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
         If the ending is another.
     """
     path = Path(path)
-    if ending_of(path, ENDINGS) == ".json":
+    if checked_ending(path, ENDINGS) == ".json":
         text = json.dumps(data, indent=2) + "\n"
     else:
         # TOML needs plain values before tables
@@ -48,7 +48,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         If the file cannot be read, or does not have the format of its ending.
     """
     path = Path(path)
-    ending = ending_of(path, ENDINGS)
+    ending = checked_ending(path, ENDINGS)
     text = read_text(path)
     try:
         data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
@@ -113,7 +113,7 @@ def overridden(
         *groups, leaf = name.split(".")
         place = result
         for depth, group in enumerate(groups, start=1):
-            inner = dict(table_of(place.get(group, {}), ".".join(groups[:depth])))
+            inner = dict(as_table(place.get(group, {}), ".".join(groups[:depth])))
             if depth == 1 and group in exclusive:
                 inner = {key: v for key, v in inner.items() if key == name.split(".")[1]}
             place[group] = inner

@@ -125,7 +125,7 @@ class Equilibrium:
     @property
     def stable(self) -> bool:
         """Whether the potential energy of springs, gravity and constant forces has a minimum in the free freedoms."""
-        balance = _Balance.of(self.parameters, self.inputs)
+        balance = _Balance.build(self.parameters, self.inputs)
         free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
         return bool(values[0] > 1e-9 * np.abs(values).max())
@@ -169,7 +169,7 @@ class _Balance:
     scale: FloatArray
 
     @classmethod
-    def of(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
+    def build(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
         mechanism = mechanism_of(parameters)
         given(mechanism, inputs, None)
         if not inputs.held_exactly:
@@ -298,7 +298,7 @@ def _balance_with_held(
             raise InputError(f"{name} is {value}: it must be a finite number")
         inputs = inputs.replace(**{commands[name].argument: 0.0})
         coordinates[commands[name].freedom] = value
-    return _Balance.of(parameters, inputs), coordinates
+    return _Balance.build(parameters, inputs), coordinates
 
 
 @takes_published()

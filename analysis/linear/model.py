@@ -98,7 +98,7 @@ def layout(mechanism: Mechanism, modes: Modes) -> Layout:
     forces = tuple(n for n in acting if kinds[n] == "force")
     inputs = [mechanism.channels[n].name for n in forces]
     for n in commanded:
-        inputs += [_channel_of(mechanism, n, "rate"), _channel_of(mechanism, n, "command")]
+        inputs += [_channel_name(mechanism, n, "rate"), _channel_name(mechanism, n, "command")]
         inputs.append(mechanism.freedoms[n].coordinate)
     names_of = [mechanism.freedoms[n] for n in free]
     return Layout(
@@ -110,7 +110,7 @@ def layout(mechanism: Mechanism, modes: Modes) -> Layout:
     )
 
 
-def _channel_of(mechanism: Mechanism, freedom: int, kind: str) -> str:
+def _channel_name(mechanism: Mechanism, freedom: int, kind: str) -> str:
     return next(c.name for c in mechanism.channels if c.kind == kind and c.freedom == freedom)
 
 
@@ -146,7 +146,7 @@ def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
     channels = dict(zip(mechanism.input_names, casadi.vertsplit(u)))
     acting = [channels[mechanism.channels[k].name] for k in its.forces]
     for k in its.commanded:
-        acting += [channels[_channel_of(mechanism, k, "rate")], x[n + k], x[k]]
+        acting += [channels[_channel_name(mechanism, k, "rate")], x[n + k], x[k]]
     w = casadi.vertcat(*acting)
 
     def in_modes(expression: Any) -> Any:

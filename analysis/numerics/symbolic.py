@@ -34,7 +34,7 @@ def traced(modules: tuple[ModuleType, ...], **others: Any) -> Rebound:
     return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY} | others)
 
 
-def over(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:
+def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:
     """Evaluate a ``casadi.Function`` with scalar outputs over arrays.
 
     Parameters

@@ -81,7 +81,7 @@ def check_jobs(n_jobs: int | None) -> None:
         raise InputError("0 cores: give a number of cores, or -1 for all")
 
 
-def cores_of(n_jobs: int | None, *, threads: bool = False) -> int:
+def worker_count(n_jobs: int | None, *, threads: bool = False) -> int:
     """Return the number of workers of `over_workers`, as `joblib.Parallel` counts them; on a cluster all of its cores."""
     return _workers(n_jobs, threads)[0]
 

@@ -240,7 +240,7 @@ def _divided(
     bodies = {name.partition(".")[0] for name in mechanism.mechanism_variables if "." in name}
     for group in dict.fromkeys(name.partition(".")[0] for name in acting if "." in name):
         inside = {name.removeprefix(f"{group}."): r for name, r in readers.items() if name.startswith(f"{group}.")}
-        table = files.table_of(own.pop(group, {}), group)
+        table = files.as_table(own.pop(group, {}), group)
         if group in bodies:
             own[group] = {leaf: value for leaf, value in table.items() if leaf not in inside}
             table = {leaf: value for leaf, value in table.items() if leaf in inside}

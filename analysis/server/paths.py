@@ -118,7 +118,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
                     f"{1e6 * solution.error:.4g}",
                     f"{1e3 * solution.evaluation.worst:.3g}",
                     format_transmission(v),
-                    f"{1e3 * solution.linkage.largest_link:.4g}",
+                    f"{1e3 * solution.largest_link:.4g}",
                     ", ".join([v.grashof, *v.defects]),
                 ]
             )

@@ -18,17 +18,17 @@ from ..files import (
     Range,
     Table,
     Whole,
-    as_it_is,
+    as_table,
     check_names,
     entry,
+    entry_names,
     flag,
-    names_of,
     overridden,
     read,
     read_rows,
     read_tables,
-    table_of,
     text,
+    unchanged,
 )
 from ..linear import design_pid, linearise_along
 from ..run import parameters_to
@@ -102,7 +102,7 @@ class SliderTable:
 class StrategyWanted:
     """Arguments of `simplest_mechanism`."""
 
-    tolerance: float = entry(as_it_is)
+    tolerance: float = entry(unchanged)
     criterion: Criterion = entry(Choice(get_args(Criterion)), "worst")
     harmonics: int = entry(Whole(1), 3)
     ratios: tuple[int, ...] = entry(Many(Whole()), RATIOS)
@@ -176,10 +176,10 @@ class SliderCase:
     load : Load, optional
     """
 
-    synthesis: SynthesisCase = entry(as_it_is)
-    linkage: Linkage | None = entry(as_it_is, None)
+    synthesis: SynthesisCase = entry(unchanged)
+    linkage: Linkage | None = entry(unchanged, None)
     slider: SliderTable = entry(Table(SliderTable), SliderTable())
-    strategy: StrategyWanted | None = entry(as_it_is, None)
+    strategy: StrategyWanted | None = entry(unchanged, None)
     drive: DriveWanted | None = entry(Table(DriveWanted), None)
     load: Load | None = entry(Table(Load), None)
     tracking: TrackingWanted | None = entry(Table(TrackingWanted), None)
@@ -344,13 +344,13 @@ TABLES: Mapping[str, type] = {
 
 def _read_strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
     """Read the table ``[strategy]``; its tolerance has the unit of the criterion, the quality function is squared."""
-    unit = ("rad" if angular else "m") + "**2" * (table_of(value, name).get("criterion") == "error")
+    unit = ("rad" if angular else "m") + "**2" * (as_table(value, name).get("criterion") == "error")
     return read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
 
 def _read_linkage(value: Any, name: str, *, folder: Path) -> Linkage:
     """Read a linkage from its dimensions or from a file of `linkwork synthesize`."""
-    if "file" not in table_of(value, name):
+    if "file" not in as_table(value, name):
         dimensions = {d: Quantity("rad" if d in ANGLES else "m") for d in DIMENSIONS}
         return read(Linkage, value, name, readers={**dimensions, "branch": Whole()})
     found: dict[str, Any] = read(dict, value, name, readers={"file": text, "rank": Whole(1)})
@@ -376,8 +376,8 @@ def slider_case_from(
 ) -> SliderCase:
     """Build a case from the tables of a case file; its files are looked for in ``folder``."""
     data = {"title": title} | overridden(data, overrides or {})
-    own = [name for name in names_of(SliderCase) if name != "synthesis"]
-    check_names(data, "", [name for name in (*names_of(SynthesisCase), *own) if name != "trade_off"])
+    own = [name for name in entry_names(SliderCase) if name != "synthesis"]
+    check_names(data, "", [name for name in (*entry_names(SynthesisCase), *own) if name != "trade_off"])
     if "slider" not in data and "strategy" not in data:
         raise MissingParameterError("slider")
     synthesis = synthesis_case_from({name: value for name, value in data.items() if name not in own}, folder=folder)

@@ -8,14 +8,12 @@ each crank angle alone is in `analysis.slider.variational`; it may jump, a Fouri
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from math import inf, pi
+from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from linkwork.errors import InputError, Interrupted
+from linkwork.errors import InputError
 
 from ..numerics.fourier import FourierSeries
 from ..synthesis import (
@@ -24,18 +22,14 @@ from ..synthesis import (
     Assembly,
     Constraint,
     FullTurn,
-    InfeasibleError,
     Linkage,
     PivotUnknown,
     Search,
     SliderMotion,
-    SliderUnknown,
     Solution,
     Synthesis,
-    SynthesisInterrupted,
     Task,
     improve,
-    solve_both_ways,
 )
 from ..units import Amount, in_si
 
@@ -115,41 +109,6 @@ def slider_motion(
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SmoothnessCurve:
-    """Error of the task over the smoothness of the slider's motion.
-
-    Attributes
-    ----------
-    acceleration : ndarray, shape (n,)
-        Bounds of ``|d2u/dphi2|`` (m/rad2), increasing.
-    solutions : tuple of Solution or None
-        Best solution for each bound; None if there is none.
-    """
-
-    acceleration: FloatArray
-    solutions: tuple[Solution | None, ...]
-
-    @property
-    def error(self) -> np.ma.MaskedArray:
-        """Value of the quality function at each bound, masked where there is no solution; shape (n,)."""
-        return np.ma.masked_invalid(np.array([np.nan if s is None else s.error for s in self.solutions]))
-
-    @property
-    def attained(self) -> np.ma.MaskedArray:
-        """Greatest ``|d2u/dphi2|`` of each motion (m/rad2)."""
-        values = [np.nan if s is None else greatest_derivative(s.linkage, 2) for s in self.solutions]
-        return np.ma.masked_invalid(np.array(values))
-
-
-class SmoothnessInterrupted(Interrupted):
-    """A smoothness curve was stopped from the keyboard; ``curve`` has the best motion so far at each bound."""
-
-    def __init__(self, curve: SmoothnessCurve, done: int, problems: int) -> None:
-        self.curve = curve
-        super().__init__(f"stopped after {done} of {problems} problems of the smoothness curve")
-
-
 def greatest_derivative(linkage: Linkage, order: int) -> float:
     """Return the greatest magnitude over a turn of the slider's position (order 0) or of a derivative by the rotation."""
     if not isinstance(linkage.pivot, SliderMotion):
@@ -175,80 +134,3 @@ def motion_of_plant(linkage: Linkage) -> FourierSeries:
     series = linkage.pivot.series
     turned = (series.cos - 1j * series.sin) * np.exp(-1j * linkage.crank_phase * np.arange(series.order + 1))
     return FourierSeries(turned.real, -turned.imag)
-
-
-def smoothness_curve(
-    task: Task,
-    linkage: Linkage | Solution,
-    unknown: SliderUnknown,
-    accelerations: ArrayLike,
-    *,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    constraints: Sequence[Constraint] = (FullTurn(),),
-    search: Search = USUAL_SEARCH,
-) -> SmoothnessCurve:
-    """Find the best motion for each bound of its second derivative: error against smoothness, warm started.
-
-    From no bound to the tightest, each problem starts from the solutions of the one before, their harmonics scaled down to the
-    new bound, and from random starts. Then back: each problem keeps the smoother solution or one refined from it, so that a
-    wider bound never has a larger error.
-
-    Parameters
-    ----------
-    task, linkage, unknown, bounds, constraints, search
-        As for `slider_motion`.
-    accelerations : array_like, shape (n,)
-        Bounds of ``|d2u/dphi2|`` (m/rad2), above zero.
-
-    Raises
-    ------
-    InputError
-        If the bounds are not usable, or the unknown is no slider.
-    SmoothnessInterrupted
-        On Ctrl-C, with the best so far at each bound.
-    """
-    if not isinstance(unknown, SliderUnknown):
-        raise InputError(f"the unknown is {unknown!r}: a smoothness curve needs a SliderUnknown")
-    values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
-    if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
-        raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
-
-    def best(acceleration: float, guesses: Sequence[Solution], starts: int) -> tuple[Solution, ...]:
-        return slider_motion(
-            task,
-            linkage,
-            replace(unknown, acceleration=acceleration),
-            bounds=bounds,
-            constraints=constraints,
-            guesses=[replace(guess, linkage=_shrunk(guess.linkage, acceleration)) for guess in guesses],
-            search=replace(search, starts=starts, solutions=3),
-        ).solutions
-
-    found: dict[int, Solution] = {}
-    done: int | None = 0
-    # the best motion without a bound is the start for a wide bound
-    with suppress(SynthesisInterrupted, KeyboardInterrupt):
-        try:
-            widest = best(inf, [], search.starts)
-        except InfeasibleError:
-            widest = ()
-        found, done = solve_both_ways(
-            range(len(values))[::-1],
-            lambda k, guesses, back: best(float(values[k]), guesses, 0 if back else search.starts),
-            widest,
-        )
-    curve = SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
-    if done is not None:
-        raise SmoothnessInterrupted(curve, done, 2 * len(values))
-    return curve
-
-
-def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:
-    """Return the linkage with the slider's harmonics scaled down to a bound of the second derivative."""
-    most = greatest_derivative(linkage, 2)
-    if not isinstance(linkage.pivot, SliderMotion) or most <= acceleration:
-        return linkage
-    series = linkage.pivot.series
-    factor = acceleration / most
-    mean = series.mean
-    return replace(linkage, pivot=replace(linkage.pivot, series=(series + -mean) * factor + mean))

@@ -10,7 +10,6 @@ from .dual_dynamics import DeadCentreError as DeadCentreError
 from .dual_dynamics import Difference as Difference
 from .dual_dynamics import JointLoads as JointLoads
 from .dual_dynamics import Rates as Rates
-from .dual_dynamics import binors as binors
 from .dual_dynamics import compare as compare
 from .dual_dynamics import joint_loads as joint_loads
 from .dual_dynamics import rates as rates

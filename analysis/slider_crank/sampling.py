@@ -17,7 +17,7 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
-from ..numerics.workers import check_jobs, cores_of, over_workers
+from ..numerics.workers import check_jobs, over_workers, worker_count
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
 from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, unit_table
 from .tolerances import (
@@ -262,7 +262,7 @@ def monte_carlo(
         raise InputError(f"{samples} samples: there must be at least two")
     check_jobs(n_jobs)
     linear = tolerance_effects(turn, tolerances, quantities)
-    cores = cores_of(n_jobs)
+    cores = worker_count(n_jobs)
     size = len(turn) if cores == 1 else -(-len(turn) // (_PARTS * cores))
     parts = [range(k, min(k + size, len(turn))) for k in range(0, len(turn), max(1, size))]
     work = partial(_sample_angles, turn, tuple(tolerances), tuple(quantities), samples, seed)

@@ -11,7 +11,7 @@ import numpy as np
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ..files import Many, Quantity, Table, Whole, as_it_is, entry, flag, overridden, read, read_tables, table_of, text
+from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
 from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import Drive, drive_of, unit_of
 from ..run import Case, case_from
@@ -47,17 +47,17 @@ class TuneTable:
         Quantity to be minimised: "least change", or a parameter, as in "least slider.damping"
     """
 
-    change: Mapping[str, Any] = entry(table_of)
+    change: Mapping[str, Any] = entry(as_table)
     speeds: tuple[float, float] | None = entry(Many(Quantity("rad/s", above=0.0), length=2), None)
     over: str = entry(text, "")
-    between: tuple[Any, Any] | None = entry(Many(as_it_is, length=2), None)
+    between: tuple[Any, Any] | None = entry(Many(unchanged, length=2), None)
     turns: int = entry(Whole(least=1), 1)
     no_resonance: bool = entry(flag, False)
     resonance_margin: float = entry(Quantity("1", least=0.0), 0.02)
     no_jump: bool = entry(flag, False)
     no_unstable: bool = entry(flag, False)
     least_margin: float = entry(Quantity("1", least=0.0), 0.0)
-    peak: tuple[Limit, ...] = entry(Many(Table(Limit, {"output": text, "below": as_it_is}), single=True), ())
+    peak: tuple[Limit, ...] = entry(Many(Table(Limit, {"output": text, "below": unchanged}), single=True), ())
     objective: str = entry(_objective, _LEAST_CHANGE)
 
 

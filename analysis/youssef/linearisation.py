@@ -142,7 +142,9 @@ def _traced() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
     second = [0.5 * casadi.jacobian(value, p.l2) for value in first]
     outputs = {"balance": (arguments, balance), "taylor": ([angle, w, columns, load], rest + first + second)}
     return {
-        name: partial(symbolic.over, casadi.Function(name, ins, [casadi.densify(out) for out in outs], {"cse": True}))
+        name: partial(
+            symbolic.evaluate_arrays, casadi.Function(name, ins, [casadi.densify(out) for out in outs], {"cse": True})
+        )
         for name, (ins, outs) in outputs.items()
     }
 

@@ -9,7 +9,7 @@ from math import pi
 import pytest
 
 from analysis.cli.new import case_text, kinds
-from analysis.files import Many, Quantity, Whole, names_of
+from analysis.files import Many, Quantity, Whole, entry_names
 from analysis.files.template import example, meanings
 from analysis.mechanisms import MECHANISMS
 from analysis.run import RunTable, acting_on, load_case, load_parameters
@@ -57,22 +57,22 @@ def test_it_holds_every_entry_there_is(kind):
     found = sections(case_text(kind, "x.toml"))
     if kind in MECHANISMS:
         mechanism = MECHANISMS[kind]
-        assert names(found["run"]) == set(names_of(RunTable))
+        assert names(found["run"]) == set(entry_names(RunTable))
         assert names(found["initial"]) == set(mechanism.initial_variables)
         there = {f"{table}.{name}" if table else name for table, lines in found.items() for name in names(lines)}
         assert {*mechanism.mechanism_variables, *acting_on(mechanism)} <= there
         return
     if kind == TUNING:
-        assert names(found["tune"]) == set(names_of(TuneTable))
+        assert names(found["tune"]) == set(entry_names(TuneTable))
         return
     tables = TABLES | MOTION if kind == SLIDER else TABLES
-    assert names(found["task"]) == {"kind", *names_of(KINDS["rocker-function" if kind == SLIDER else kind])}
+    assert names(found["task"]) == {"kind", *entry_names(KINDS["rocker-function" if kind == SLIDER else kind])}
     assert names(found["bounds"]) == set(BOUNDS.readers)
-    known = set(names_of(SliderCase if kind == SLIDER else SynthesisCase)) - {"synthesis", "title"}
+    known = set(entry_names(SliderCase if kind == SLIDER else SynthesisCase)) - {"synthesis", "title"}
     assert set(found) - {"", "task", "bounds", "linkage"} == set(tables) - ({"trade_off"} if kind == SLIDER else set())
     assert known <= set(found)
     for table in set(tables) & set(found):
-        assert names(found[table]) == set(names_of(tables[table])), table
+        assert names(found[table]) == set(entry_names(tables[table])), table
 
 
 @pytest.mark.parametrize("kind", kinds())

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import analysis.synthesis as syn
 from analysis import cli, figures
-from analysis.files import names_of
+from analysis.files import entry_names
 from analysis.numerics.symbolic import library
 from analysis.run import case_from, load_case, load_parameters, simulate
 from analysis.synthesis.case import case as cases
@@ -459,7 +459,7 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
         cases.Make,
         cases.TradeOffTable,
     ):
-        for name in names_of(kind):
+        for name in entry_names(kind):
             assert re.search(rf"\b{name}\b", page), name
 
 

@@ -27,9 +27,9 @@ from analysis.files import (
     Table,
     Whole,
     entry,
+    entry_names,
     flag,
     load_array,
-    names_of,
     overridden,
     read,
     read_columns,
@@ -169,7 +169,7 @@ def test_a_table_becomes_a_dataclass():
     )
     assert read(Bar, table, "bar") == made
     assert read(Bar, {"holes": 3}, "bar", base=made).holes == 3
-    assert names_of(Bar)[:3] == ("length", "play", "from")
+    assert entry_names(Bar)[:3] == ("length", "play", "from")
 
 
 @pytest.mark.parametrize(

@@ -559,3 +559,18 @@ class TestBadUnknowns:
     def test_regions(self, polygon: Sequence[Sequence[float]], message: str) -> None:
         with pytest.raises(InputError, match=message):
             syn.PivotRegion(pivot="A", polygon=polygon)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        syn.PrecisionPoints(points=ellipse(12)[:4], angle=np.linspace(0.0, 1.0, 4)),
+        syn.Motion(points=ellipse(12)[:6], angle=np.linspace(0.0, 1.0, 6)),
+        syn.RockerFunction(angle=1.2 + 0.9 * np.abs(np.sin(0.5 * syn.turn(12))), mounting=True),
+    ],
+    ids=["poses", "motion", "function"],
+)
+def test_a_task_without_constraints_is_answered(task: syn.Task) -> None:
+    """Least squares come to the limit of assembly, where the slopes are infinite."""
+    found = syn.synthesize(task, constraints=[], search=syn.Search(starts=12, candidates=1 << 12))
+    assert np.isfinite(found.best.error)

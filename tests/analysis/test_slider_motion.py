@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
-from analysis.slider import SmoothnessInterrupted, greatest_derivative, motion, slider_motion, smoothness_curve
+from analysis.slider import greatest_derivative, slider_motion
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.synthesis import (
     ANGLES,
@@ -28,7 +28,6 @@ from analysis.synthesis import (
     SliderMotion,
     SliderUnknown,
     Synthesis,
-    SynthesisInterrupted,
     TargetPath,
     Task,
     TimedPath,
@@ -371,65 +370,6 @@ def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
 # Smoothness
 
 
-@pytest.mark.slow
-def test_smoothness_costs_error_and_never_the_other_way() -> None:
-    accelerations = np.array([0.02, 0.005, 0.05, 0.01])
-    curve = smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), accelerations)
-    assert curve.acceleration.tolist() == sorted(accelerations.tolist())
-    assert not np.ma.is_masked(curve.error)
-    assert (np.diff(curve.error) <= 1e-9 * curve.error[:-1]).all()
-    assert (curve.attained <= (1.0 + 1e-6) * curve.acceleration).all()
-    # the last bound is wide enough to be none
-    assert curve.error[-1] == pytest.approx(moved(2).best.error, rel=1e-6)
-    assert curve.attained[-1] < 0.9 * accelerations.max()
-    assert curve.error[0] > 10.0 * curve.error[-1]
-
-
-def test_a_worse_polish_on_the_way_back_does_not_spoil_the_curve(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What keeps the tighter bound keeps the looser one too: the error is as good where every later search fails."""
-    real, calls = motion.slider_motion, []
-
-    def second_best(*arguments: object, **more: object) -> Synthesis:
-        calls.append(more)
-        found = real(*arguments, **more)
-        if len(calls) in (1, 3):
-            # without a bound and with the tightest one: as it is
-            return found
-        worse = tuple(
-            replace(s, linkage=replace(s.linkage, pivot=None), evaluation=replace(s.evaluation, error=10.0, value=10.0))
-            for s in found.solutions
-        )
-        return replace(found, solutions=worse)
-
-    monkeypatch.setattr(motion, "slider_motion", second_best)
-    curve = smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), [0.005, 0.02], search=Search(starts=3))
-    assert len(calls) == 5
-    assert curve.error[1] == curve.error[0] < 10.0
-    assert curve.solutions[1] is curve.solutions[0]
-
-
-@pytest.mark.parametrize("stop", [1, 3, 4, 5])
-def test_an_interrupted_smoothness_curve_keeps_what_it_has(monkeypatch: pytest.MonkeyPatch, stop: int) -> None:
-    real, calls = motion.slider_motion, []
-
-    def stopped(*arguments: object, **more: object) -> Synthesis:
-        calls.append(more)
-        if len(calls) == 4 == stop:
-            raise KeyboardInterrupt
-        found = real(*arguments, **more)
-        if len(calls) == stop:
-            raise SynthesisInterrupted(found, 1, 2)
-        return found
-
-    monkeypatch.setattr(motion, "slider_motion", stopped)
-    done = max(0, stop - 2)
-    with pytest.raises(SmoothnessInterrupted, match=f"stopped after {done} of 4 problems") as caught:
-        smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), [0.005, 0.02], search=Search(starts=2))
-    there = [s is not None for s in caught.value.curve.solutions]
-    assert there == {1: [False, False], 3: [True, True]}.get(stop, [True, True])
-    assert caught.value.curve.error.mask.tolist() == [not t for t in there] or all(there)
-
-
 def test_smoothness_as_a_weight_does_the_same() -> None:
     rough, smooth = moved(2), moved(2, smoothness=1.0)
     assert smooth.best.error > rough.best.error
@@ -488,11 +428,6 @@ def test_bad_input_is_named() -> None:
         slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(n_jobs=0))
     with pytest.raises(ParameterError, match="crank_lenght"):
         slider_motion(WEIGHTED.task, PRINTED, unknown, bounds={"crank_lenght": (0.1, 0.2)})
-    for wrong in ([0.01], [0.01, 0.0], [0.01, float("nan")], [[0.01, 0.02]]):
-        with pytest.raises(InputError, match="bounds of acceleration"):
-            smoothness_curve(WEIGHTED.task, PRINTED, unknown, wrong)
-    with pytest.raises(InputError, match="SliderUnknown"):
-        smoothness_curve(WEIGHTED.task, PRINTED, CrankUnknown(ratio=1, length=(0.1, 0.2)), [0.01, 0.02])
 
 
 def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:

@@ -416,3 +416,12 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     assert f"sum of squared errors of angle: {squares:.6g} deg²" in syn.report(function)
     assert "stroke" in syn.report(timed(SLIDING))
     assert "second crank at D: 2 turns" in syn.report(timed(GEARED))
+
+
+def test_the_largest_link_is_what_the_constraint_bounds() -> None:
+    """The coupler plate from B to P counts, where the task has points."""
+    long = replace(LINKAGE, point_distance=2.0 * LINKAGE.largest_link)
+    found = syn.Solution.of(syn.TimedPath(points=long.path(syn.turn(12))), long)
+    assert f"largest link {1e3 * long.point_distance:.6g} mm" in syn.report(found)
+    angle = syn.RockerFunction(angle=long.rocker_angle(syn.turn(12)))
+    assert syn.Solution.of(angle, long).largest_link == LINKAGE.largest_link

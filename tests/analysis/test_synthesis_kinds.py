@@ -169,7 +169,7 @@ class TestQuickSwing:
         assert {s.linkage.branch for s in found.solutions} == {1, -1}
         for s in found.solutions:
             phi = np.linspace(0.0, 2.0 * pi, 20001)
-            angle = s.linkage.rocker_angle(phi)
+            angle = s.linkage.rocker_angle(np.sign(swing) * phi)
             slow = phi[np.argmax(angle * np.sign(swing))]
             assert slow / (2.0 * pi - slow) == pytest.approx(ratio, rel=1e-3)
             assert np.ptp(angle) == pytest.approx(radians(abs(swing)), rel=1e-6)
@@ -194,7 +194,7 @@ class TestQuickSwing:
 
         def off(x: FloatArray, coupler: float) -> FloatArray:
             at_a, at_d = ends(*x, coupler)
-            return np.array([np.sign(swing) * (at_a[1] - at_a[0]) - advance, at_d[0] - at_d[1] - radians(50.0)])
+            return np.array([at_a[1] - at_a[0] - advance, at_d[0] - at_d[1] - radians(50.0)])
 
         start = np.array([best.ground_length, best.crank_length]) / best.rocker_length
         assert np.abs(off(start, l3)).max() < 1e-9
@@ -203,6 +203,15 @@ class TestQuickSwing:
             assert good == 1
             made = syn.Linkage(ground_length=ground, crank_length=crank, coupler_length=other, rocker_length=1.0)
             assert 0.9 * best.least_transmission < made.least_transmission < best.least_transmission
+
+    def test_a_swing_to_the_right_is_one_to_the_left_seen_from_behind(self) -> None:
+        left, right = (
+            {s.linkage.branch: s.linkage for s in syn.synthesize(task, constraints=[]).solutions}
+            for task in (syn.QuickSwing(swing=swing, time_ratio=1.2) for swing in ("40 deg", "-40 deg"))
+        )
+        phi = syn.turn(36)
+        for branch in (1, -1):
+            np.testing.assert_allclose(right[branch].rocker_angle(-phi), -left[-branch].rocker_angle(phi), atol=1e-9)
 
     def test_size_and_what_cannot_be_had(self) -> None:
         task = syn.QuickSwing(swing="-60 deg", time_ratio=1.1)

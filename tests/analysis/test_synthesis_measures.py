@@ -16,8 +16,8 @@ from scipy.optimize import minimize
 
 import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
+from analysis.numerics.overlap import symmetric_difference
 from analysis.slider import slider_motion
-from analysis.synthesis.linkage.kernels import symmetric_difference
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.refine import Refinement
 from analysis.synthesis.search.start import make_start

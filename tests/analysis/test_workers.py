@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, simulate_many
-from analysis.numerics.workers import WorkersLost, _handed_over, cores_of, interruptible, over_workers
+from analysis.numerics.workers import WorkersLost, _handed_over, interruptible, over_workers, worker_count
 from analysis.periodic import Drive, grid, plane
 from analysis.slider_crank import Tolerance, force_turn, monte_carlo
 from analysis.synthesis import Search, TargetPath, TimedPath, UntimedPath, synthesize
@@ -81,10 +81,10 @@ def test_every_item_is_done_once(backend: str | None, n_jobs: int | None) -> Non
 
 
 def test_the_backend_and_its_number_of_workers_are_those_of_joblib() -> None:
-    assert cores_of(None) == cores_of(1) == 1
-    assert cores_of(-1) == joblib.cpu_count()
+    assert worker_count(None) == worker_count(1) == 1
+    assert worker_count(-1) == joblib.cpu_count()
     with joblib.parallel_config("loky", n_jobs=3):
-        assert (cores_of(None), cores_of(2)) == (3, 2)
+        assert (worker_count(None), worker_count(2)) == (3, 2)
     here = os.getpid()
     for backend, alike in (("threading", True), ("loky", False)):
         with joblib.parallel_config(backend, n_jobs=2):

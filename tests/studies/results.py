@@ -25,18 +25,18 @@ LONG = {
 
 @cache
 def result(number: str) -> StudyResult:
-    """A study's result, computed once in a process."""
+    """Return the result of a study, computed once in a process."""
     return studies.load(number).compute()
 
 
 def computed(number: str, statement: str, source: str = OURS.kind) -> float:
-    """The computed value beside a statement."""
+    """Return the computed value of a statement."""
     (verdict,) = (v for v in result(number).verdicts if v.statement == statement and v.source.kind == source)
     return verdict.computed
 
 
 def every(*beginnings: str) -> pytest.MarkDecorator:
-    """A parameter: the numbers of the studies that begin so; those that take long are slow tests."""
+    """Parametrise a test over the studies whose numbers begin so; those that take long are slow tests."""
     numbers = [n for n in studies.STUDIES if n.startswith(beginnings)]
     return pytest.mark.parametrize(
         "number", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in numbers]
@@ -44,18 +44,18 @@ def every(*beginnings: str) -> pytest.MarkDecorator:
 
 
 def stated(kind: str, number: str) -> set[str]:
-    """The statements of a study that are ``refuted`` or ``unjudged``."""
+    """Return the statements of a study that are ``refuted`` or ``unjudged``."""
     return set(VERDICTS.get(number, {}).get(kind, ()))
 
 
 def check(number: str) -> None:
-    """What must be true of every study."""
+    """Check the verdicts, the plot and the data of a study."""
     check_verdicts(number)
     check_plot_and_data(number)
 
 
 def check_verdicts(number: str) -> None:
-    """What fails and what cannot be judged is what the table says, and all of it is the thesis's."""
+    """Check that the statements that fail or cannot be judged are those of the table, and none of them is ours."""
     verdicts = result(number).verdicts
     unjudged = [v for v in verdicts if v.outcome == UNJUDGED]
     assert {v.statement for v in unjudged} == stated("unjudged", number)

@@ -52,62 +52,30 @@ class Points(NamedTuple):
 
 
 class Search(NamedTuple):
-    """How the orbits of a row are sought.
+    """How the orbits of a row are sought."""
 
-    Attributes
-    ----------
-    end : float
-        Crank angle at the end of the period (rad).
-    turns : int
-        Turns in a period.
-    most : int
-        Newton iterations at most.
-    loose : float
-        Tolerance of the integrator in the search from further starts.
-    smooth : bool
-        Whether collocation serves.
-    """
-
-    end: float
-    turns: int
-    most: int
-    loose: float
-    smooth: bool
+    end: float  # crank angle at the end of the period (rad)
+    turns: int  # turns in a period
+    most: int  # Newton iterations at most
+    loose: float  # tolerance of the integrator in the search from further starts
+    smooth: bool  # whether collocation serves
 
 
 class Row(NamedTuple):
-    """The orbits of a row.
+    """The orbits of a row, written where the status is DONE."""
 
-    Attributes
-    ----------
-    starts : ndarray, shape (m, n)
-        y at crank angle 0, written where the status is DONE.
-    monodromies : ndarray, shape (m, n n)
-        Monodromy matrices by columns, likewise.
-    status : ndarray of int64, shape (m,)
-        The `Status` of each.
-    """
-
-    starts: NDArray[np.float64]
-    monodromies: NDArray[np.float64]
-    status: NDArray[np.int64]
+    starts: NDArray[np.float64]  # y at crank angle 0, shape (m, n)
+    monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, n n)
+    status: NDArray[np.int64]  # the `Status` of each, (m,)
 
 
 class Motions(NamedTuple):
-    """All orbits of a row, at most MOST_ORBITS of each point.
+    """All orbits of a row, at most MOST_ORBITS = k of each point."""
 
-    Attributes
-    ----------
-    starts, monodromies, swings : ndarray, shapes (m, MOST_ORBITS, n), (m, MOST_ORBITS, n n) and (m, MOST_ORBITS, samples)
-        Starts, monodromy matrices, and samples of the first component of y.
-    counts : ndarray of int64, shape (m,)
-        Number of orbits of each point.
-    """
-
-    starts: NDArray[np.float64]
-    monodromies: NDArray[np.float64]
-    swings: NDArray[np.float64]
-    counts: NDArray[np.int64]
+    starts: NDArray[np.float64]  # y at crank angle 0, shape (m, k, n)
+    monodromies: NDArray[np.float64]  # monodromy matrices by columns, (m, k, n n)
+    swings: NDArray[np.float64]  # samples of the first component of y, (m, k, samples)
+    counts: NDArray[np.int64]  # number of orbits of each point, (m,)
 
 
 POINTS = types.NamedUniTuple(MATRIX, 3, Points)

@@ -51,24 +51,12 @@ class Bench(NamedTuple):
 
 
 class Element(NamedTuple):
-    """A linearised element, written by `condense`.
+    """A linearised element, written by `condense`; its slopes w have the shape (NODES, f)."""
 
-    Attributes
-    ----------
-    end : ndarray, shape (n,)
-        y at its end, with the slopes corrected.
-    matrix : ndarray, shape (n, n)
-        Derivatives of the end by y at the beginning.
-    slope : ndarray, shape (n,)
-        Derivatives of the end by lambda.
-    moves : ndarray, shape (NODES f, 1 + n (+ 1))
-        Corrections of the slopes w, and their derivatives by the beginning and by lambda.
-    """
-
-    end: NDArray[np.float64]
-    matrix: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    moves: NDArray[np.float64]
+    end: NDArray[np.float64]  # y at its end with the slopes corrected, (n,)
+    matrix: NDArray[np.float64]  # derivatives of the end by the beginning, (n, n)
+    slope: NDArray[np.float64]  # derivatives of the end by lambda, (n,)
+    moves: NDArray[np.float64]  # corrections of w, derivatives by y and lambda, (NODES f, 1 + n (+ 1))
 
 
 @part
@@ -397,39 +385,19 @@ def solve_element(section, angle, h, unit, y, w, bench, into):
 
 
 class Neighbour(NamedTuple):
-    """What is known of a neighbouring motion, by elements.
+    """A neighbouring motion by elements."""
 
-    Attributes
-    ----------
-    y : ndarray, shape (m, n)
-        Beginnings.
-    w : ndarray, shape (m, NODES, f)
-        Slopes.
-    moves : ndarray, shape (m, NODES f, 2 + n)
-        Their corrections and derivatives: see `Element`.
-    """
-
-    y: NDArray[np.float64]
-    w: NDArray[np.float64]
-    moves: NDArray[np.float64]
+    y: NDArray[np.float64]  # beginnings, shape (m, n)
+    w: NDArray[np.float64]  # slopes, (m, NODES, f)
+    moves: NDArray[np.float64]  # see `Element`, (m, NODES f, 2 + n)
 
 
 class Walked(NamedTuple):
-    """What `walk` finds.
+    """The result of `walk`."""
 
-    Attributes
-    ----------
-    rows : ndarray, shape (k, n (2 + n))
-        y at the end of each piece, dy/dy0 by columns, dy/dlambda: as `kernels.segments` writes them.
-    tails : ndarray, shape (m,)
-        Decay of the Legendre coefficients of each element.
-    clearance : ndarray, shape (1,)
-        Least clearance to the limit of assembly.
-    """
-
-    rows: NDArray[np.float64]
-    tails: NDArray[np.float64]
-    clearance: NDArray[np.float64]
+    rows: NDArray[np.float64]  # ends of the pieces, as `kernels.segments` writes them
+    tails: NDArray[np.float64]  # decay of the Legendre coefficients, shape (m,)
+    clearance: NDArray[np.float64]  # least clearance to the limit of assembly, (1,)
 
 
 @kernel(

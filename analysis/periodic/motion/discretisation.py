@@ -88,24 +88,12 @@ def orbit_error(
 
 
 class Ends(NamedTuple):
-    """The ends of the k pieces of a period.
+    """The ends of the k pieces of a period."""
 
-    Attributes
-    ----------
-    y : ndarray, shape (k, n)
-        y at the end of each piece.
-    matrices : ndarray, shape (k, n, n)
-        Its derivatives by y at the beginning.
-    slopes : ndarray, shape (k, n)
-        Its derivatives by a parameter lambda.
-    clearance : float or None
-        Least clearance to the limit of assembly; None if it was not computed.
-    """
-
-    y: FloatArray
-    matrices: FloatArray
-    slopes: FloatArray
-    clearance: float | None = None
+    y: FloatArray  # y at the end of each piece, shape (k, n)
+    matrices: FloatArray  # its derivatives by y at the beginning, (k, n, n)
+    slopes: FloatArray  # its derivatives by a parameter lambda, (k, n)
+    clearance: float | None = None  # least clearance to the limit of assembly, if it was computed
 
 
 class Period(NamedTuple):

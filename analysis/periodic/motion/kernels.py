@@ -52,33 +52,16 @@ _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
-    """A flow with numbers.
+    """A flow with numbers; lambda is a parameter by which derivatives are wanted."""
 
-    Attributes
-    ----------
-    equations : ndarray of int64
-        Addresses of the flow's functions.
-    modes : ndarray
-    drive, p : ndarray
-        Numbers of the drive and constants of the equations, each followed by its derivatives by lambda.
-    scale : ndarray, shape (n,)
-        Magnitudes of y.
-    along : float
-        Magnitude of lambda.
-    tolerance : float
-        Bound of the local error of a step.
-    torque : bool
-        Whether the crank's rate is the last component of y.
-    """
-
-    equations: NDArray[np.int64]
+    equations: NDArray[np.int64]  # addresses of the flow's functions
     modes: NDArray[np.float64]
-    drive: NDArray[np.float64]
-    p: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    along: float
-    tolerance: float
-    torque: bool
+    drive: NDArray[np.float64]  # numbers of the drive, then their derivatives by lambda
+    p: NDArray[np.float64]  # constants of the equations, likewise
+    scale: NDArray[np.float64]  # magnitudes of y, shape (n,)
+    along: float  # magnitude of lambda
+    tolerance: float  # bound of the local error of a step
+    torque: bool  # whether the crank's rate is the last component of y
 
 
 SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)

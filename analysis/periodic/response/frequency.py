@@ -77,7 +77,7 @@ def _means(parameters: Parameters) -> tuple[float, float]:
             x[crank.freedom] = angle
         mechanism.check_assembly(parameters, x)
     resting = at_rest(mechanism, tuple(crank.freedom for crank in cranks), freedom)
-    mass, stiffness = symbolic.over(resting, *angles, list(parameters.constants()))
+    mass, stiffness = symbolic.evaluate_arrays(resting, *angles, list(parameters.constants()))
     return float(mass.mean()), float(stiffness.mean())
 
 

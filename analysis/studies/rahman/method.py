@@ -334,7 +334,7 @@ def velocities() -> StudyResult:
         columns[f"row 37f as printed; {case.name} [in/s]"] = lacking
         columns[f"row 37f mended; {case.name} [in/s]"] = mended
         size = float(np.nanmax(np.abs(lacking)))
-        name = f"row 37f with the rates of eqs 39 to 43, where |sin theta2| > {CLEAR_SINE:g}; {case.name}"
+        name = f"row 37f with the rates of eqs 39 to 43, where abs(sin theta2) > {CLEAR_SINE:g}; {case.name}"
         verdicts.append(_nothing(name, size, "in/s", "eq 37f, L557", "erratum 3"))
         name = f"velocity of point 3 by the forward path less the mixed path; {case.name}"
         verdicts.append(_nothing(name, size, "in/s", "section 2.8, L639, L750", "erratum 3"))

@@ -249,6 +249,7 @@ def steady_result() -> StudyResult:
     columns |= {f"u from the start; {_k(k)} [cm]": CM_PER_METRE * run["slider.position"] for k, run in starts.items()}
     return StudyResult(
         number="3.4",
+        assignment='The scan has "220" for the crank angle of the least position (L1962): read as 22 deg.',
         claim="After a turn of transient the slider swings steadily between its start and the crank shaft; a stiffer spring "
         "moves the mean position towards the start, and the least position to a smaller crank angle.",
         columns=padded(columns),

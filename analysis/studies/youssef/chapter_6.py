@@ -55,7 +55,7 @@ class Printed(NamedTuple):
     """Problem of the thesis: name, claim and place, and the error of the printed linkage.
 
     Both errors come with half a unit of their last digit, in the unit of print: ``stated`` as printed, ``reference`` as the
-    printed linkage evaluates.
+    printed linkage evaluates. ``reading`` tells how an illegible place is read.
     """
 
     problem: str
@@ -64,6 +64,7 @@ class Printed(NamedTuple):
     stated: tuple[float, float]
     reference: tuple[float, float]
     why: str = ""
+    reading: str = ""
 
 
 TABLE = {
@@ -89,6 +90,7 @@ TABLE = {
         (53.6, 0.05),
         (30.4, 0.05),
         "with a1 = -93.8 deg, printed without its sign",
+        'The scan has "10 2" for the bound of the crank (L4917): read as l2 < 10 cm.',
     ),
     "6.7": Printed(
         "rocker",
@@ -452,6 +454,7 @@ def compute(number: str) -> StudyResult:
     return StudyResult(
         number=number,
         claim=row.claim,
+        assignment=row.reading,
         columns=padded(rocker_columns(row.problem) if rocker else path_columns(row.problem)),
         # a rocker function determines the transmission angle
         verdicts=verdicts if rocker else (*verdicts, *sound_verdicts(row.problem)),

@@ -145,7 +145,7 @@ def compute() -> StudyResult:
         verdicts=(
             at_least("rms force without a spring, of that with the best", OURS, 1.5, bare / sprung),
             at_least(
-                "an independent drive without feedback loses the motion; status of the run",
+                "an accurate motion is difficult for an independent drive without feedback; status of the run",
                 text("7.1.1 (c), L5327"),
                 1.0,
                 open_loop.loop.status,

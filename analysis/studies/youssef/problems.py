@@ -21,11 +21,21 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ...synthesis.linkage.linkage import Linkage
-from ...synthesis.task.constraint import USUAL, Constraint, FullTurn, LargestLink
-from ...synthesis.task.formula import path_from_formula
-from ...synthesis.task.target import TargetPath
-from ...synthesis.task.task import RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
+from ...synthesis import (
+    USUAL,
+    Constraint,
+    FullTurn,
+    LargestLink,
+    Linkage,
+    RockerFunction,
+    Straight,
+    TargetPath,
+    Task,
+    TimedPath,
+    UntimedPath,
+    path_from_formula,
+    turn,
+)
 from ...units import CM_PER_METRE
 
 CM2_PER_M2 = CM_PER_METRE**2

@@ -1,4 +1,4 @@
-"""Case files of a synthesis: their tables, and the task, constraints and search that these describe.
+"""Case files of a synthesis: their tables, and the task, constraints and search in them.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

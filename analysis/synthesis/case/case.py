@@ -21,20 +21,18 @@ from ...files import (
     Range,
     Table,
     Whole,
-    as_it_is,
+    as_table,
     entry,
     flag,
     overridden,
     read,
     read_tables,
-    table_of,
     text,
+    unchanged,
 )
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
-from ..linkage.kind import Kind
-from ..linkage.linkage import ANGLES
-from ..linkage.machine import PINS, Make, PinForces, pin_forces
+from ..linkage import ANGLES, PINS, Kind, Make, PinForces, pin_forces
 from ..result.solution import Solution
 from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from ..search.start import Search
@@ -74,7 +72,7 @@ def _cores(value: Any, name: str) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchTable:
-    """How it is searched, and among what; see `Search` and `synthesize`."""
+    """The table ``[search]``: kinds of linkages and effort; see `Search` and `synthesize`."""
 
     seed: int = entry(Whole(0), 0)
     candidates: int = entry(Whole(1), 1 << 16)
@@ -195,7 +193,7 @@ class TradeOffTable:
     """The table ``[trade_off]``: arguments of `trade_off`."""
 
     over: Any = entry(Choice(OVER))
-    limits: tuple[float, ...] = entry(Many(as_it_is, least=2))
+    limits: tuple[float, ...] = entry(Many(unchanged, least=2))
     starts: int = entry(Whole(1), 12)
 
 
@@ -218,17 +216,17 @@ def _constraints(value: Any, name: str) -> tuple[Constraint | Stroke, ...]:
 
 
 def _trade_off(value: Any, name: str) -> TradeOffTable:
-    over = table_of(value, name).get("over")
+    over = as_table(value, name).get("over")
     limit = Quantity(OVER[over].unit if isinstance(over, str) and over in OVER else "m")
     return read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SynthesisCase:
-    """What a case file asks for."""
+    """A synthesis as a case file describes it."""
 
     title: str = entry(text)
-    task: Task = entry(as_it_is)
+    task: Task = entry(unchanged)
     bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
     constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
     search: SearchTable = entry(Table(SearchTable), SearchTable())

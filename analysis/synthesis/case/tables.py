@@ -1,4 +1,4 @@
-"""The task of a synthesis case: its table, of points, files and formulas, and the task that it describes."""
+"""The table of the task in a synthesis case, with its points, files and formulas."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ...files import Choice, Kinds, Many, Quantity, Table, Whole, as_it_is, entry, flag, read, read_points, text
+from ...files import Choice, Kinds, Many, Quantity, Table, Whole, entry, flag, read, read_points, text, unchanged
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..task.formula import function_from_formula, path_from_formula
@@ -78,7 +78,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Targets that are weighted: from one crank rotation, or number of a point, to another."""
+    """A window of targets with a weight: from one crank rotation, or number of a point, to another."""
 
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
@@ -129,7 +129,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
     if value is None:
         return None
     name = "task.weights"
-    rows = Many(as_it_is)(value, name)
+    rows = Many(unchanged)(value, name)
     if not any(isinstance(row, Mapping) for row in rows):
         return np.array(Many(Quantity("1"))(value, name))
     at = np.arange(n, dtype=float) if rotation is None else rotation
@@ -165,7 +165,7 @@ def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Formula:
-    """What is made small, and the range of the parameter of a formula: how many points of it, from where to where."""
+    """The objective, and the range of a formula's parameter with its number of points."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -181,9 +181,9 @@ class _Formula:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Curve(_Formula):
-    """Points of a target: written down, of a file, or by formulas; then scaled, turned and shifted."""
+    """Points of a target as a list, from a file, or by formulas; then scaled, turned and shifted."""
 
-    points: Any = entry(as_it_is, None)
+    points: Any = entry(unchanged, None)
     file: str | None = entry(text, None)
     name: str | None = entry(text, None)
     closed: bool | None = entry(flag, None)
@@ -192,7 +192,7 @@ class _Curve(_Formula):
     y: str | None = entry(text, None)
     scale: float | None = entry(Quantity("1", above=0.0), None)
     turn: float | None = entry(Quantity("rad"), None)
-    shift: Any = entry(as_it_is, None)
+    shift: Any = entry(unchanged, None)
 
     def _placed(self, folder: Path) -> tuple[FloatArray, bool]:
         """Return the points in m, and whether their curve is closed."""
@@ -223,7 +223,7 @@ class TimedPathTable(_Curve):
     """The table of a `TimedPath`."""
 
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         points, _ = self._placed(folder)
@@ -240,7 +240,7 @@ class UntimedPathTable(_Curve):
     samples: int = entry(Whole(8), 72)
     smoothing: Smoothing | None = entry(_smoothing, None)
     straight: Straight | None = entry(_STRAIGHT, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         points, closed = self._placed(folder)
@@ -265,7 +265,7 @@ class UntimedPathTable(_Curve):
 class PrecisionPointsTable(_Curve):
     """The table of a `PrecisionPoints`."""
 
-    angle: Any = entry(as_it_is, None)
+    angle: Any = entry(unchanged, None)
     angle_unit: str | None = entry(_angle_unit, None)
     rotation: Any = entry(_steps_or_list, None)
     length: float | None = entry(Quantity("m"), None)
@@ -290,7 +290,7 @@ class PrecisionPointsTable(_Curve):
 class MotionTable(PrecisionPointsTable):
     """The table of a `Motion`."""
 
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         body = self._body(folder)
@@ -303,11 +303,11 @@ class MotionTable(PrecisionPointsTable):
 class RockerFunctionTable(_Formula):
     """The table of a `RockerFunction`."""
 
-    angle: Any = entry(as_it_is, None)
+    angle: Any = entry(unchanged, None)
     angle_unit: str | None = entry(_angle_unit, None)
     file: str | None = entry(text, None)
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
     mounting: bool = entry(flag, False)
     spacing: Any = entry(Choice(("even", "chebyshev")), "even")
 
@@ -338,10 +338,10 @@ class RockerFunctionTable(_Formula):
 class SliderFunctionTable(_Formula):
     """The table of a `SliderFunction`."""
 
-    position: Any = entry(as_it_is)
+    position: Any = entry(unchanged)
     unit: str | None = entry(_length_unit, None)
     rotation: Any = entry(_steps_or_list, None)
-    weights: Any = entry(as_it_is, None)
+    weights: Any = entry(unchanged, None)
 
     def task(self, folder: Path) -> Task:
         if isinstance(self.position, str):

@@ -62,8 +62,28 @@ class Dyad:
         return abs(self.point - self.pivot)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Guidance(Shown):
+class Exact(Shown):
+    """Linkages in closed form, sound or not."""
+
+    __slots__ = ()
+
+    solutions: tuple[Solution, ...]
+
+    @property
+    def sound(self) -> tuple[Solution, ...]:
+        """Return the solutions without circuit, branch or order defect."""
+        return tuple(s for s in self.solutions if s.verdicts.sound)
+
+    def describe(self) -> str:
+        """Say in a sentence how many linkages there are."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.describe()}>"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Guidance(Exact):
     """Every four-bar that carries a body exactly through five poses, sound or not.
 
     Attributes
@@ -86,11 +106,6 @@ class Guidance(Shown):
     nearest_complex: float
     solutions: tuple[Solution, ...]
 
-    @property
-    def sound(self) -> tuple[Solution, ...]:
-        """Return the solutions without circuit, branch or order defect."""
-        return tuple(s for s in self.solutions if s.verdicts.sound)
-
     def describe(self) -> str:
         """Say in a sentence how many linkages there are."""
         there = f"{format_count(len(self.dyads), 'real dyad')} of {len(self.dyads) + self.complex_dyads}"
@@ -100,9 +115,6 @@ class Guidance(Shown):
         if not self.sound:
             return f"{there}, {linkages}, driven from either side: each has a defect, so that no sound four-bar exists"
         return f"{there}, {linkages}, driven from either side: {len(self.sound)} of {len(self.solutions)} sound"
-
-    def __repr__(self) -> str:
-        return f"<Guidance: {self.describe()}>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

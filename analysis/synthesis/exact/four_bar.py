@@ -22,12 +22,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, ParameterError
 
-from ...display import Shown, format_count
+from ...display import format_count
 from ...units import Amount, in_si
 from ..linkage.linkage import Linkage, wrapped
 from ..result.solution import Solution, ranked
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, turn
-from .burmester import INDEPENDENT, REAL, dyads_of_five, exact_solution
+from .burmester import INDEPENDENT, REAL, Exact, dyads_of_five, exact_solution
 
 FloatArray = NDArray[np.float64]
 #: Crank, coupler and rocker in units of the ground link; the crank's phase and the output's mounting (rad).
@@ -38,8 +38,8 @@ GROUND = 0.1
 ON_CIRCLE = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Generators(Shown):
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Generators(Exact):
     """Every four-bar that does a function exactly at its points.
 
     Attributes
@@ -52,11 +52,6 @@ class Generators(Shown):
     task: RockerFunction
     solutions: tuple[Solution, ...]
 
-    @property
-    def sound(self) -> tuple[Solution, ...]:
-        """Return the solutions without circuit, branch or order defect."""
-        return tuple(s for s in self.solutions if s.verdicts.sound)
-
     def describe(self) -> str:
         """Say in a sentence how many linkages there are."""
         points = format_count(len(np.asarray(self.task.angle)), "point")
@@ -66,9 +61,6 @@ class Generators(Shown):
         if not self.sound:
             return f"{linkages} through the {points}: each has a defect, so that no sound four-bar exists"
         return f"{linkages} through the {points}: {len(self.sound)} sound"
-
-    def __repr__(self) -> str:
-        return f"<Generators: {self.describe()}>"
 
 
 @in_si(crank_phase="rad", ground_length="m")

@@ -1,4 +1,4 @@
-"""Slider-cranks of a given stroke and crank-rockers of a given swing, each with a time ratio: the best of them in closed form.
+"""The best slider-crank of a stroke, or crank-rocker of a swing, with a given time ratio, in closed form.
 
 In the dead centres C is l3 + l2 and l3 - l2 away from A, the two directions advance = pi (Q - 1)/(Q + 1) apart, so that by the
 laws of cosines and sines
@@ -6,7 +6,7 @@ laws of cosines and sines
     l2^2 (1 + cos advance) = H^2/2 - l3^2 (1 - cos advance),    l1 H = (l3^2 - l2^2) sin advance
 
 with the stroke H, the time ratio Q and the offset l1. That leaves l3, for which (l1 + l2)/l3, the cosine of the least
-transmission angle, is made small. Of a crank-rocker C is in the same two places, their distance the chord
+transmission angle, is minimised. Of a crank-rocker C is in the same two places, their distance the chord
 H = 2 l4 sin(swing/2) of its swing about D, which lies on A's side of that chord where a crank that turns to the left is slow
 while the rocker turns to the left. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
 """
@@ -83,8 +83,8 @@ class QuickSwing(RockerFunction):
     Attributes
     ----------
     swing : float
-        To the left, the crank turning to the left (rad), short of half a turn; below zero to the right, which is the same
-        seen from behind.
+        To the left, the crank turning to the left (rad), short of half a turn; below zero both turn to the right, which is the
+        same seen from behind.
     time_ratio : float
         As of `QuickReturn`.
     angle, rotation : ndarray, shape (3,)
@@ -102,7 +102,8 @@ class QuickSwing(RockerFunction):
         if not 0.0 < abs(float(self.swing)) < pi:
             raise ParameterError("swing", float(self.swing), "be an angle above zero and below half a turn (rad)")
         object.__setattr__(self, "angle", np.array([0.0, float(self.swing), 0.0]))
-        object.__setattr__(self, "rotation", np.array([0.0, pi + _advance(self.time_ratio), 2.0 * pi]))
+        way = 1.0 if float(self.swing) > 0.0 else -1.0
+        object.__setattr__(self, "rotation", way * np.array([0.0, pi + _advance(self.time_ratio), 2.0 * pi]))
         RockerFunction.__post_init__(self)
 
 
@@ -172,7 +173,7 @@ def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -
 
 
 class _Swing:
-    """Crank-rockers of a swing and a time ratio, by their couplers in rockers; and their size, by bounds and caps."""
+    """Crank-rockers of a swing and a time ratio, one for each ratio of coupler to rocker, sized by the bounds."""
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
@@ -191,8 +192,7 @@ class _Swing:
         """Return l1 ... l4 (m); None where the dead centres are not of one assembly, or a bound is not kept."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
-        side = 1.0 if float(self.task.swing) > 0.0 else -1.0
-        x, y = far - 0.5 * self.chord, side * sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
+        x, y = far - 0.5 * self.chord, sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
         # D from A to the same side of both places of C
         sides = [x * -e - y * reach for reach in (far, far - self.chord)]
         if l2 <= 0.0 or sides[0] * sides[1] <= 0.0:
@@ -221,13 +221,15 @@ class _Swing:
         links = self.links(l3)
         assert links is not None
         l1, l2, l3, l4 = links
-        made = Linkage(ground_length=l1, crank_length=l2, coupler_length=l3, rocker_length=l4, branch=branch)
+        # a swing to the right is one to the left seen from behind
+        side = 1 if float(self.task.swing) > 0.0 else -1
+        made = Linkage(ground_length=l1, crank_length=l2, coupler_length=l3, rocker_length=l4, branch=side * branch)
         first, second = dead_centres(made)
         slow = [
             (abs((end - start) % (2.0 * pi) - pi - self.advance), start)
             for start, end in ((first, second), (second, first))
         ]
-        begun = [replace(made, crank_phase=start) for off, start in slow if off < 1e-6]
+        begun = [replace(made, branch=branch, crank_phase=side * start) for off, start in slow if off < 1e-6]
         begun = [replace(one, output_angle=-float(one.rocker_angle([0.0])[0])) for one in begun]
         return min(begun, key=lambda one: Solution.of(self.task, one).error)
 

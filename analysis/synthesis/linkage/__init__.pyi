@@ -1,5 +1,7 @@
 from .kind import Kind as Kind
+from .linkage import ANGLES as ANGLES
 from .linkage import Linkage as Linkage
+from .machine import PINS as PINS
 from .machine import Make as Make
 from .machine import PinForces as PinForces
 from .machine import pin_forces as pin_forces

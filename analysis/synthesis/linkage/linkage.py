@@ -331,11 +331,13 @@ class Linkage:
 
     @property
     def grashof(self) -> str:
-        """Return the type of the four-bar by Grashof's criterion, the rocker pivot at the end of the ground link.
+        """Return the type of a four-bar by Grashof's criterion, the rocker pivot at the end of the ground link.
 
         One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
         does not), triple-rocker, change-point.
         """
+        if self.links != LINKS:
+            return self.kind
         lengths = [getattr(self, name) for name in LINKS]
         excess = 2.0 * (min(lengths) + max(lengths)) - sum(lengths)
         if abs(excess) <= 1e-12 * sum(lengths):
@@ -437,16 +439,13 @@ class Linkage:
     ) -> FiveBarParameters:
         """Return the parameters of the plant and its FMU, with masses from density and section.
 
-        Crank and rocker are bars of a rectangular section between their pins; the coupler is one from B to C and, where the
-        coupler point is off that line, a second from B to P. The plant's x axis is the ground link: gravity comes at the
-        linkage's own inclination. A fixed rocker pivot becomes a slider held by a spring: give it one, or hold it by force.
+        The links are bars, see `bodies`. The plant's x axis is the ground link: gravity comes at the linkage's own
+        inclination. A fixed rocker pivot becomes a slider held by a spring: give it one, or hold it by force.
 
         Parameters
         ----------
-        density : float
-            kg/m3; steel by default.
-        section : (float, float)
-            Width in the plane and thickness of every bar (m).
+        density, section : float, (float, float)
+            kg/m3; steel by default. Width in the plane and thickness of every bar (m).
         slider_mass : float, optional
             kg; by default that of a block of four widths by two widths by four thicknesses.
         slider_stiffness, slider_damping, slider_coulomb_friction, gravity : float
@@ -466,24 +465,13 @@ class Linkage:
                 "kind", self.kind, "be 'four-bar': the plant of the five-bar slider has no other linkage"
             )
         r, a2 = self.point_distance, self.point_angle
+        links: dict[str, float] = {name: getattr(self, name) for name in LINKS}
         straight = on_line(self.coupler_length, r, a2)
-        made = bodies(
-            self.crank_length,
-            self.coupler_length,
-            self.rocker_length,
-            r,
-            a2,
-            density * width * thickness,
-            width,
-            straight,
-        )
+        l2, l3, l4 = self.crank_length, self.coupler_length, self.rocker_length
+        own = bodies(l2, l3, l4, r, a2, density * width * thickness, width, straight)
         return FiveBarParameters(
-            ground_length=self.ground_length,
-            crank_length=self.crank_length,
-            coupler_length=self.coupler_length,
-            rocker_length=self.rocker_length,
+            **links | own,
             slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
-            **made,
             slider_guide_angle=self.pivot.guide_angle if isinstance(self.pivot, SliderMotion) else 0.0,
             slider_stiffness=slider_stiffness,
             slider_damping=slider_damping,
@@ -530,11 +518,6 @@ class SliderCrank(Linkage):
         """Return the names of the dimensions that it does not have: a rocker, and a coupler point if that is the pin."""
         return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
 
-    @property
-    def grashof(self) -> str:
-        """Return its type: slider-crank."""
-        return self.kind
-
     def slider_position(self, rotation: ArrayLike) -> FloatArray:
         """Return the position of C on its guide from the foot E of the offset, to the left of A -> E (m)."""
         position: FloatArray = self.crank_length * np.sin(self.crank_angle(rotation))
@@ -562,7 +545,6 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def square(along: Any, across: Any) -> Any:
-        """Return the square of `distance`."""
         return along * along
 
     @staticmethod
@@ -572,12 +554,10 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
-        """Return the derivative of `transmission_excess` by the cosine."""
         return 2.0 * l3 * l3 * cosine
 
     @staticmethod
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
-        """Return how far an extreme of `square` may be off its value half a step away."""
         return 2.0 * (l1 + l2) * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:

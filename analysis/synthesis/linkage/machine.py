@@ -1,4 +1,4 @@
-"""What a linkage is made of, how fast it runs and what loads it: the plant's parameters, and a case that runs."""
+"""The linkage as a machine: material, speed and load, the plant's parameters, the forces on the pins."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ STIFF, STIFF_TURNS = 1000.0, 50.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Make:
-    """What the linkage is made of, and how fast it runs; see `Linkage.to_five_bar`.
+    """Material, speed and load of a linkage; see `Linkage.to_five_bar`.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Motions of the rocker pivot: on a guide or on a second crank, known, or as what a search is to find."""
+"""Motions of the rocker pivot, on a guide or on a second crank: known ones, and the unknowns of a search."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class SecondCrank:
     phase : float
         psi at the start (rad).
     series : FourierSeries
-        What is added to the geared rotation (rad): zero with gears.
+        Rotation added to the geared one (rad): zero with gears.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A linkage that was found: how well it does its task, what its dimensions cost, its report and its drawings.
+"""Solutions: how well a linkage does its task, the cost of errors in its dimensions, its report and its drawings.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

@@ -1,4 +1,4 @@
-"""What a picture or a drawing of a solution shows: the linkage in its positions, its curve, its target."""
+"""Drawings of a solution: the linkage in its positions with curve and target, and its links as plates."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LAYERS = {
 
 @dataclass(frozen=True, eq=False)
 class LinkageScene:
-    """A solution as it is drawn, in m and rad, with the title of the picture."""
+    """The geometry of a solution that pictures and drawings show, in m and rad, with a title."""
 
     solution: Solution
     title: str = ""

@@ -1,4 +1,4 @@
-"""What each dimension of a solution does to its error, and what rounding the dimensions costs: by exact derivatives."""
+"""The effect of each dimension on the error by exact derivatives, the cost of rounding, and the text report."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ DIFFERENCE = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensitivity:
-    """What one dimension does to the error.
+    """The effect of one dimension on the error.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rounding:
-    """What rounding the dimensions costs.
+    """The cost of rounding the dimensions.
 
     Attributes
     ----------
@@ -363,7 +363,7 @@ def headline(solution: Solution) -> str:
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
     return (
         f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
-        f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
+        f"largest link {1e3 * solution.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")
         + (f"\n{', '.join(v.defects)}" if v.defects else "")
     )
@@ -381,7 +381,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Assessment:
-    """A solution with what errors in its dimensions cost, computed once for the shell, the report and the sheet.
+    """A solution with the cost of errors in its dimensions, computed once for the shell, the report and the sheet.
 
     Attributes
     ----------
@@ -389,7 +389,7 @@ class Assessment:
     dimensions : list of tuple
         Headings, then a row for each dimension: name, value, error, and what that does to output and quality function.
     rounding : str
-        What rounding the dimensions costs, in a line.
+        The cost of rounding the dimensions, in a line.
     """
 
     solution: Solution
@@ -407,7 +407,7 @@ class Assessment:
             f"{quality_name(task)}: {error} {quality_unit(task)[1]}; "
             f"rms error {rms} {error_unit(task)[1]}, worst {worst} {error_unit(task)[1]}\n"
             f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
-            f"largest link {1e3 * linkage.largest_link:.6g} mm"
+            f"largest link {1e3 * solution.largest_link:.6g} mm"
         )
         if pivot is None:
             head += _slider_line(linkage) + _limits(linkage, solution.rotation)

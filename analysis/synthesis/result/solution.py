@@ -1,4 +1,4 @@
-"""A linkage that was found, and everything a designer asks of it."""
+"""Solutions: a linkage for a task, its errors and its verdicts."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ CURVE = 360
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evaluation:
-    """How well a linkage does a task.
+    """The errors of a linkage in a task.
 
     Attributes
     ----------
     error : float
         The task's quality function: m2, of a rocker function rad2.
     value : float
-        What the task's objective makes small: the quality function, or the greatest error (m, of a rocker function rad).
+        The value of the task's objective: the quality function, or the greatest error (m, of a rocker function rad).
     errors : ndarray, shape (n,)
         At each target: distance (m), of an untimed path from the target's point to the curve; of a rocker function, angle
         (rad).
@@ -159,7 +159,7 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """Whether a linkage really does its task.
+    """The defects of a linkage in its task, and its transmission angle.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """The straight part of a path as it is traced, evaluated densely.
+    """The straight part of a path as the linkage traces it, evaluated densely.
 
     Attributes
     ----------
@@ -283,7 +283,7 @@ class Solution(Shown):
         found = self.evaluation
         return (
             f"error {self.error:.4g} {unit}2, rms {found.rms:.4g} {unit}, worst {found.worst:.4g} {unit}; largest link "
-            f"{self.linkage.largest_link:.4g} m; {self.verdicts}"
+            f"{self.largest_link:.4g} m; {self.verdicts}"
         )
 
     @classmethod
@@ -342,6 +342,12 @@ class Solution(Shown):
     def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
         """Return the parameters of the plant and its FMU; see `Linkage.to_five_bar`."""
         return self.linkage.to_five_bar(**made_of)
+
+    @property
+    def largest_link(self) -> float:
+        """Return the greatest length that `LargestLink` bounds: of the links and, with target points, from B to P (m)."""
+        point = 0.0 if target_points(self.task) is None else self.linkage.point_distance
+        return max(self.linkage.largest_link, point)
 
     @property
     def direction(self) -> float:

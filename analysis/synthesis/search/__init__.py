@@ -1,4 +1,4 @@
-"""The search for linkages: a scan in closed form, least squares and a nonlinear program from its best, trade-offs.
+"""The search for linkages: a scan in closed form, then least squares and nonlinear programs; trade-offs.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

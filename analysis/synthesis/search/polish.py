@@ -1,4 +1,4 @@
-"""From starts to optima: SciPy's least squares where bounds are all that is asked, IPOPT where there are inequalities.
+"""Polishing of starts to optima: SciPy's least squares where there are only bounds, IPOPT where there are inequalities.
 
 Both have exact Jacobians. What is not a sum of squares is fitted by least squares first: an area, or the greatest distance of a
 path, then goes on in `analysis.synthesis.refine`, the greatest error at given stations as the least bound of all by IPOPT.
@@ -61,7 +61,7 @@ EXACT = 1e-14
 
 
 class _OneThread(ContextDecorator):
-    """Inside, linear algebra is on one thread, for as long as any of our own threads is inside.
+    """A context in which linear algebra runs on one thread, as long as any of our threads is in it.
 
     The last digits of a sum depend on how many threads share it, and where a slope is flat a search ends by these.
     """
@@ -87,7 +87,7 @@ ONE_THREAD = _OneThread()
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """The answers of all starts: those that keep every constraint, best first, and the others; the starts that keep them."""
+    """The answers of all starts: those that keep every constraint, best first, and the others; the feasible starts."""
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]
@@ -345,12 +345,12 @@ class Polisher:
         def solve(start: Start, places: Sequence[FloatArray] | None = None) -> Answer:
             return program.solve(start, size=size, places=places)
 
-        as_it_is = replace(answer, start=replace(answer.start, quality=size))
+        unchanged = replace(answer, start=replace(answer.start, quality=size))
         if self.normal.exact and size**2 < EXACT:
-            return as_it_is
+            return unchanged
         found = solve(answer.start)
         if not (found.feasible and found.start.quality < size):
-            return as_it_is
+            return unchanged
         return program.exact(found, solve)
 
     @property
@@ -451,9 +451,9 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
         return q, rotation0 if timed else x[size:]
 
     def value(x: FloatArray) -> FloatArray:
-        residual = residuals(normal, start.branch, *unpacked(x))[0]
-        # beyond the limit of assembly: farther than anything, so that the step is shortened
-        return residual if np.isfinite(residual).all() else np.full(len(residual), 1e3)
+        found = residuals(normal, start.branch, *unpacked(x))
+        # at the limit of assembly and beyond: farther than anything, so that the step is shortened
+        return found[0] if all(np.isfinite(part).all() for part in found) else np.full(len(found[0]), 1e3)
 
     def derivative(x: FloatArray) -> FloatArray:
         _, jacobian, rate = residuals(normal, start.branch, *unpacked(x))
@@ -465,7 +465,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
             own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
         return np.hstack([columns, own])
 
-    if not np.isfinite(residuals(normal, start.branch, *unpacked(x0))[0]).all():
+    if not all(np.isfinite(part).all() for part in residuals(normal, start.branch, *unpacked(x0))):
         return Answer.unjoined(start)
     result = least_squares(
         value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400

@@ -1,4 +1,4 @@
-"""The nonlinear program of a synthesis, evaluated and solved: exact derivatives by CasADi, IPOPT.
+"""The nonlinear program of a synthesis: evaluated with exact derivatives by CasADi, solved by IPOPT.
 
 `statement` says what is asked; here are its functions, the way from a start to unknowns and parameters, solving, and judging
 what came of it: whether the constraints are kept, of a moved pivot at the extremes of its motion.
@@ -134,7 +134,7 @@ class Program(Statement):
 
     @property
     def own(self) -> int:
-        """Place of the unknown that stands for the greatest value of what is made small in the place of an error."""
+        """Place of the unknown that stands for the greatest value of the function that is minimised instead of an error."""
         return len(self.low) - len(self._initial)
 
     def greatest(self, start: Start) -> float:
@@ -206,7 +206,7 @@ class Program(Statement):
         ----------
         start : Start
         size : float
-            Magnitude of the greatest error (units), where that is made small.
+            Magnitude of the greatest error (units), where that is minimised.
         iterations : int
             At most.
         pieces : sequence of int, optional

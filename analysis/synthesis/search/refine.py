@@ -1,4 +1,4 @@
-"""The last step of a path whose timing is free: the measure between the whole curves itself is made small.
+"""Refinement of untimed paths: the measure between the whole curves is minimised.
 
 Stations that are fitted in their order cannot cut a corner, and their squares are no area. Here the curve is the polygon by
 which it is judged, and the measure that of `areas`: the area of the symmetric difference, the strip along an open path, or the
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression, minimize
 
-from ..linkage.kernels import nearest, symmetric_difference
+from ...numerics.overlap import nearest, symmetric_difference
 from ..result.solution import CURVE
 from ..task.constraint import UNKNOWNS
 from ..task.target import TargetPath, hausdorff, ring
@@ -44,7 +44,7 @@ PHASE = UNKNOWNS.index("crank_phase")
 
 
 class Near(NamedTuple):
-    """Distances between points of curve and target, and what the curve's own points do to them.
+    """Distances between points of curve and target, and their derivatives by the curve's points.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Near(NamedTuple):
 
 
 class Refinement:
-    """The measure of a path, and the way down on it, of a program with the objective "curve"."""
+    """Minimisation of the measure of a path, for a program with the objective "curve"."""
 
     def __init__(self, program: Program) -> None:
         self.program, normal = program, program.normal
@@ -168,8 +168,8 @@ class Refinement:
         first = self.value(z0, parameters, curve)
         if not (np.isfinite(self.measure(curve)) and np.isfinite(slopes).all()):
             return replace(answer, feasible=False)
-        as_it_is = program.judged(z0, parameters, answer.start)
-        best = [(first if as_it_is.feasible else inf, z0)]
+        unchanged = program.judged(z0, parameters, answer.start)
+        best = [(first if unchanged.feasible else inf, z0)]
 
         def seen(z: FloatArray) -> None:
             value = self.value(z, parameters, down.curve(z)[0])
@@ -192,8 +192,8 @@ class Refinement:
             seen(down.unknowns(found.x))
         value, z = best[0]
         if not np.isfinite(value):
-            more = {} if self.limit is None or not as_it_is.feasible else program.excess(self.over(curve))
-            return replace(as_it_is, feasible=False, start=replace(answer.start, quality=first), **more)
+            more = {} if self.limit is None or not unchanged.feasible else program.excess(self.over(curve))
+            return replace(unchanged, feasible=False, start=replace(answer.start, quality=first), **more)
         ended = program.judged(z, parameters, answer.start)
         quality = value if self.limit is None else ended.start.quality
         start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=quality)
@@ -267,8 +267,9 @@ class Refinement:
 
 
 class _Descent:
-    """The measure as SLSQP takes it: over directions of the unknowns, in shares of what it was; of a bound of all distances
-    the bound besides.
+    """The problem that SLSQP solves: the measure over directions of the unknowns, as a share of its first value.
+
+    For the greatest distance the bound of all distances is one unknown more.
     """
 
     def __init__(
@@ -283,7 +284,7 @@ class _Descent:
         self._of, self._program = refinement, refinement.program
         self._z0, self._stretch, self._size = z0, size * stretch, size
         if refinement.limit is not None:
-            # what is made small is a direction of its own
+            # what is minimised is a direction of its own
             self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.own]])
         self._some = some
         self._held = refinement.normal.quality == "worst"

@@ -1,4 +1,4 @@
-"""The global scan: many thousand linkages, each placed as well as it can be in closed form.
+"""The global scan: many thousand linkages, each placed optimally in closed form.
 
 Variable projection: with the shape of the linkage (its links as shares of the ground link, of a slider-crank of the coupler, of
 a geared five-bar the second crank and its phase as well) and the crank's phase given, the
@@ -123,7 +123,19 @@ class _FiveBarShapes(_FourBarShapes):
 
     @staticmethod
     def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        return _turning(shapes, links, limits, least)
+        """Return which shapes keep it at `AROUND` rotations; few come to the last of these."""
+        turned = limits.gears
+        allowed = np.ones(len(shapes), dtype=bool)
+        for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
+            rows = np.flatnonzero(allowed)
+            l1, l2, l3, l4, l5 = links[rows].T
+            phi = 2.0 * pi * np.arange(begin, AROUND, step)[:, None] / AROUND
+            second = np.exp(1j * _second(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
+            off = l1 + second - l2 * np.exp(1j * turned[0] * phi)
+            d2 = off.real**2 + off.imag**2
+            for excess in Linkage.transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
+                allowed[rows] &= excess <= 0.0
+        return allowed
 
 
 _SHAPES: Mapping[Kind, type[_FourBarShapes]] = {
@@ -233,7 +245,7 @@ def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
 
 def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     """Return which shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
-    sized = _links(shapes, limits)
+    sized = _SHAPES[limits.linkage.kind].links(shapes, limits)
     links = sized[:, :4]
     allowed = np.ones(len(shapes), dtype=bool)
     if limits.turn is not None:
@@ -249,22 +261,6 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     least, most = _sizes(sized, limits)
     # links that are fixed leave one size but for rounding
     return allowed & (least <= most * (1.0 + 1e-9))
-
-
-def _turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-    """Return which geared five-bars keep the transmission angle at `AROUND` rotations; few come to the last ones."""
-    turned = limits.gears
-    allowed = np.ones(len(shapes), dtype=bool)
-    for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
-        rows = np.flatnonzero(allowed)
-        l1, l2, l3, l4, l5 = links[rows].T
-        phi = 2.0 * pi * np.arange(begin, AROUND, step)[:, None] / AROUND
-        second = np.exp(1j * _second(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
-        off = l1 + second - l2 * np.exp(1j * turned[0] * phi)
-        d2 = off.real**2 + off.imag**2
-        for excess in Linkage.transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
-            allowed[rows] &= excess <= 0.0
-    return allowed
 
 
 def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
@@ -294,7 +290,7 @@ def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, ran
         found = _paths(normal, limits, shapes, branch)
     if limits.second is None:
         return found
-    links = _links(shapes, limits)
+    links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     second = links[:, 4] * found.q[:, 4] / links[:, 2]
     return replace(found, pivot=np.column_stack([second, _second(shapes, found.q[:, 8], limits)]))
 
@@ -309,7 +305,7 @@ def _directions(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Compute the directions of coupler and rocker of shapes at crank rotations, after a rotation of each shape's own."""
     first, second = limits.gears
-    links = _links(shapes, limits)
+    links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
     rows = np.column_stack([links[:, :4], *phases])
     coupler = np.empty((len(shapes), len(rotation)), dtype=complex)
@@ -331,7 +327,7 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
         offset = np.angle((normal.weights * left).sum(axis=1))
         left *= np.exp(-1j * offset)[:, None]
     quality = (normal.weights * np.angle(left) ** 2).sum(axis=1)
-    links = _links(shapes, limits)
+    links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     least, most = _sizes(links, limits)
     size = np.sqrt(np.maximum(least, 1e-12) * most)
     q = np.zeros((len(shapes), 11))
@@ -345,7 +341,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
     assert normal.rotation is not None
     assert normal.points is not None
     phase = 2.0 * pi * shapes[:, 3]
-    links, w, x = _links(shapes, limits), normal.weights, normal.points.real
+    links, w, x = _SHAPES[limits.linkage.kind].links(shapes, limits), normal.weights, normal.points.real
     coupler, _ = _directions(shapes, phase, normal.rotation, branch, limits)
     travelled = links[:, 1:2] * np.sin(phase[:, None] + normal.rotation) + coupler.imag
     mean, wanted = travelled @ w / w.sum(), float(x @ w / w.sum())
@@ -369,7 +365,7 @@ def _timed(
 ) -> Candidates:
     """Place timed paths and motions by variable projection; without given rotations, over random ones in order."""
     phase = 2.0 * pi * shapes[:, 3]
-    links = _links(shapes, limits)
+    links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     n = normal.n
     if random is None:
         assert normal.rotation is not None
@@ -404,18 +400,8 @@ def _timed(
         left = np.exp(1j * (normal.angle - turn[:, None])) * coupler.conj()
         offset = np.angle((w * left).sum(axis=1))
         error = error + (normal.leverage * np.angle(left * np.exp(-1j * offset)[:, None])) ** 2
-    q = np.column_stack(
-        [
-            z[:, 0].real,
-            z[:, 0].imag,
-            bounded[:, None] * links[:, :4],
-            np.abs(z[:, 2]),
-            turn,
-            phase,
-            np.angle(z[:, 2]) - turn,
-            offset,
-        ]
-    )
+    lengths = [bounded[:, None] * links[:, :4], np.abs(z[:, 2])]
+    q = np.column_stack([z[:, 0].real, z[:, 0].imag, *lengths, turn, phase, np.angle(z[:, 2]) - turn, offset])
     return Candidates(
         quality=(w * error).sum(axis=1), q=q, rotation=None if random is None else rotation, branch=branch
     )
@@ -436,7 +422,7 @@ def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexAr
 
 def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
     """Place untimed paths: coupler curves laid over the target by a similarity."""
-    links = _links(shapes, limits)
+    links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
     coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
     # the coupler point anywhere about the coupler, evenly in the logarithm of its distance; of some on the crank pin itself,
@@ -553,19 +539,10 @@ def _bounded(
 def _vectors(
     links: FloatArray, size: FloatArray, scale: ComplexArray, place: ComplexArray, point: ComplexArray
 ) -> FloatArray:
-    turn = np.angle(scale)
-    zero = np.zeros(len(links))
-    columns = [
-        place.real,
-        place.imag,
-        size[:, None] * links[:, :4],
-        size * np.abs(point),
-        turn,
-        zero,
-        np.angle(point),
-        zero,
-    ]
-    return np.column_stack(columns)
+    """Return the unknowns of linkages, shape (m, 11), from sizes, scales, places and coupler points."""
+    zero, sized = np.zeros(len(links)), size[:, None] * links[:, :4]
+    angles = [np.angle(scale), zero, np.angle(point), zero]
+    return np.column_stack([place.real, place.imag, sized, size * np.abs(point), *angles])
 
 
 def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:

@@ -368,7 +368,7 @@ def make_solutions(
         )
         there = [s for s in found if isfinite(s.error)]
         if limits.least is not None:
-            # in the order of what is made small in the place of an error
+            # in the order of the function that is minimised instead of an error
             return tuple(sorted(there, key=lambda s: not s.verdicts.sound))
         return ranked(there)
 
@@ -411,12 +411,12 @@ def infeasible(done: Polished) -> InfeasibleError:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TradeOff:
-    """The least error over a limit that is tightened.
+    """The least error for each of several limits of size, transmission angle or pin force.
 
     Attributes
     ----------
     over : str
-        What it is over, of `OVER`.
+        The quantity whose limit is tightened, of `OVER`.
     limit : ndarray, shape (n,)
         Largest link (m), least transmission angle (rad), or greatest force on a pin (N).
     solutions : tuple of Solution or None
@@ -447,7 +447,7 @@ class TradeOff:
 
 
 class Over(NamedTuple):
-    """What an error is traded for: what its limit is, SI unit, and whether a small limit is the tight one."""
+    """The quantity that an error is traded for: name and SI unit of its limit, and whether a small limit is the tight one."""
 
     name: str
     unit: str

@@ -1,4 +1,4 @@
-"""How a search is done, and how its parts are spread over cores."""
+"""Settings of a search, its starts and answers in normal form, and its work spread over cores."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ...numerics.fourier import FourierSeries
-from ...numerics.workers import check_jobs, cores_of, interruptible, over_workers
+from ...numerics.workers import check_jobs, interruptible, over_workers, worker_count
 from ...run import shown
 from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
@@ -27,7 +27,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """How a search is done.
+    """Settings of a search.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Search:
     @property
     def cores(self) -> int:
         """Return the number of workers."""
-        return cores_of(self.n_jobs)
+        return worker_count(self.n_jobs)
 
 
 USUAL_SEARCH = Search()
@@ -94,7 +94,7 @@ AMPLITUDE = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
-    """Where a search starts, or ends, in normal form.
+    """A point at which a search starts or ends, in normal form.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Where an optimiser ended, whether every constraint is satisfied there, which is violated most, and its status.
+    """The end of an optimisation: its point, whether every constraint is kept, the worst violation, and the status.
 
     By how much it is, ``violation`` is in units, rad or shares of a bound, ``excess`` a text with its unit.
     """

@@ -1,4 +1,4 @@
-"""The statement of a synthesis as a nonlinear program, in CasADi's symbols: what is asked. `program` evaluates and solves it.
+"""The statement of a synthesis as a nonlinear program in CasADi's symbols; `program` evaluates and solves it.
 
 Loop closure is that of the plant, traced (`analysis.numerics.symbolic`). The program is stated in normal form (`tasks.Normal`,
 `constraints.Limits`); what a start decides - assembly, direction of travel, which triangle of a region, which link is the
@@ -39,14 +39,14 @@ LEAST_WAY = 1e-3
 GAP = 8.0
 #: Objectives in the place of an error.
 SOUGHT = ("least", "least curve")
-#: What the bound of the greatest error is called; share of it by which an error of zero has a slope.
+#: Name of the bound of the greatest error; share of it by which an error of zero has a slope.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
 #: Rotations beside the given ones at which what holds all along is held: its greatest values in the solution before.
 FURTHER = 8
 
 
 class Label(NamedTuple):
-    """Name of a constraint, and the factor and the unit in which it is written by how much it is violated."""
+    """Name of a constraint, with the factor and the unit in which its violation is written."""
 
     name: str
     factor: float
@@ -63,7 +63,7 @@ class Label(NamedTuple):
 
 
 class Statement:
-    """A synthesis stated as a nonlinear program: unknowns, objective and constraints, symbols all of them.
+    """A synthesis stated as a nonlinear program: symbols for unknowns, objective and constraints.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Statement:
         Weighted squared errors; the greatest weighted error, as the least bound of all; the least transmission angle, greatest,
         with the stations met exactly; or nothing but the constraints of a path, for `analysis.synthesis.refine`, whose measure
         needs no stations: of their rotations only the ends of an open path and of its straight part are unknown. The
-        last two are what the limits make small in the place of an error, with stations and without.
+        last two are the objective of the limits instead of an error, with stations and without.
     exact : bool
         Whether bounds of the pivot's motion can be held at its extremes, see `exact`; without, a first search is quicker.
     """
@@ -129,7 +129,7 @@ class Statement:
         quality = self._quality(p, v, phi, branch, size)
         tilt: Any = None
         if objective == "transmission":
-            # the largest |cos mu| of all, which is made small
+            # the largest |cos mu| of all, which is minimised
             tilt = self._extra("tilt", 0.0, 0.0, cos(TURNING))
             quality = tilt + 1e-3 * casadi.sumsqr(q[2:6])
         self._assembled(p, v, phi, tilt)

@@ -1,4 +1,4 @@
-"""What a linkage must satisfy besides tracing its target."""
+"""Constraints on a linkage: transmission angle, turning, size, regions, time ratio, pin forces, any function."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"]
 #: The unknowns of every linkage, in their order: `kernels.PLACES` and the output angle.
 UNKNOWNS = (*PLACES, "output_angle")
-#: What only a geared five-bar has, besides.
+#: Name of the further dimension of a geared five-bar.
 SECOND_LENGTH = "second_crank_length"
 #: Least transmission angle at which a crank still counts as turning fully (rad).
 TURNING = 0.002
@@ -199,7 +199,7 @@ class Along(Require):
 
 
 class Way(NamedTuple):
-    """Over what a constraint holds that is about the crank's rotation.
+    """The range of crank rotations over which a constraint holds.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ class Way(NamedTuple):
     straight : bool
         Whether the bounds hold the coupler point on the line of B and C.
     linkage : type
-        Whether it is about a slider-crank.
+        Type of the linkages.
     """
 
     turn: bool
@@ -236,21 +236,21 @@ class Way(NamedTuple):
 
 
 class Least(NamedTuple):
-    """What is made small in the place of an error: the greatest value of a function, the greatest error bounded (units)."""
+    """A function whose greatest value is minimised while the greatest error is bounded (units)."""
 
     along: Along
     error: float
 
 
 class Demand:
-    """A constraint that is functions of the dimensions kept below zero; `limit_positions` and `forces` have such."""
+    """A constraint stated as functions of the dimensions that are kept below zero."""
 
     __slots__ = ()
     #: Type of four-bar that it is about.
     grashof: ClassVar[GrashofType | None] = None
     #: Whether the crank then cannot turn fully.
     stops: ClassVar[bool] = False
-    #: Whether something is made small in the place of an error.
+    #: Whether something is minimised instead of an error.
     seeks: ClassVar[bool] = False
 
     def requires(self, way: Way) -> tuple[Require, ...]:
@@ -379,7 +379,7 @@ def _check_pins(pins: str) -> None:
 
 
 class _Forces(Demand):
-    """What the forces on the pins are about."""
+    """A constraint on the forces on the pins."""
 
     __slots__ = ()
     make: Make
@@ -443,7 +443,7 @@ class MaxPinForce(_Forces):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LeastPinForce(_Forces):
-    """Of the linkages whose greatest error stays below a bound, that whose pins carry least is sought.
+    """Minimise the pin forces, with the greatest error below a bound.
 
     Attributes
     ----------

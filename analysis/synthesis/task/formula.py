@@ -1,4 +1,4 @@
-"""Curves and functions of the crank angle from formulas, which are parsed, never run as code."""
+"""Formulas and requirements from text, which are parsed, never run as code; users' functions for CasADi's symbols."""
 
 from __future__ import annotations
 
@@ -347,7 +347,7 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
 
 
 class _Dimensions(ast.NodeTransformer):
-    """Names of dimensions become attributes of the argument, numbers floats."""
+    """Transformer that makes names of dimensions attributes of the argument, and numbers floats."""
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if node.id not in UNKNOWNS:

@@ -1,4 +1,4 @@
-"""Where a four-bar or a slider-crank stands still or cannot go on, and what its crank gains.
+"""Limit positions and mechanical advantage of four-bars and slider-cranks, as numbers and as constraints.
 
 In a dead centre crank and coupler lie in one line, and rocker or slider rest at the end of their travel; in a toggle coupler
 and rocker do, or the coupler is square to the guide, and the crank can go no farther. See R. L. Norton, Design of Machinery,

@@ -1,4 +1,4 @@
-"""What a linkage must satisfy besides tracing its target."""
+"""Bounds and constraints in normal form, for each kind of linkage that a task can be given to."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Limits:
     ratio : float
         Of its gears.
     least : Least, optional
-        What is made small in the place of an error.
+        The function that is minimised instead of an error.
     """
 
     low: FloatArray
@@ -158,7 +158,7 @@ def make_limits(
     over = Way(turn is not None, normal.rotation, straight, linkage)
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
     if len(least) > 1:
-        raise InputError("more than one thing is to be made small: a search has one objective")
+        raise InputError("more than one thing is to be minimised: a search has one objective")
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}
     if len(branches) > 1:
         raise InfeasibleError("both assemblies are asked for at once")

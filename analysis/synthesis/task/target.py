@@ -1,4 +1,4 @@
-"""What is to be traced: plane curves as points in m, from arrays or files.
+"""Targets: plane curves as points in m, and measures of how far a traced curve is from them.
 
 A curve is a polyline: its points joined by straight segments, the last one to the first if it is closed. Length, centroid,
 size and areas are exact for the polyline.
@@ -469,7 +469,7 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straightness:
-    """How straight and how long a part of a curve is.
+    """Length and flatness of a part of a curve.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a linkage is asked to do: tasks of synthesis, and their normal form.
+"""The tasks of synthesis, and their normal form.
 
 A task holds target values and weights. `Task.normal` puts it in the form that every method here works on: lengths in units
 of the target's size, about its centre, so that a watch and an excavator are the same problem.
@@ -130,7 +130,7 @@ class TimedPath:
     weights : ndarray, shape (n,)
         Of the squared distances.
     objective : "error" or "worst"
-        What is made small: the quality function, or the greatest error, times the root of its weight.
+        The objective: the quality function, or the greatest error, times the root of its weight.
     """
 
     points: ArrayLike
@@ -226,7 +226,7 @@ class UntimedPath:
     weights : ndarray, shape (number of the path's points,), optional
         Per point of ``path``; in between they are interpolated along it.
     objective : "error" or "worst"
-        What is made small: the quality function, or the Hausdorff distance between curve and path, in which weights do not
+        The objective: the quality function, or the Hausdorff distance between curve and path, in which weights do not
         count.
     """
 
@@ -264,7 +264,7 @@ class RockerFunction:
     mounting : bool
         Whether the output may be mounted on the rocker at any angle.
     objective : "error" or "worst"
-        What is made small: the quality function, or the greatest error, as in `TimedPath`.
+        The objective: the quality function, or the greatest error, as in `TimedPath`.
     """
 
     angle: ArrayLike
@@ -306,7 +306,7 @@ class Motion:
         only turns 50 mm.
     weights : ndarray, shape (n,)
     objective : "error" or "worst"
-        What is made small: the quality function, or the greatest error, place and angle together.
+        The objective: the quality function, or the greatest error, place and angle together.
     """
 
     points: ArrayLike
@@ -345,7 +345,7 @@ class PrecisionPoints:
     length : float, optional
         As in `Motion`.
     objective : "error" or "worst"
-        What is made small: the quality function, or the greatest error, where the points cannot be met.
+        The objective: the quality function, or the greatest error, where the points cannot be met.
     """
 
     points: ArrayLike
@@ -386,7 +386,7 @@ def _leverage(length: float | None, points: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Normal:
-    """A task in normal form: what is compared at n stations, in units of the target's size about its centre.
+    """A task in normal form: targets at n stations, in units of the target's size about its centre.
 
     Attributes
     ----------
