@@ -33,14 +33,14 @@ _RANGE = (0.15, 2.3)
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
     """Refuse a range that is none, in the words of the command line."""
-    from ..periodic import format_value, speed_name, unit_of
+    from ..periodic import format_value, speed_names, unit_of
 
     unit = unit_of(mechanism_of(parameters), name)
     options = first if first == last else f"{first} and {last}"
     if not low < high:
         span = f"from {format_value(name, low, unit)} to {format_value(name, high, unit)}"
         raise click.UsageError(f"{options}: {span}: it must increase")
-    if name == speed_name(mechanism_of(parameters)) and low <= 0.0:
+    if name in speed_names(mechanism_of(parameters)) and low <= 0.0:
         raise click.UsageError(f"{options}: it begins at {format_value(name, low, unit)}: speeds must be above zero")
 
 
@@ -104,12 +104,12 @@ def resonance(
     """
     from .. import figures
     from ..files import write_csv
-    from ..periodic import ResponseInterrupted, frequency_response, speed_name, unit_of, with_isolas
+    from ..periodic import ResponseInterrupted, frequency_response, speed_names, unit_of, with_isolas
     from ..youssef import approximations
 
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = mechanism_of(parameters)
-    over_speed = vary == speed_name(mechanism)
+    over_speed = vary in speed_names(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
@@ -161,11 +161,11 @@ def _natural(parameters: Any) -> float | None:
 
 def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None) -> tuple[float, float]:
     """The range to follow, by default about the natural frequency."""
-    from ..periodic import speed_name, unit_of
+    from ..periodic import speed_names, unit_of
 
     unit = unit_of(mechanism_of(parameters), vary)
     if natural is None and (low is None or high is None):
-        speed = vary == speed_name(mechanism_of(parameters))
+        speed = vary in speed_names(mechanism_of(parameters))
         why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
         raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     ends = [
@@ -294,7 +294,7 @@ def stability(
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
     mechanism = mechanism_of(parameters)
-    names = (x or speed_name(mechanism) or "drive.speed", y or damping_name(mechanism))
+    names = (x or speed_name(mechanism, drive) or "drive.speed", y or damping_name(mechanism))
     for name in (x, y):
         if name is not None:
             require_variable(parameters, drive, name)

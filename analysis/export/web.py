@@ -146,7 +146,7 @@ def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     accelerations, of = slopes[freedoms : 2 * freedoms], [run.x, run.u, run.p, motor]
     changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(of)]
     angle, k = sx.sym("angle"), sx.sym("k", len(mechanism.constants._fields))
-    resting = at_rest(mechanism, crank, other)(angle, k) if min(crank, other) >= 0 else (sx(0.0), sx(0.0))
+    resting = at_rest(mechanism, (crank,), other)(angle, k) if min(crank, other) >= 0 else (sx(0.0), sx(0.0))
     d_torque = casadi.jtimes(torque, join(motor, speed), join(d_motor, d_speed))
     return [
         ("motor", [motor, speed], torque),

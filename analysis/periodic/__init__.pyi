@@ -69,6 +69,7 @@ from .motion.variables import of_the_motor as of_the_motor
 from .motion.variables import plane as plane
 from .motion.variables import require_variable as require_variable
 from .motion.variables import speed_name as speed_name
+from .motion.variables import speed_names as speed_names
 from .motion.variables import unit_of as unit_of
 from .motion.variables import value_of as value_of
 from .motion.variables import variable_names as variable_names

@@ -45,17 +45,22 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
 
 
 @cache
-def at_rest(mechanism: Mechanism, crank: int, freedom: int) -> Any:
-    """(crank angle, constants) -> second derivatives of the energy by rate and by coordinate of a freedom, all at rest."""
+def at_rest(mechanism: Mechanism, cranks: tuple[int, ...], freedom: int) -> Any:
+    """Trace the second derivatives of the energy by rate and by coordinate of a freedom, all at rest.
+
+    The function takes the angle of each crank, and the constants.
+    """
     casadi = symbolic.library()
-    angle, s, v = (casadi.SX.sym(name) for name in ("angle", "s", "v"))
+    s, v, *angles = (casadi.SX.sym(name) for name in ("s", "v", *(f"angle{n}" for n in cranks)))
     p, k = constants(mechanism)
     x = [casadi.SX(0.0)] * mechanism.size
-    x[crank], x[freedom], x[len(mechanism.freedoms) + freedom] = angle, s, v
+    x[freedom], x[len(mechanism.freedoms) + freedom] = s, v
+    for crank, angle in zip(cranks, angles):
+        x[crank] = angle
     energy = traced(mechanism).of(mechanism.equations.energy)(tuple(x), k)
     seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
     resting = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
-    return casadi.Function("at_rest", [angle, p], resting)
+    return casadi.Function("at_rest", [*angles, p], resting)
 
 
 class OfParameters(NamedTuple):

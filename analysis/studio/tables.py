@@ -136,9 +136,11 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
 
 def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
     """What is given of a motor on the crank: the page's module has it beside what has a value reference, which are below 0."""
-    torque = crank_of(mechanism).torque if crank >= 0 else None
+    torque = crank_of(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
     if torque is None:
         return []
+    own = mechanism.channels[torque].name
+    numbers = {name: what for name, what in of_the_motor(mechanism).items() if name.startswith(f"{own}.")}
     return [
         {
             "name": name,
@@ -153,7 +155,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
             "kind": "motor",
             "file": field,
         }
-        for number, (name, (field, unit)) in enumerate(of_the_motor(mechanism).items())
+        for number, (name, (field, unit)) in enumerate(numbers.items())
     ]
 
 

@@ -28,7 +28,7 @@ from ..periodic import (
     passes,
     period_from,
     scale_of,
-    speed_name,
+    speed_names,
 )
 from .conditions import (
     Across,
@@ -474,7 +474,7 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
 
 def _nearest_start(wish: Wish, response: Response, level: float) -> FloatArray | None:
     """Return the start of the one-turn motion nearest to a level; None at a prescribed speed, which needs no guess."""
-    if wish.over == speed_name(wish.mechanism):
+    if wish.over in speed_names(wish.mechanism):
         return None
     known = [orbit for branch in response.branches if branch.turns == 1 for orbit in branch.orbits]
     return min(known, key=lambda orbit: abs(wish.level(orbit) - level)).start

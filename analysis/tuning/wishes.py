@@ -24,6 +24,7 @@ from ..periodic import (
     driving_names,
     require_variable,
     speed_name,
+    speed_names,
     unit_of,
     value_of,
     variable_names,
@@ -216,7 +217,7 @@ class Wish:
 
     def _required_over(self) -> str:
         """Return the name of the range's quantity after a check of the arguments about the range."""
-        speed = speed_name(self.mechanism)
+        speed = speed_name(self.mechanism, self.drive)
         if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
             raise InputError(
                 "give the range: either speeds of the crank, or over (a drive quantity) and between (its values)"
@@ -320,7 +321,7 @@ class Wish:
 
 
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
-    name = "speeds" if over == speed_name(mechanism) else over
+    name = "speeds" if over in speed_names(mechanism) else over
     low, high = (float(si(value, unit_of(mechanism, over), name)) for value in given)
     if not (isfinite(low) and isfinite(high) and low < high):
         raise ParameterError(name, list(given), "be a range: [least, greatest]")

@@ -17,10 +17,11 @@ curves of the ends of the range, limits of assembly, folds where the two partial
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import acos, atan2, hypot, isfinite, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -313,6 +314,15 @@ def _sampled(parameters: FiveBarParameters, low: float, high: float) -> NDArray[
     return np.concatenate(arcs) if arcs else np.empty((0, 2))
 
 
+class _Grid(NamedTuple):
+    """Square grid over the plane: the points that P can reach, and the test for any other points."""
+
+    xs: NDArray[np.float64]
+    ys: NDArray[np.float64]
+    inside: NDArray[np.bool_]
+    reaches: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.bool_]]
+
+
 def _trace(
     parameters: FiveBarParameters, slider_range: tuple[float, float], sample: NDArray[np.float64], cells: int
 ) -> tuple[list[NDArray[np.float64]], float]:
@@ -332,24 +342,19 @@ def _trace(
         margin *= 2.0
     i, j = ((sample - origin) / size).astype(int).T
     corners = inside[j, i] | inside[j + 1, i] | inside[j, i + 1] | inside[j + 1, i + 1]
-    return _rings(parameters, slider_range, inside, xs, ys), float(1.0 - corners.mean())
+    return _rings(_Grid(xs, ys, inside, partial(accessible, parameters, slider_range))), float(1.0 - corners.mean())
 
 
-def _rings(
-    parameters: FiveBarParameters,
-    slider_range: tuple[float, float],
-    inside: NDArray[np.bool_],
-    xs: NDArray[np.float64],
-    ys: NDArray[np.float64],
-) -> list[NDArray[np.float64]]:
+def _rings(grid: _Grid) -> list[NDArray[np.float64]]:
     """Return the closed boundaries, their vertices located on the edges of the grid by bisection."""
+    xs, ys, inside, reaches = grid
     heights = inside.astype(float)
     # if two diagonal corners of a cell are inside, its centre decides whether they connect: the contour uses their mean
     lower, upper = inside[:-1], inside[1:]
     across = (lower[:, :-1] == upper[:, 1:]) & (lower[:, 1:] == upper[:, :-1]) & (lower[:, :-1] != lower[:, 1:])
     j, i = np.nonzero(across)
     half = 0.5 * (xs[1] - xs[0])
-    joined = accessible(parameters, slider_range, xs[i] + half, ys[j] + half)
+    joined = reaches(xs[i] + half, ys[j] + half)
     for k in range(4):
         corner = j + k // 2, i + k % 2
         own = inside[corner] == joined
@@ -359,20 +364,14 @@ def _rings(
     lines = [np.round(line, 6)[:-1] for line in contours]
     if not lines:
         return []
-    vertices = _crossings(parameters, slider_range, inside, xs, ys, np.concatenate(lines))
+    vertices = _crossings(grid, np.concatenate(lines))
     rings = np.split(vertices, np.cumsum([len(line) for line in lines])[:-1])
     return sorted(rings, key=lambda ring: (-abs(_signed_area(ring)), *ring[0]))
 
 
-def _crossings(
-    parameters: FiveBarParameters,
-    slider_range: tuple[float, float],
-    inside: NDArray[np.bool_],
-    xs: NDArray[np.float64],
-    ys: NDArray[np.float64],
-    between: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _crossings(grid: _Grid, between: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the points of the boundary between neighbours of the grid; ``between`` has fractional indices, (k, 2)."""
+    xs, ys, inside, reaches = grid
     (i, j), (far_i, far_j) = np.floor(between).astype(int).T, np.ceil(between).astype(int).T
     first = np.column_stack([xs[i], ys[j]])
     second = np.column_stack([xs[far_i], ys[far_j]])
@@ -380,7 +379,7 @@ def _crossings(
     good, bad = np.where(swap, second, first), np.where(swap, first, second)
     for _ in range(BISECTIONS):
         middle = 0.5 * (good + bad)
-        keep = accessible(parameters, slider_range, middle[:, 0], middle[:, 1])[:, None]
+        keep = reaches(middle[:, 0], middle[:, 1])[:, None]
         good, bad = np.where(keep, middle, good), np.where(keep, bad, middle)
     return good
 

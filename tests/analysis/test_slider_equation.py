@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -283,23 +284,19 @@ class TestGeneralMechanism:
 class TestErrors:
     """What is refused."""
 
-    @pytest.mark.parametrize("speed", [0.0, -3.0, float("nan"), float("inf")])
-    def test_speed(self, speed: float) -> None:
-        with pytest.raises(InputError, match="crank speed"):
-            slider_equation(TABLE_3_1, speed)
-
-    def test_coulomb_friction(self) -> None:
-        with pytest.raises(InputError, match="coulomb_friction"):
-            slider_equation(replace(TABLE_3_1, slider_coulomb_friction=0.1), 44.0)
-
-    @pytest.mark.parametrize("name", ["slider_friction_coefficient", "pin_C_friction_radius"])
-    def test_friction_by_contact_forces(self, name: str) -> None:
-        with pytest.raises(InputError, match=r"pin\.\*_friction_radius must be 0: a linear equation cannot hold them"):
-            slider_equation(replace(TABLE_3_1, **{name: 0.01}), 44.0)
-
-    def test_order_of_a_taylor_variant(self) -> None:
-        with pytest.raises(InputError, match="first order"):
-            slider_equation(TABLE_3_1, 44.0, variant=Variant.FIRST_ORDER, order=2)
+    @pytest.mark.parametrize(
+        ("changes", "speed", "options", "named"),
+        [
+            *(({}, speed, {}, "crank speed") for speed in (0.0, -3.0, float("nan"), float("inf"))),
+            ({"slider_coulomb_friction": 0.1}, 44.0, {}, "coulomb_friction"),
+            ({"slider_friction_coefficient": 0.01}, 44.0, {}, r"slider\.friction_coefficient"),
+            ({"pin_C_friction_radius": 0.01}, 44.0, {}, r"pin\.\*_friction_radius"),
+            ({}, 44.0, {"variant": Variant.FIRST_ORDER, "order": 2}, "first order"),
+        ],
+    )
+    def test_arguments(self, changes: dict[str, Any], speed: float, options: dict[str, Any], named: str) -> None:
+        with pytest.raises(InputError, match=named):
+            slider_equation(replace(TABLE_3_1, **changes), speed, **options)
 
     def test_links_that_do_not_join(self) -> None:
         short = replace(TABLE_3_1, coupler_length=0.03)

@@ -27,7 +27,7 @@ from ...units import RAD_S_PER_RPM, Amount, si
 from ..motion.drive import Drive, published_drive
 from ..motion.floquet import Crossing
 from ..motion.orbit import PeriodicOrbit
-from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
+from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, speed_names, unit_of, value_of
 from ..response.branch import distance
 from ..response.frequency import first_freedom, natural_frequency
 from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
@@ -262,7 +262,7 @@ def stability_chart(
     mechanism = mechanism_of(parameters)
     if drive is None:
         raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
-    names = names or (speed_name(mechanism) or "drive.speed", damping_name(mechanism))
+    names = names or (speed_name(mechanism, drive) or "drive.speed", damping_name(mechanism))
     spans = tuple(
         default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
         for n, name in enumerate(names)
@@ -512,7 +512,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
         If there is no value, or no such axis.
     """
     require_variable(parameters, drive, name)
-    if name == speed_name(mechanism_of(parameters)):
+    if name in speed_names(mechanism_of(parameters)):
         try:
             natural = natural_frequency(parameters)
         except ParameterError:

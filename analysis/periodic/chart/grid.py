@@ -84,8 +84,10 @@ def largest_multipliers(
     """
     points = [operating_point(parameters, drive) for parameters, drive in zip(rows, drives)]
     flow = points[0].flow
-    if any(point.flow.modes != flow.modes for point in points):
-        raise InputError("a row has both drives by speed and by torque, or other modes: it must have one kind")
+    if any(point.flow is not flow for point in points):
+        raise InputError(
+            "a row has both drives by speed and by torque, or other modes or ratios: it must have one kind"
+        )
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([first_guess(flow, drives[0], guess) for guess in given])
     return _solve_row(points, starting, tolerance, turns)

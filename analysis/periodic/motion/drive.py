@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
+from fractions import Fraction
 from functools import cache
-from math import isfinite, pi
+from math import isfinite, lcm, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,10 @@ from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ...run import InductionMotor, Inputs, driven, given, started, takes_published
 from ...units import Amount, in_si
-from .flow import Flow, crank_of, flow
+from .flow import Crank, Flow, crank_of, flow
+
+#: Turns, at most, that one crank makes while another makes whole turns: beyond that they have no common period to speak of.
+MOST_TURNS = 100
 
 #: A torque on the crank: constant, a motor's, or both.
 Torque = float | InductionMotor | Sequence[float | InductionMotor]
@@ -35,10 +39,25 @@ class VaryingInputError(InputError):
         )
 
 
-@in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units)
+def _ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
+    """Return the ratio of two speeds as a fraction of whole numbers; raise InputError if it is none."""
+    ratio = Fraction(value / speed).limit_denominator(MOST_TURNS)
+    if abs(ratio * speed - value) > 1e-9 * abs(value) or (value != 0.0 and ratio == 0):
+        raise InputError(
+            f"{reference} = {speed:.9g} rad/s and {name} = {value:.9g} rad/s have no common period: their ratio is "
+            f"{value / speed:.9g}, and must be a fraction of whole numbers up to {MOST_TURNS}"
+        )
+    return ratio
+
+
+@in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units, speeds=variable_units)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """What drives a mechanism over an orbit: a speed of its cyclic freedom, the crank, or a torque on it; all else constant.
+    """What drives a mechanism over a periodic motion: speeds of its cranks or torques on them; all else is constant.
+
+    Of a mechanism with one crank, ``speed``, ``torque`` and ``motor`` are of this crank. Of one with several, ``speeds`` gives
+    all that are commanded; they keep their ratios where the speed varies. Where none is commanded, ``crank`` names the one
+    that ``torque`` and ``motor`` drive; torques on others are among ``forces`` and ``motors``.
 
     Attributes
     ----------
@@ -49,17 +68,31 @@ class Drive:
     motor : InductionMotor or None
         A motor whose torque is added.
     forces : mapping of str to float
-        Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N).
+        Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N), and torques on other
+        cranks (N.m).
     held : mapping of str to float
-        Coordinates of freedoms that are held, by their FMI names, such as ``shift.position``; 0 where they are left out.
+        Coordinates of freedoms that are held, by their FMI names, such as ``shift.position``, and of other commanded cranks
+        where the angle of the crank is 0; 0 where they are left out.
     modes : mapping of str to int
         Modes of other freedoms than the crank, by name, such as ``axial.mode``. Without it a freedom with a mode is free where
-        its force is among ``forces``, be it 0, and else in its default mode.
+        its force is among ``forces``, be it 0, commanded where it is a crank with a ratio, and else in its default mode.
+    crank : str
+        FMI name of the crank of ``speed``, ``torque`` and ``motor``: its coordinate, commanded speed or torque; follows from
+        ``speeds``, and may be left out where there is one crank.
+    ratios : mapping of str to Fraction
+        Turns of other cranks for each turn of the crank, by their FMI names; follow from ``speeds``. A crank that is
+        neither free nor among them is held.
+    motors : mapping of str to InductionMotor
+        Motors on other cranks by the FMI names of the torques.
+    speeds : mapping of str to float, optional
+        Prescribed speeds of all commanded cranks (rad/s) by the FMI names of their inputs, such as ``{"left.speed": 40.0,
+        "right.speed": -80.0}``; the first above zero is ``speed``.
 
     Raises
     ------
     InputError
-        If a value is not finite, the speed is not above zero, or there are both a speed and a torque.
+        If a value is not finite, the speed is not above zero, there are both a speed and a torque, or speeds have no common
+        period.
     """
 
     speed: Amount = None
@@ -68,8 +101,27 @@ class Drive:
     forces: Mapping[str, Amount] = field(default_factory=dict)
     held: Mapping[str, Amount] = field(default_factory=dict)
     modes: Mapping[str, int] = field(default_factory=dict)
+    crank: str = ""
+    ratios: Mapping[str, Any] = field(default_factory=dict)
+    motors: Mapping[str, InductionMotor] = field(default_factory=dict)
+    speeds: InitVar[Mapping[str, Amount] | None] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, speeds: Mapping[str, Any] | None) -> None:
+        if speeds:
+            if self.speed is not None:
+                raise InputError("both speed and speeds are given: speeds has those of all commanded cranks")
+            known = {name: value for name, value in speeds.items() if isfinite(value)}
+            first = next((name for name, value in known.items() if value > 0.0), None)
+            if first is None or len(known) < len(speeds):
+                raise InputError(f"speeds are {dict(speeds)} rad/s: they must be finite, and one of them above zero")
+            ratios = {name: _ratio(name, v, first, speeds[first]) for name, v in speeds.items() if name != first}
+            for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
+                object.__setattr__(self, name, value)
+        if self.ratios:
+            ratios = {
+                n: r if isinstance(r, Fraction) else _ratio(n, float(r), "crank", 1.0) for n, r in self.ratios.items()
+            }
+            object.__setattr__(self, "ratios", ratios)
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
             raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero")
         for name, value in {"torque": self.torque, **self.forces, **self.held}.items():
@@ -85,30 +137,60 @@ class Drive:
         """Whether the speed is prescribed."""
         return self.speed is not None
 
+    def reference(self, mechanism: Mechanism) -> Crank:
+        """Return the crank whose angle is the independent variable: that of ``speed``, ``torque`` and ``motor``.
+
+        Raises
+        ------
+        InputError
+            If the mechanism has no crank, or several and ``crank`` names none.
+        """
+        return crank_of(mechanism, self.crank)
+
+    def turning(self, mechanism: Mechanism) -> dict[int, Fraction]:
+        """Return the ratios of the other cranks by the numbers of their freedoms."""
+        return {crank_of(mechanism, name).freedom: ratio for name, ratio in self.ratios.items()}
+
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
-        """What drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`.
+        """Return what drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`.
 
         Raises
         ------
         InputError
             If a mode is not one of a freedom beside the crank, or has no such value.
         """
-        return _arguments(mechanism, self.speed_drive, tuple(self.forces), tuple(self.modes.items()))
+        return _arguments(
+            mechanism,
+            self.reference(mechanism).freedom,
+            self.speed_drive,
+            (*self.forces, *self.motors),
+            tuple(self.turning(mechanism)),
+            tuple(self.modes.items()),
+        )
 
     def flow(self, mechanism: Mechanism) -> Flow:
-        """The mechanism's flow, driven in this way.
+        """Return the mechanism's flow, driven in this way.
 
         Raises
         ------
         InputError
             If the mechanism cannot be driven so, or nothing of it is free.
         """
-        crank = crank_of(mechanism)
+        crank, ratios = self.reference(mechanism), self.turning(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
             what = "speed of" if self.speed_drive else "torque on"
             raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
         chosen = self.arguments(mechanism)
-        made = flow(mechanism, tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes))
+        modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
+        made = flow(mechanism, modes, crank.freedom, lcm(*(ratio.denominator for ratio in ratios.values())))
+        for number in made.others:
+            name = mechanism.freedoms[number].coordinate
+            if number in made.free and number not in ratios:
+                raise InputError(
+                    f"{name} is free: say how often it turns for each turn of the crank, ratios = {{{name!r}: 1}}"
+                )
+            if number in ratios and number not in (*made.free, *made.commanded):
+                raise InputError(f"{name} has a ratio, but is neither commanded nor free")
         if made.size == 0:
             raise InputError(
                 f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque, or another freedom by "
@@ -117,7 +199,7 @@ class Drive:
         return made
 
     def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
-        """The numbers of the drive, as `kernels.Section` has them.
+        """Return the numbers of the drive: channels, motors, held coordinates, ratios; see `Flow`.
 
         Raises
         ------
@@ -126,10 +208,13 @@ class Drive:
         InputError
             If a force does not act, or a coordinate is not one that is held.
         """
-        crank, numbers = crank_of(mechanism), {c.name: n for n, c in enumerate(mechanism.channels)}
+        made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.turning(mechanism)
+        numbers = {c.name: n for n, c in enumerate(mechanism.channels)}
         u = np.zeros(len(numbers))
         if self.speed is not None and crank.command is not None:
             u[crank.command] = self.speed
+            for number, channel in made.commanded.items():
+                u[channel] = ratios.get(number, Fraction(0)) * self.speed
         elif crank.torque is not None:
             u[crank.torque] = self.torque
         forces = forces_of(mechanism)
@@ -138,28 +223,41 @@ class Drive:
                 raise unknown_name(name, forces)
             require_acting(self, mechanism, forces[name])
             u[numbers[name]] = value
-        motor = (0.0, 1.0, 1.0)
-        if self.motor is not None:
-            motor = (self.motor.breakdown_torque, self.motor.breakdown_slip, self.motor.synchronous_speed)
-        free = self.flow(mechanism).free
+        motors = []
+        for channel in mechanism.torques:
+            name = mechanism.channels[channel].name
+            motor = self.motor if channel == crank.torque else self.motors.get(name)
+            if motor is not None:
+                require_acting(self, mechanism, mechanism.channels[channel])
+            motors += (
+                [0.0, 1.0, 1.0]
+                if motor is None
+                else [motor.breakdown_torque, motor.breakdown_slip, motor.synchronous_speed]
+            )
+        if wrong := [name for name in self.motors if numbers.get(name) not in mechanism.torques]:
+            raise unknown_name(wrong[0], [mechanism.channels[n].name for n in mechanism.torques])
         coordinates = [f.coordinate for f in mechanism.freedoms]
         for name in self.held:
-            if name not in coordinates or coordinates.index(name) in (crank.freedom, *free):
+            if name not in coordinates or coordinates.index(name) in (crank.freedom, *made.free):
                 raise InputError(f"{name} is no coordinate of the {mechanism.name} that is held in this drive")
-        return np.array([*u, *motor, *(self.held.get(name, 0.0) for name in coordinates)])
+        held = (self.held.get(name, 0.0) for name in coordinates)
+        return np.array([*u, *motors, *held, *(float(ratios.get(n, 0)) for n in made.others)])
 
     def inputs(self, mechanism: Mechanism) -> Inputs:
-        """The inputs of a run that drive the mechanism in this way."""
-        crank = crank_of(mechanism)
+        """Return the inputs of a run that drive the mechanism in this way."""
+        made, crank, ratios = self.flow(mechanism), self.reference(mechanism), self.turning(mechanism)
+        names = [c.argument for c in mechanism.channels]
         acting: dict[str, Any] = {c.argument: self.forces[c.name] for c in mechanism.channels if c.name in self.forces}
-        if self.speed_drive:
-            acting[mechanism.channels[crank.command or 0].argument] = self.speed
+        for channel in mechanism.channels:
+            if channel.name in self.motors:
+                acting[channel.argument] = (acting.get(channel.argument, 0.0), self.motors[channel.name])
+        if self.speed is not None:
+            acting[names[crank.command or 0]] = self.speed
+            acting |= {names[n]: float(ratios.get(i, Fraction(0)) * self.speed) for i, n in made.commanded.items()}
         else:
-            torque = self.torque if self.motor is None else (self.torque, self.motor)
-            acting[mechanism.channels[crank.torque or 0].argument] = torque
-        known = {c.argument for c in mechanism.channels}
+            acting[names[crank.torque or 0]] = self.torque if self.motor is None else (self.torque, self.motor)
         for argument in self.arguments(mechanism).values():
-            acting.setdefault(argument, 0.0 if argument in known else True)
+            acting.setdefault(argument, 0.0 if argument in names else True)
         return Inputs(**acting)
 
 
@@ -172,11 +270,16 @@ class Direction(NamedTuple):
 
 @cache
 def _arguments(
-    mechanism: Mechanism, speed_drive: bool, forces: tuple[str, ...], modes: tuple[tuple[str, int], ...]
+    mechanism: Mechanism,
+    crank: int,
+    speed_drive: bool,
+    acting: tuple[str, ...],
+    turning: tuple[int, ...],
+    modes: tuple[tuple[str, int], ...],
 ) -> Mapping[str, str]:
-    """See `Drive.arguments`, which is asked again and again along a branch."""
-    found, crank, own = {}, crank_of(mechanism), dict(modes)
-    others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank.freedom}
+    """Return `Drive.arguments`, which is asked for again and again along a branch."""
+    found, own = {}, dict(modes)
+    others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank}
     for name, value in modes:
         if name not in others or value not in range(len(others[name].values)):
             raise InputError(f"{name} = {value} is no mode of a {mechanism.name} that a drive can have")
@@ -186,18 +289,21 @@ def _arguments(
         if mode.name in own:
             found[mode.name] = mode.arguments[own[mode.name]]
             continue
-        kind = "command" if number == crank.freedom and speed_drive else "force"
-        channel = next((c for c in mechanism.channels if c.freedom == number and c.kind == kind), None)
-        acts = channel is not None and (number == crank.freedom or channel.name in forces)
-        found[mode.name] = channel.argument if acts and channel else mode.arguments[mode.default]
+        names = {c.kind: c for c in mechanism.channels if c.freedom == number}
+        kind = "command" if number == crank and speed_drive else "force"
+        acts = kind in names and (number == crank or names[kind].name in acting)
+        if not acts and number in turning:
+            # a crank that nothing drives follows, where its speed can be commanded
+            kind, acts = ("command", True) if "command" in names else (kind, kind in names)
+        found[mode.name] = names[kind].argument if acts else mode.arguments[mode.default]
     return found
 
 
 @cache
 def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
-    """The inputs of a mechanism that are forces, but for the crank's torque, by FMI name."""
-    crank = crank_of(mechanism).freedom
-    return {c.name: c for c in mechanism.channels if c.kind == "force" and c.freedom != crank}
+    """Return the inputs of a mechanism that are forces, but for the torque on its crank if it has one, by FMI name."""
+    crank = mechanism.cyclic[0] if len(mechanism.cyclic) == 1 else -1
+    return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
 
 
 def _forces(mechanism: Mechanism) -> str:
@@ -217,7 +323,7 @@ def _value(mode: Mode, argument: str) -> str:
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """A drive that is given, or else that of a published set: its crank speed, what is held as it is at the start."""
+    """Return the drive that is given, or else that of a published set, with what is held as it is at the start."""
     return drive or drive_of(known.parameters, driven(known, None), known.initial)
 
 
@@ -240,7 +346,7 @@ def drive_of(
     initial : state at the start, optional
         Where freedoms that are neither free nor the crank's are held.
     speed, torque : optional
-        In the place of what drives the crank in the inputs.
+        In the place of what drives the crank in the inputs; other commanded cranks keep their ratios to it.
 
     Raises
     ------
@@ -251,22 +357,27 @@ def drive_of(
     """
     mechanism = mechanism_of(parameters)
     inputs, initial = given(mechanism, inputs, initial)
-    crank = crank_of(mechanism)
+    modes = inputs.modes(mechanism)
+    crank, ratios = _turning(mechanism, inputs, initial, modes)
     constant: dict[str, float] = {}
     motors: list[InductionMotor] = []
+    others: dict[str, InductionMotor] = {}
     for number, channel in enumerate(mechanism.channels):
         if channel.freedom == crank.freedom and (speed is not None or torque is not None):
             continue
         for part in inputs.parts(channel.argument) if channel.kind != "rate" else ():
             if isinstance(part, InductionMotor) and number == crank.torque:
                 motors.append(part)
+            elif isinstance(part, InductionMotor) and number in mechanism.torques:
+                others[channel.name] = part
             elif isinstance(part, (int, float, np.floating, np.integer)):
                 constant[channel.name] = constant.get(channel.name, 0.0) + float(part)
             else:
                 raise VaryingInputError(channel.argument, part)
     named = [None if n is None else mechanism.channels[n].name for n in (crank.command, crank.torque)]
     for channel in mechanism.channels:
-        if channel.kind == "command" and channel.name != named[0] and constant.get(channel.name, 0.0) != 0.0:
+        turns = channel.freedom in mechanism.cyclic
+        if channel.kind == "command" and not turns and constant.get(channel.name, 0.0) != 0.0:
             raise InputError(
                 f"{channel.argument} is {constant[channel.name]}: a motion that goes on so is not periodic"
             )
@@ -274,17 +385,49 @@ def drive_of(
     motors += [part for part in parts if isinstance(part, InductionMotor)]
     if len(motors) > 1:
         raise InputError(f"{len(motors)} motors: an orbit has one at most")
-    modes = inputs.modes(mechanism)
-    free = flow(mechanism, tuple(modes.values())).free
-    other = [f for n, f in enumerate(mechanism.freedoms) if n not in (crank.freedom, *free)]
+    free = flow(mechanism, tuple(modes.values()), crank.freedom).free
+    other = {n: f for n, f in enumerate(mechanism.freedoms) if n not in (crank.freedom, *free)}
+    angle = float(getattr(initial, mechanism.freedoms[crank.freedom].initial[0]))
+    coordinate = {n: f.coordinate for n, f in enumerate(mechanism.freedoms)}
+    several = len(mechanism.cyclic) > 1
     return Drive(
         speed=constant.get(named[0] or "") if speed is None else speed,
         torque=constant.get(named[1] or "", 0.0) + sum(float(p) for p in parts if not isinstance(p, InductionMotor)),
         motor=motors[0] if motors else None,
-        forces={name: constant[name] for name in forces_of(mechanism) if name in constant},
-        held={f.coordinate: float(getattr(initial, f.initial[0])) for f in other},
-        modes={f.mode.name: modes[f.mode.name] for f in other if f.mode is not None},
+        forces={name: constant[name] for name in forces_of(mechanism) if name in constant and name != named[1]},
+        held={f.coordinate: float(getattr(initial, f.initial[0])) - ratios.get(n, 0) * angle for n, f in other.items()},
+        modes={f.mode.name: modes[f.mode.name] for f in other.values() if f.mode is not None},
+        crank=coordinate[crank.freedom] if several else "",
+        ratios={coordinate[n]: ratio for n, ratio in ratios.items()},
+        motors=others,
     )
+
+
+def _turning(
+    mechanism: Mechanism, inputs: Inputs, initial: InitialState, modes: Mapping[str, int]
+) -> tuple[Crank, dict[int, Fraction]]:
+    """Return the crank whose angle is the independent variable under the inputs of a run, and the ratios of the others.
+
+    It is the first crank that is commanded to turn forward, or else the first. A free crank has the ratio of the speeds at
+    the start, to the nearest whole number.
+    """
+    if len(mechanism.cyclic) < 2:
+        return crank_of(mechanism), {}
+    commanded = {mechanism.channels[n].freedom: mechanism.channels[n] for n in mechanism.commands(modes)}
+    speeds = {n: sum(inputs.constants([commanded[n].argument]) or [0.0]) for n in mechanism.cyclic if n in commanded}
+    first = next((n for n, speed in speeds.items() if speed > 0.0), mechanism.cyclic[0])
+    crank = crank_of(mechanism, mechanism.freedoms[first].coordinate)
+    start = {n: float(getattr(initial, mechanism.freedoms[n].initial[1])) for n in mechanism.cyclic}
+    speed = speeds.get(first) or start[first]
+    ratios = {}
+    for n in mechanism.cyclic:
+        if n != first and n in speeds:
+            ratios[n] = (
+                _ratio(commanded[n].name, speeds[n], commanded[first].name, speed) if first in speeds else Fraction(0)
+            )
+        elif n != first and speed != 0.0:
+            ratios[n] = Fraction(round(start[n] / speed))
+    return crank, ratios
 
 
 #: Distance of two starts, relative to the scale, below which they are of one motion.

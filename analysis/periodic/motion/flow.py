@@ -22,7 +22,7 @@ _NAMES = ("plain", "variational", "directional", "gap", "state")
 
 
 class Crank(NamedTuple):
-    """The cyclic freedom of a mechanism: its number, and those of the channels of its rate and of the torque on it, or None."""
+    """A freedom that turns: its number, and those of the channels of its rate and of the torque on it, or None."""
 
     freedom: int
     command: int | None
@@ -30,42 +30,76 @@ class Crank(NamedTuple):
 
 
 @cache
-def crank_of(mechanism: Mechanism) -> Crank:
-    """The cyclic freedom of a mechanism.
+def cranks_of(mechanism: Mechanism) -> tuple[Crank, ...]:
+    """Return all freedoms of a mechanism that turn."""
+    return tuple(Crank(n, mechanism.channel(n, "command"), mechanism.channel(n, "force")) for n in mechanism.cyclic)
+
+
+@cache
+def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
+    """Return the crank of a mechanism, of several the one of a name.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    name : str
+        FMI name of the coordinate of the crank, of its commanded speed or of the torque on it; may be left out where there is
+        one crank.
 
     Raises
     ------
     InputError
-        If it has none.
+        If the mechanism has no crank, several and no name is given, or none of that name.
     """
-    number = next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), None)
-    if number is None:
+    cranks = cranks_of(mechanism)
+    if not cranks:
         raise InputError(f"a {mechanism.name} has no freedom that turns: it has no periodic motions over an angle")
+    if len(cranks) == 1 and not name:
+        return cranks[0]
+    for crank in cranks:
+        if name in _names(mechanism, crank):
+            return crank
+    names = ", ".join(_names(mechanism, crank)[0] for crank in cranks)
+    said = f"{name!r} is none of them" if name else "name one"
+    raise InputError(
+        f"a {mechanism.name} has the cranks {names}: {said}, or give all commanded speeds, as speeds = {{NAME: VALUE, ...}}"
+    )
 
-    def channel(kind: str) -> int | None:
-        found = (n for n, c in enumerate(mechanism.channels) if c.kind == kind and c.freedom == number)
-        return next(found, None)
 
-    return Crank(number, channel("command"), channel("force"))
+def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
+    """Return the FMI names of a crank's coordinate, commanded speed and torque."""
+    channels = [mechanism.channels[n].name for n in (crank.command, crank.torque) if n is not None]
+    return [mechanism.freedoms[crank.freedom].coordinate, *channels]
 
 
 class Flow:
     """A mechanism as a flow over its crank's angle, driven in one way.
+
+    Other cranks turn with a ratio to it: a commanded one exactly, one under a torque on average. Of the latter, y has the
+    angle less the ratio times the angle of the crank, so that y repeats itself.
 
     Parameters
     ----------
     mechanism : Mechanism
     modes : tuple of int
         Values of its modes.
+    crank : int
+        Number of the freedom that turns whose angle is the independent variable.
+    base : int
+        Turns of the crank after which all cranks have made whole turns.
 
     Attributes
     ----------
-    crank : int
-        Number of the cyclic freedom.
+    others : tuple of int
+        Numbers of the other freedoms that turn.
     free : tuple of int
-        Numbers of the other freedoms that are part of y; what is commanded is held where it is.
+        Numbers of the other freedoms that are part of y; what is commanded without a ratio is held where it is.
     torque : bool
         Whether the crank's rate is part of y.
+    motors : int
+        Place of the motors' numbers in those of the drive, after the channels: three for each of `Mechanism.torques`.
+    held : int
+        Place of the coordinates of what is held, or has a ratio, at the crank angle 0; after them the ratios of ``others``.
     components : tuple of (str, str)
         FMI names and units of y.
     labels : tuple of str
@@ -76,18 +110,22 @@ class Flow:
         Number of components of y.
     """
 
-    def __init__(self, mechanism: Mechanism, modes: tuple[int, ...]) -> None:
+    def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int) -> None:
         self.mechanism = mechanism
         self.modes = modes
-        self.crank = crank_of(mechanism).freedom
+        self.crank = crank
+        self.base = base
+        self.others = tuple(n for n in mechanism.cyclic if n != crank)
         by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
         commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
         forced = {c.argument for c in mechanism.channels if c.kind == "force"}
         self.command = commanded.get(self.crank)
+        self.commanded = {n: commanded[n] for n in self.others if n in commanded}
         self.free = tuple(
             n
             for n, freedom in enumerate(mechanism.freedoms)
             if n != self.crank
+            and n not in commanded
             and (freedom.mode is None or freedom.mode.arguments[by_name[freedom.mode.name]] in forced)
         )
         self.torque = self.command is None
@@ -105,16 +143,16 @@ class Flow:
         self.labels = (*labels, *[label(variables[crank_rate])] * self.torque)
         self.components = tuple((name, variables[name].unit) for name in names)
         self.size = len(names)
-        #: numbers of the channels of the drive, and of motor and held coordinates after them
-        self.inputs = len(mechanism.channels)
-        self.drive_size = self.inputs + len(MOTOR) + len(mechanism.freedoms)
+        self.inputs = self.motors = len(mechanism.channels)
+        self.held = self.motors + len(MOTOR) * len(mechanism.torques)
+        self.drive_size = self.held + rates + len(self.others)
         self._code: dict[tuple[bool, int], MachineCode] = {}
         self._addresses: NDArray[np.int64] = np.zeros((2, len(_NAMES)), dtype=np.int64)
 
     @property
     def period(self) -> float:
-        """Angle of one turn (rad)."""
-        return self.mechanism.freedoms[self.crank].period
+        """Angle of the crank (rad) over the common period of all cranks: of one crank, that of a turn."""
+        return self.mechanism.freedoms[self.crank].period * self.base
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
         """Addresses of the machine code, of the functions of those numbers at least, with the mechanism's switch on or off."""
@@ -133,15 +171,29 @@ class Flow:
         return " ".join(self._code[switched, n].fingerprint for n in which)
 
     def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[float, ...]:
-        """State of a run at the crank angle 0, from y and the numbers of the drive."""
+        """Return the state of a run at the crank angle 0, from y and the numbers of the drive."""
         rates = len(self.mechanism.freedoms)
-        x = [*drive[self.inputs + len(MOTOR) : self.drive_size].tolist(), *[0.0] * (rates + 2)]
+        x = [*drive[self.held : self.held + rates].tolist(), *[0.0] * (rates + 2)]
         x[self.crank] = 0.0
         if self.command is not None:
             x[rates + self.crank] = float(drive[self.command])
+        for number, channel in self.commanded.items():
+            x[rates + number] = float(drive[channel])
         for place, value in zip(self.places, y.tolist()):
             x[place] = value
         return tuple(x)
+
+    def unknowns(self, states: NDArray[np.float64], drive: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return y from states of a run, shape (..., states), and the numbers of the drive; shape (..., n)."""
+        y = states[..., self.places]
+        for place, ratio in self._ratios(drive).items():
+            if place in self.places:
+                y[..., self.places.index(place)] -= ratio * states[..., self.crank]
+        return y
+
+    def _ratios(self, drive: Any) -> dict[int, Any]:
+        """Return the ratios of the other cranks by the numbers of their freedoms."""
+        return {n: drive[self.held + len(self.mechanism.freedoms) + i] for i, n in enumerate(self.others)}
 
     @cache  # noqa: B019 - flows are kept for good themselves
     def function(self, which: int, switched: bool = False) -> Any:
@@ -178,6 +230,9 @@ class Flow:
         else:
             rates = functions.of(m.equations.derivative)(x, applied, k)
             f = casadi.vertcat(*[rates[place] for place in self.places]) / x[len(m.freedoms) + self.crank]
+            ratios = self._ratios(drive)
+            if any(place in ratios for place in self.places):
+                f -= casadi.vertcat(*[ratios.get(place, 0.0) for place in self.places])
             results = [f]
             if which != PLAIN:
                 jacobian = casadi.jacobian(f, y)
@@ -208,21 +263,25 @@ class Flow:
         return casadi.Function("trace", [angle, y, modes, drive, p], [casadi.trace(casadi.jacobian(f, y))])
 
     def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
-        """State of a run and channels, as expressions."""
+        """Return the state of a run and the channels, as expressions."""
         casadi = symbolic.library()
         m, freedoms = self.mechanism, len(self.mechanism.freedoms)
-        held = drive[self.inputs + len(MOTOR) :]
+        held = drive[self.held : self.held + freedoms]
         x = [*casadi.vertsplit(held), *[casadi.SX(0.0)] * freedoms, casadi.SX(0.0), casadi.SX(0.0)]
         x[self.crank] = angle
         for component, place in enumerate(self.places):
             x[place] = y[component]
-        u = drive[: self.inputs]
-        if self.command is not None:
-            x[freedoms + self.crank] = u[self.command]
-        else:
-            channel = crank_of(m).torque
-            u = casadi.vertcat(u)
-            u[channel] += kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
+        for number, ratio in self._ratios(drive).items():
+            x[number] += ratio * angle
+        u = casadi.vertcat(drive[: self.inputs])
+        for number, channel in ({self.crank: self.command} | self.commanded).items():
+            if channel is not None:
+                x[freedoms + number] = u[channel]
+        for n, channel in enumerate(m.torques):
+            number = m.channels[channel].freedom
+            if number in (*self.free, self.crank) and (number != self.crank or self.torque):
+                motor = drive[self.motors + len(MOTOR) * n : self.motors + len(MOTOR) * (n + 1)]
+                u[channel] += kloss(motor, x[freedoms + number])
         return tuple(x), u
 
 
@@ -233,6 +292,6 @@ def label(variable: Variable) -> str:
 
 
 @cache
-def flow(mechanism: Mechanism, modes: tuple[int, ...]) -> Flow:
-    """The flow of a mechanism driven in one way, made when it is first asked for."""
-    return Flow(mechanism, modes)
+def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1) -> Flow:
+    """Return the flow of a mechanism driven in one way, made when it is first asked for."""
+    return Flow(mechanism, modes, crank, base)

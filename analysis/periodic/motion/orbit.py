@@ -315,7 +315,7 @@ class PeriodicOrbit(Shown):
         slider turns round: it then takes some ten thousand samples.
         """
         flow, turn, p = self.flow, self.turn(samples), self.point.constants
-        y = turn.states[:, flow.places].T
+        y = flow.unknowns(turn.states, self.point.vector).T
         trace = flow.jacobian_trace(self.point.mechanism.switched(p.tolist())).map(samples)
         traces = trace(turn.angle[None, :], y, list(flow.modes), self.point.vector, p)
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
@@ -440,6 +440,10 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray
                     f"under a torque alone the {flow.labels[-1]} is needed: give start = ({', '.join(flow.labels)})"
                 )
             guess[-1] = drive.motor.synchronous_speed * (1.0 - 0.5 * drive.motor.breakdown_slip)
+        speed, rates = drive.speed or guess[-1], len(flow.mechanism.freedoms)
+        for number, ratio in drive.turning(flow.mechanism).items():
+            if number in flow.free:
+                guess[flow.places.index(rates + number)] = ratio * speed
         return guess
     guess = np.array(start, dtype=float)
     if guess.shape != (flow.size,) or not np.isfinite(guess).all():

@@ -17,10 +17,10 @@ from linkwork.parameters import field_name, fmi_name
 from ...files import unknown_name
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics import symbolic
-from ...run import of_parameters, takes_published
+from ...run import InductionMotor, of_parameters, takes_published
 from ...units import RAD_S_PER_RPM
 from .drive import Direction, Drive, forces_of, require_acting
-from .flow import Flow, crank_of
+from .flow import Flow, crank_of, cranks_of
 
 #: A mechanism and what drives it.
 Operation = tuple[Parameters, Drive]
@@ -29,29 +29,44 @@ Plane = Callable[[float, float], Operation]
 
 
 @cache
-def _of_the_crank(mechanism: Mechanism) -> dict[str, str]:
-    """FMI names of the crank's speed and torque: what of `Drive` each is."""
-    crank = crank_of(mechanism)
-    numbers = {"torque": crank.torque, "speed": crank.command}
-    return {mechanism.channels[n].name: what for what, n in numbers.items() if n is not None}
+def _of_cranks(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
+    """Return the FMI names of the speeds of the cranks and of the torques on them: which it is, and of which freedom."""
+    found = {}
+    for crank in cranks_of(mechanism):
+        for what, n in (("torque", crank.torque), ("speed", crank.command)):
+            if n is not None:
+                found[mechanism.channels[n].name] = (what, crank.freedom)
+    return found
 
 
 @cache
 def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Names of what a motor on the crank has, in the order of `Drive.vector`: field and unit of each."""
+    """Return the names of the numbers of motors on cranks, in the order of `Drive.vector`: field and unit of each."""
     units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
-    torques = [name for name, what in _of_the_crank(mechanism).items() if what == "torque"]
+    torques = [mechanism.channels[n].name for n in mechanism.torques]
     return {f"{name}.{field}": (field, unit) for name in torques for field, unit in units.items()}
 
 
 def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of what can vary of a drive: the crank's speed and torque, what a motor has, and forces."""
-    return (*_of_the_crank(mechanism), *of_the_motor(mechanism), *forces_of(mechanism))
+    """Return the names of what can vary of a drive: speeds of cranks and torques on them, numbers of motors, and forces."""
+    return tuple(dict.fromkeys((*_of_cranks(mechanism), *of_the_motor(mechanism), *forces_of(mechanism))))
 
 
-def speed_name(mechanism: Mechanism) -> str | None:
-    """FMI name of the crank's prescribed speed, such as ``drive.speed``; None where it cannot be prescribed."""
-    return next((name for name, what in _of_the_crank(mechanism).items() if what == "speed"), None)
+def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the FMI names of the speeds of cranks that can be prescribed."""
+    return tuple(name for name, (what, _) in _of_cranks(mechanism).items() if what == "speed")
+
+
+def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
+    """Return the FMI name of the prescribed speed of the crank, such as ``drive.speed``; None where it cannot be prescribed.
+
+    Raises
+    ------
+    InputError
+        If the mechanism has several cranks, and there is no drive that says which.
+    """
+    command = (crank_of(mechanism) if drive is None else drive.reference(mechanism)).command
+    return None if command is None else mechanism.channels[command].name
 
 
 @takes_published()
@@ -67,13 +82,31 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """
     mechanism = mechanism_of(parameters)
     unit_of(mechanism, name)
-    what = _of_the_crank(mechanism).get(name)
-    if what is not None and (what == "speed") != drive.speed_drive:
-        raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
-    if name in of_the_motor(mechanism) and drive.motor is None:
-        raise InputError(f"{name} cannot vary: no motor drives the crank")
-    if name in forces_of(mechanism):
+    what, freedom = _of_cranks(mechanism).get(name, ("", -1))
+    if what == "speed" or freedom == drive.reference(mechanism).freedom:
+        if (what == "speed") != drive.speed_drive:
+            raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+        if what == "speed" and not _ratio_of(mechanism, drive, freedom):
+            raise InputError(f"{name} cannot vary: this crank is not commanded to turn")
+    elif name in forces_of(mechanism):
         require_acting(drive, mechanism, forces_of(mechanism)[name])
+    if name in of_the_motor(mechanism) and _motor_of(mechanism, drive, name) is None:
+        raise InputError(f"{name} cannot vary: no motor drives the crank")
+
+
+def _ratio_of(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
+    """Return the turns of a commanded crank for each turn of the crank of the drive; 0 where it is held or not commanded."""
+    if freedom == drive.reference(mechanism).freedom:
+        return 1.0
+    commanded = freedom in drive.flow(mechanism).commanded
+    return float(drive.turning(mechanism).get(freedom, 0)) if commanded else 0.0
+
+
+def _motor_of(mechanism: Mechanism, drive: Drive, name: str) -> InductionMotor | None:
+    """Return the motor that a number of a motor, by its name, belongs to."""
+    torque = name.rpartition(".")[0]
+    own = drive.reference(mechanism).torque
+    return drive.motor if own is not None and mechanism.channels[own].name == torque else drive.motors.get(torque)
 
 
 def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
@@ -102,12 +135,13 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
 def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
     """The value there is of what can vary; NaN of a speed under a torque, or of a motor that there is not."""
     mechanism = mechanism_of(parameters)
-    what = _of_the_crank(mechanism).get(name)
-    if what is not None:
-        value = getattr(drive, what)
-        return float("nan") if value is None else float(value)
+    what, freedom = _of_cranks(mechanism).get(name, ("", -1))
+    if what == "speed":
+        return float("nan") if drive.speed is None else float(drive.speed) * _ratio_of(mechanism, drive, freedom)
+    if what == "torque" and freedom == drive.reference(mechanism).freedom:
+        return float(drive.torque)
     if name in of_the_motor(mechanism):
-        return float(getattr(drive.motor, of_the_motor(mechanism)[name][0], np.nan))
+        return float(getattr(_motor_of(mechanism, drive, name), of_the_motor(mechanism)[name][0], np.nan))
     if name in forces_of(mechanism):
         return float(drive.forces.get(name, 0.0))
     return float(getattr(parameters, field_name(name)))
@@ -129,15 +163,35 @@ def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Mechanism and drive with other values of parameters by their FMI names."""
     mechanism = mechanism_of(parameters)
-    of_crank, of_motor, forces = _of_the_crank(mechanism), of_the_motor(mechanism), forces_of(mechanism)
-    of_drive: dict[str, Any] = {of_crank[name]: value for name, value in values.items() if name in of_crank}
-    acting = {name: value for name, value in values.items() if name in forces}
-    driving = {of_motor[name][0]: value for name, value in values.items() if name in of_motor}
-    of_mechanism = {field_name(n): v for n, v in values.items() if n not in {*of_crank, *of_motor, *forces}}
+    of_cranks, of_motor, forces = _of_cranks(mechanism), of_the_motor(mechanism), forces_of(mechanism)
+    own = drive.reference(mechanism).freedom
+    of_drive: dict[str, Any] = {}
+    acting: dict[str, float] = {}
+    motors: dict[str, InductionMotor] = {}
+    of_mechanism: dict[str, float] = {}
+    for name, value in values.items():
+        what, freedom = of_cranks.get(name, ("", -1))
+        if what == "speed":
+            # all commanded speeds keep their ratios
+            of_drive["speed"] = value / _ratio_of(mechanism, drive, freedom)
+        elif what == "torque" and freedom == own:
+            of_drive["torque"] = value
+        elif name in of_motor:
+            torque = name.rpartition(".")[0]
+            motor = motors.get(torque) or _motor_of(mechanism, drive, name)
+            if motor is not None:
+                motors[torque] = replace(motor, **{of_motor[name][0]: value})
+        elif name in forces:
+            acting[name] = value
+        else:
+            of_mechanism[field_name(name)] = value
     if acting:
         of_drive["forces"] = {**drive.forces, **acting}
-    if driving and drive.motor is not None:
-        of_drive["motor"] = replace(drive.motor, **driving)
+    for torque, motor in motors.items():
+        if torque in drive.motors:
+            of_drive["motors"] = {**of_drive.get("motors", drive.motors), torque: motor}
+        else:
+            of_drive["motor"] = motor
     return (
         _replaced(parameters, *of_mechanism.items()) if of_mechanism else parameters,
         replace(drive, **of_drive) if of_drive else drive,
@@ -283,16 +337,22 @@ def along_parameters(parameters: Parameters, names: Sequence[str], along: str = 
     return Along(*chosen)
 
 
-def stacked(flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
-    """Derivatives of the numbers of the drive, and after them of the constants, ``p``; shape (c, m)."""
+def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
+    """Return derivatives of the numbers of the drive, and after them of the constants, ``p``; shape (c, m)."""
     mechanism = flow.mechanism
-    drive = np.zeros((flow.drive_size, p.shape[1]))
+    found = np.zeros((flow.drive_size, p.shape[1]))
     # in the order of `Drive.vector`
     places = (*mechanism.input_names, *of_the_motor(mechanism))
     for column, name in enumerate(names):
-        if name in places:
-            drive[places.index(name), column] = 1.0
-    return np.vstack([drive, p])
+        what, freedom = _of_cranks(mechanism).get(name, ("", -1))
+        if what == "speed":
+            own = _ratio_of(mechanism, drive, freedom)
+            for number, channel in ({flow.crank: flow.command} | flow.commanded).items():
+                if channel is not None:
+                    found[channel, column] = _ratio_of(mechanism, drive, number) / own
+        elif name in places:
+            found[places.index(name), column] = 1.0
+    return np.vstack([found, p])
 
 
 @cache

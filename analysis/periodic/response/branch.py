@@ -305,7 +305,7 @@ def _growth(orbit: PeriodicOrbit) -> float:
 def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
     """Return a follower of the same curve by multiple shooting, and its first point, from the last point so far."""
     orbit: PeriodicOrbit = last.data
-    places = orbit.turn(PLACES * orbit.turns).states[:, orbit.flow.places]
+    places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.turns).states, orbit.point.vector)
     angles, starts = choose_pieces(orbit.point, places, orbit.turns)
     divided = _follower(family, orbit, settings, angles)
     n = len(orbit.start)

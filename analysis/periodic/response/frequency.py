@@ -32,7 +32,7 @@ from ...units import Amount, si
 from ..motion.discretisation import OrbitError
 from ..motion.drive import SAME, Drive, published_drive
 from ..motion.floquet import Crossing
-from ..motion.flow import crank_of
+from ..motion.flow import cranks_of
 from ..motion.orbit import PeriodicOrbit, orbit_of, require_turns
 from ..motion.search import orbits_of
 from ..motion.variables import Family, unit_of
@@ -42,13 +42,14 @@ from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, fol
 
 #: Crank angles over which the effective mass is averaged.
 MASS_SAMPLES = 1024
+#: Generator of a lattice of as many points: next to the golden section of their number, and odd.
+LATTICE = 633
 
 
 def first_freedom(mechanism: Mechanism) -> int:
     """Return the number of the first freedom that is not a crank's; raises ParameterError if there is none."""
-    crank = crank_of(mechanism).freedom
     for number in range(len(mechanism.freedoms)):
-        if number != crank:
+        if number not in mechanism.cyclic:
             return number
     raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
 
@@ -61,15 +62,22 @@ def stiffness_name(mechanism: Mechanism) -> str:
 def _means(parameters: Parameters) -> tuple[float, float]:
     """Return mean effective mass (kg) and stiffness (N/m) of the first freedom at its zero over a turn."""
     mechanism = mechanism_of(parameters)
-    crank = crank_of(mechanism).freedom
-    angles = np.linspace(0.0, mechanism.freedoms[crank].period, MASS_SAMPLES, endpoint=False)
-    for angle in angles.tolist():
+    cranks, freedom = cranks_of(mechanism), first_freedom(mechanism)
+    if not cranks:
+        raise InputError(f"a {mechanism.name} has no freedom that turns: it has no mean over a turn")
+    # of several cranks the points of a lattice, which fill all pairs of angles evenly
+    turn = np.linspace(0.0, 1.0, MASS_SAMPLES, endpoint=False)
+    angles = [
+        mechanism.freedoms[crank.freedom].period * turn[np.arange(MASS_SAMPLES) * LATTICE**n % MASS_SAMPLES]
+        for n, crank in enumerate(cranks)
+    ]
+    for at in zip(*(each.tolist() for each in angles)):
         x = [0.0] * mechanism.size
-        x[crank] = angle
+        for crank, angle in zip(cranks, at):
+            x[crank.freedom] = angle
         mechanism.check_assembly(parameters, x)
-    mass, stiffness = symbolic.evaluate_arrays(
-        at_rest(mechanism, crank, first_freedom(mechanism)), angles, list(parameters.constants())
-    )
+    resting = at_rest(mechanism, tuple(crank.freedom for crank in cranks), freedom)
+    mass, stiffness = symbolic.evaluate_arrays(resting, *angles, list(parameters.constants()))
     return float(mass.mean()), float(stiffness.mean())
 
 

@@ -464,7 +464,9 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
             stop_time=turn * turns,
             tolerance=1e-12,
         )
-        return np.column_stack([run[name] for name, _ in flow.components]), run.message
+        names = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
+        states = np.column_stack([run[name] for name in (*names[::2], *names[1::2])])
+        return flow.unknowns(states, point.vector), run.message
     passed = [start]
     for _ in range(turns):
         try:

@@ -124,7 +124,7 @@ class MotionGradient:
             require_variable(parameters, drive, name)
         self.values = np.array([value_of(parameters, drive, name) for name in self.names])
         own = along_parameters(parameters, self.names)
-        self.along = stacked(orbit.flow, self.names, own.p)
+        self.along = stacked(orbit.drive, orbit.flow, self.names, own.p)
         mechanism = mechanism_of(parameters)
         place = mechanism.switch_place
         self._switched = mechanism.switched(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
@@ -195,7 +195,11 @@ class MotionGradient:
         number = self.names.index(along)
         by_y, by_constant = v.second(solution[..., number], self.along[:, number])
         twice = along_parameters(self.orbit.parameters, self.names, along).p_along
-        forcing = by_y @ solution + by_constant @ self.along + v.by_constant @ stacked(self.orbit.flow, (), twice)
+        forcing = (
+            by_y @ solution
+            + by_constant @ self.along
+            + v.by_constant @ stacked(self.orbit.drive, self.orbit.flow, (), twice)
+        )
         second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:

@@ -124,7 +124,7 @@ class Variations:
     def _sampled(self) -> FloatArray:
         """Return the motion at the nodes, shape (k, s, n)."""
         found = self.orbit.sample(self.angles.ravel())
-        return found[:, self.flow.places].reshape(*self.angles.shape, self.flow.size)
+        return self.flow.unknowns(found, self._drive).reshape(*self.angles.shape, self.flow.size)
 
     def _call(
         self, name: str, size: int, direction: FloatArray | None = None, along: FloatArray | None = None

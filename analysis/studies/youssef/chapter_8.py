@@ -298,7 +298,7 @@ def _fig_8_15() -> list[Verdict]:
 def _fig_8_16() -> list[Verdict]:
     ratio, why = natural_speed("B") / natural_speed("A"), "the springs are as 11 to 3"
     return [
-        *_natural_and_half("B", (500.0, 540.0, 560.0), "L6754"),
+        *_natural_and_half("B", SPEEDS["B"][:3], "L6754"),
         near("natural frequency over spring A's", text("8.4.1.2, L6551"), 2.0, ratio, 0.01, why=why),
         near("natural frequency over spring A's, sqrt(11/3)", OURS, sqrt(11.0 / 3.0), ratio, 1e-9),
         *_peaks("B", SPEEDS["B"][:3], "L6752"),

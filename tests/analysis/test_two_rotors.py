@@ -1,0 +1,243 @@
+"""A mechanism with two cranks through every analysis: two unbalanced rotors on one sprung, damped cart.
+
+At commanded speeds the cart is a linear oscillator under two harmonic forces, so that motion, multipliers and resonance are
+known in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from math import pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy
+from click.testing import Result
+
+from analysis import (
+    InductionMotor,
+    Inputs,
+    Wish,
+    compare,
+    cosimulate,
+    figures,
+    frequency_response,
+    simulate,
+    simulate_many,
+    steps,
+    tune,
+)
+from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
+from analysis.linear import find_equilibrium, linearise
+from analysis.mechanisms import MECHANISMS, register
+from analysis.periodic import Drive, natural_frequency, orbit_of, stability_chart
+from analysis.run import load_case
+from analysis.studio.tables import tables_of
+from linkwork.errors import InputError
+
+from ..mechanisms.two_rotors import MECHANISM
+
+DEMO = MECHANISM.published["two-rotors-demo"]
+P = DEMO.parameters
+K = P.constants()
+RATIOS = [Fraction(1), Fraction(2), Fraction(3, 2), Fraction(-1)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _registered() -> Iterator[None]:
+    register(MECHANISM)
+    yield
+    del MECHANISMS[MECHANISM.name]
+
+
+def _drive(speed: float, ratio: Fraction, phase: float = 0.0) -> Drive:
+    return Drive(speeds={"left.speed": speed, "right.speed": float(ratio) * speed}, held={"right.angle": phase})
+
+
+def _cart(speeds: tuple[float, ...], phases: tuple[float, ...], t: Any) -> Any:
+    """Return the steady position of the cart at times t: M s'' + c s' + k s = sum U w2 cos(w t + phase)."""
+    s = np.zeros_like(np.asarray(t, dtype=float))
+    for w, phase, unbalance in zip(speeds, phases, (K.unbalance1, K.unbalance2)):
+        size = unbalance * w * w / (K.k - K.mass * w * w + 1j * K.c * w)
+        s = s + (size * np.exp(1j * (w * t + phase))).real
+    return s
+
+
+@pytest.mark.parametrize("ratio", RATIOS, ids=str)
+def test_the_motion_at_commanded_speeds_is_the_closed_form(ratio: Fraction) -> None:
+    speed, phase = 21.0, 0.4
+    orbit = orbit_of(P, _drive(speed, ratio, phase))
+    turns = ratio.denominator
+    assert orbit.flow.period == pytest.approx(2.0 * pi * turns)
+    turn = orbit.turn(256)
+    assert turn.period == pytest.approx(2.0 * pi * turns / speed, rel=1e-12)
+    wanted = _cart((speed, float(ratio) * speed), (0.0, phase), turn.time)
+    np.testing.assert_allclose(turn["cart.position"], wanted, atol=1e-10 * np.abs(wanted).max())
+    np.testing.assert_allclose(turn["right.angle"], phase + float(ratio) * turn["left.angle"], atol=1e-12)
+    # the multipliers are those of the free oscillator over the common period
+    roots = np.roots([K.mass, K.c, K.k])
+    np.testing.assert_allclose(
+        np.sort_complex(orbit.multipliers), np.sort_complex(np.exp(roots * turn.period)), rtol=1e-8
+    )
+    assert orbit.determinant_by_liouville() == pytest.approx(np.exp(-K.c / K.mass * turn.period), rel=1e-8)
+
+
+def test_a_run_settles_on_it_and_the_balance_closes() -> None:
+    speeds = {"left_speed": 20.0, "right_speed": 30.0}
+    run = simulate(P, Inputs(**speeds), initial=DEMO.initial, stop_time=16.0, step=1e-3, tolerance=1e-11)
+    late = run.time > 14.0
+    wanted = _cart((20.0, 30.0), (0.0, 0.0), run.time[late])
+    np.testing.assert_allclose(run["cart.position"][late], wanted, atol=1e-6 * np.abs(wanted).max())
+    assert np.abs(run["energy.residual"]).max() < 1e-9
+
+
+def _slope(t: float, x: np.ndarray, torque: Any) -> np.ndarray:
+    """Return the rates of both angles, cart, by the mass matrix: the left rotor's speed is held, a torque drives the right."""
+    th1, th2, s, w1, w2, v = x
+    b2 = K.unbalance2 * np.sin(th2)
+    mass = np.array([[K.inertia2, -b2], [-b2, K.mass]])
+    force = K.unbalance1 * np.cos(th1) * w1**2 + K.unbalance2 * np.cos(th2) * w2**2 - K.k * s - K.c * v
+    acceleration = np.linalg.solve(mass, [torque(w2), force])
+    return np.array([w1, w2, v, 0.0, *acceleration])
+
+
+def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_an_independent_monodromy() -> None:
+    motor = InductionMotor(breakdown_torque=0.05, breakdown_slip=0.2, synchronous_speed=24.1)
+    drive = Drive(speed=24.0, crank="left.speed", ratios={"right.angle": 1}, motors={"right.torque": motor})
+    found = simulate(
+        P,
+        Inputs(left_speed=24.0, right_torque=motor),
+        initial=MECHANISM.initial(left_speed=24.0, right_speed=24.0),
+        samples=2.0 * pi / 24.0 * np.arange(401),
+        stop_time=2.0 * pi / 24.0 * 400,
+        tolerance=1e-11,
+    )
+    last = [found[name][-1] for name in ("right.angle", "cart.position", "right.speed_out", "cart.velocity")]
+    last[0] -= 400 * 2.0 * pi
+    orbit = orbit_of(P, drive, start=last)
+    assert orbit.flow.components[0][0] == "right.angle"
+
+    def torque(w: float) -> float:
+        slip = (motor.synchronous_speed - w) / motor.synchronous_speed / motor.breakdown_slip
+        return 2.0 * motor.breakdown_torque * slip / (1.0 + slip * slip)
+
+    def turned(y: np.ndarray) -> np.ndarray:
+        th2, s, w2, v = y
+        state = scipy.integrate.solve_ivp(
+            _slope, (0.0, 2.0 * pi / 24.0), [0.0, th2, s, 24.0, w2, v], "DOP853", rtol=1e-12, atol=1e-13, args=(torque,)
+        ).y[:, -1]
+        return np.array([state[1] - 2.0 * pi, state[2], state[4], state[5]])
+
+    np.testing.assert_allclose(turned(orbit.start), orbit.start, rtol=1e-8, atol=1e-9)
+    step = 1e-5
+    columns = [(turned(orbit.start + step * e) - turned(orbit.start - step * e)) / (2.0 * step) for e in np.eye(4)]
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(np.column_stack(columns))), np.sort_complex(orbit.multipliers), atol=1e-6
+    )
+
+
+def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refused() -> None:
+    with pytest.raises(InputError, match=r"left\.speed.*right\.speed"):
+        Drive(speeds={"left.speed": 20.0, "right.speed": 20.0 * sqrt(2.0)})
+    with pytest.raises(InputError, match=r"left\.angle, right\.angle"):
+        orbit_of(P, Drive(speed=20.0))
+    with pytest.raises(InputError, match=r"right\.angle"):
+        orbit_of(P, Drive(speed=20.0, crank="left.speed", forces={"right.torque": 0.01}))
+
+
+@pytest.mark.parametrize("ratio", [Fraction(1), Fraction(2), Fraction(3, 2)], ids=str)
+def test_the_response_scales_all_commanded_speeds_together(ratio: Fraction) -> None:
+    response = frequency_response(P, 18.0, 32.0, drive=_drive(20.0, ratio), vary="left.speed")
+    for orbit in response.branches[0].orbits[::5]:
+        speed = orbit.drive.speed
+        t = np.linspace(0.0, 2.0 * pi * ratio.denominator / speed, 4001)
+        wanted = _cart((speed, float(ratio) * speed), (0.0, 0.0), t)
+        assert orbit.amplitude == pytest.approx(0.5 * np.ptp(wanted), rel=1e-5)
+    over_right = frequency_response(
+        P, 18.0 * float(ratio), 32.0 * float(ratio), drive=_drive(20.0, ratio), vary="right.speed"
+    )
+    tops, others = response.maxima(), over_right.maxima()
+    assert [top.amplitude for top in tops] == pytest.approx([top.amplitude for top in others], rel=1e-6)
+    assert natural_frequency(P) == pytest.approx(sqrt(K.k / K.mass), rel=0.02)
+
+
+def test_the_chart_has_the_multiplier_of_the_free_oscillator() -> None:
+    chart = stability_chart(
+        P,
+        _drive(20.0, Fraction(3, 2)),
+        ("left.speed", "cart.damping"),
+        ranges=((18.0, 30.0), (5.0, 20.0)),
+        points=5,
+    )
+    for row, damping in enumerate(chart.grid.y):
+        for column, speed in enumerate(chart.grid.x):
+            wanted = np.exp(-0.5 * damping / K.mass * 4.0 * pi / speed)
+            assert chart.grid.largest[row, column] == pytest.approx(wanted, rel=1e-6)
+    assert not chart.boundaries
+
+
+def test_the_linear_model_has_the_poles_of_the_cart() -> None:
+    rest = find_equilibrium(P)
+    model = linearise(P, rest.state, rest.inputs)
+    poles = model.poles[np.abs(model.poles) > 1e-6]  # the others are of the rotors, which nothing holds
+    np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(np.roots([K.mass, K.c, K.k])), rtol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [Fraction(2), Fraction(3, 2)], ids=str)
+def test_tuning_clears_the_range_of_the_resonance(ratio: Fraction) -> None:
+    natural = sqrt(K.k / K.mass)
+    wish = Wish(
+        parameters=P,
+        drive=_drive(10.0, ratio),
+        over="left.speed",
+        between=(0.97 * natural, 1.03 * natural),
+        change={"cart.stiffness": "60 %"},
+        no_resonance=True,
+    )
+    tuned = tune(wish)
+    assert tuned.met
+    moved = sqrt(tuned.parameters.cart_stiffness / K.mass)
+    assert not 0.97 * natural < moved < 1.03 * natural
+
+
+def test_a_case_file_an_ensemble_and_the_command_line(linkwork: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "rotors.toml").write_text(
+        'mechanism = "two-rotors"\npublished = "two-rotors-demo"\n'
+        '[left]\nspeed = "100 rpm"\n[right]\ntorque = "10 mN.m"\n[run]\nstop_time = 0.2\nstep = 1e-3\n'
+    )
+    case = load_case(tmp_path / "rotors.toml")
+    inputs = Inputs(left_speed=100.0 * pi / 30.0, right_torque=0.01)
+    one = simulate(P, inputs, initial=case.initial, stop_time=0.2, step=1e-3)
+    own = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.2, step=1e-3)
+    np.testing.assert_allclose(own["right.angle"], one["right.angle"], rtol=1e-13)
+    runs = simulate_many([P, P], inputs, initial=case.initial, stop_time=0.2, step=1e-3)
+    np.testing.assert_array_equal(runs.output("right.angle")[1], one["right.angle"])
+    for words in (
+        ("run", "rotors.toml"),
+        ("run", "--published", "two-rotors-demo", "--set", "run.stop_time=0.1"),
+        ("resonance", "--published", "two-rotors-demo", "--vary", "left.speed", "--from", "18", "--to", "30"),
+    ):
+        done = linkwork(*words)
+        assert done.exit_code == 0, (words, done.output)
+
+
+def test_the_fmus_run_as_the_solver_does(tmp_path: Path) -> None:
+    inputs = Inputs(left_speed=steps([0.0, 0.1], [10.0, 14.0]), right_torque=0.02)
+    run = simulate(P, inputs, initial=DEMO.initial, stop_time=0.2, step=1e-3, tolerance=1e-11)
+    for file in (
+        build(MECHANISM, tmp_path),
+        *(build_native(MECHANISM, kind, tmp_path) for kind in (NATIVE, NATIVE_FMI3)),
+    ):
+        other = cosimulate(file, P, inputs, initial=DEMO.initial, stop_time=0.2, step=1e-3, tolerance=1e-11)
+        assert compare(run, other).worst.relative < 1e-8, file.name
+
+
+def test_the_studio_and_the_pictures_show_both_rotors() -> None:
+    tables = tables_of(MECHANISM)
+    starts = {row["name"]: row["start"] for row in tables["given"]}
+    assert (starts["left.speed"], starts["right.speed"]) == (20.0, 30.0)
+    figures.plot(orbit_of(P, _drive(20.0, Fraction(2))))
+    figures.plot(frequency_response(P, 18.0, 32.0, drive=_drive(20.0, Fraction(2)), vary="left.speed"))
