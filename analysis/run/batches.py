@@ -43,7 +43,7 @@ _PAUSED = -3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """Runs to be solved together; parameters, inputs and initial states of each.
+    """A batch of runs that are solved together: the parameters, inputs and initial state of each.
 
     Attributes
     ----------
@@ -68,18 +68,18 @@ class Task:
     code: str
 
     def run(self, i: int) -> Run:
-        """One of the runs, prepared by itself."""
+        """Prepare one of the runs by itself."""
         return Run(self.parameters[i], self.inputs[i], self.initial[i], self.settings)
 
     @property
     def shapes(self) -> list[tuple[int, ...]]:
-        """Shapes of what is computed: see `_integrate`."""
+        """Return the shapes of the result arrays: see `_integrate`."""
         m, n, size = len(self.parameters), len(self.settings.times), self.mechanism.size
         samples = (size, len(self.mechanism.channels)) if self.outputs is None else (len(self.outputs),)
         return [(m, 4 + size), *((m, n, numbers) for numbers in samples)]
 
     def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Views of these shapes into one array."""
+        """Split a flat array into views of these shapes."""
         ends = np.cumsum([prod(shape) for shape in self.shapes])
         return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), self.shapes)]
 
@@ -106,7 +106,7 @@ class Prepared(NamedTuple):
     failures: dict[int, LinkworkError]
 
     def digest(self, task: Task) -> str:
-        """Hash of all that the result depends on."""
+        """Return a hash of everything that the result depends on."""
         settings, e = task.settings, self.encoded
         numbers = [settings.hold, settings.tolerance, settings.max_steps, *e.modes.values()]
         digest = hashlib.sha256(
@@ -146,7 +146,7 @@ def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]]
 
 
 def _kept(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.float64]:
-    """`Task.parts` in one array, from the file of the batch, or computed and kept there."""
+    """Return the results as one flat array, read from the batch's file or computed and saved there."""
     path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
     kept = None if path is None else load_array(path)
     if kept is None or kept.shape != (sum(map(prod, task.shapes)),):
@@ -164,7 +164,7 @@ def _kept(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.f
 
 
 def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
-    """solver.status and solver.message of each run."""
+    """Return the solver.status and solver.message of each run."""
     from . import records as k
 
     status, messages = [k.FINISHED] * len(ends), [""] * len(ends)
@@ -192,7 +192,7 @@ def _integrate(
     ends: NDArray[np.float64],
     samples: Sequence[NDArray[np.float64]],
 ) -> bool:
-    """Solve the runs; whether all came to their ends.
+    """Solve the runs and return whether all of them were finished.
 
     ``ends`` gets a row for each run: the compiled code's status, the number of samples, the time of the end (s), the number
     of the channel that was not finite, the state at the end. ``samples`` get the samples, NaN after the end of a run.
@@ -240,11 +240,11 @@ def _integrate(
     return not todo.any()
 
 
-# What a run starts from
+# Start of a run
 
 
 def prepare(task: Task) -> Prepared:
-    """Prepare a batch: what `Run` and `Run.start` do, over arrays, with the same numbers to the last bit.
+    """Prepare a batch over arrays, with the same numbers to the last bit as `Run` and `Run.start`.
 
     Runs that come near the limit of assembly or meet a number that is not finite go through `Run.start`, which says why
     they cannot start.
@@ -307,19 +307,19 @@ def prepare(task: Task) -> Prepared:
 
 
 def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
-    """Whether the switch is on in some row of constants."""
+    """Return whether the mechanism's switch is on in any row of constants."""
     return mechanism.switch_place >= 0 and bool(p[:, mechanism.switch_place].any())
 
 
 def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
-    """What is made of each item, of the same object once."""
+    """Apply a function to each item, but only once to the same object."""
     made = {key: make(item) for key, item in {id(item): item for item in items}.items()}
     return [made[id(item)] for item in items]
 
 
 @cache
 def _over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
-    """The equations over arrays, and the type of the parameters for them.
+    """Return the equations for arrays, and the type of parameters that they take.
 
     The functions are those of `math` itself, element by element, as those of NumPy differ in bits.
     """
@@ -330,7 +330,7 @@ def _over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
 
 
 def _elementwise(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
-    """A function of floats over arrays."""
+    """Return a function of floats that is applied to arrays element by element."""
 
     def applied(*values: Any) -> NDArray[np.float64]:
         arrays = np.broadcast_arrays(*values) if len(values) > 1 else [np.asarray(values[0])]
@@ -359,7 +359,7 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
     constant = -1
 
     def kind_of(inputs: Inputs) -> tuple[int, list[float] | None]:
-        """Number among the kinds, which constants share, and their values."""
+        """Return the number of the kind of inputs, and the values if all are constant."""
         nonlocal constant
         values = inputs.constants(signals)
         if values is None or constant < 0:

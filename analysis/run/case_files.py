@@ -32,7 +32,7 @@ from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, tab
 def parameters_from(
     data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism | None = None
 ) -> Parameters:
-    """Parameters from nested tables or dotted names; what they leave out is taken from ``base``.
+    """Read parameters from nested tables or dotted names; missing ones are taken from ``base``.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def parameters_from(
         If a name is unknown, a value is wrong, or, without a base, one is missing.
     """
     if mechanism is None:
-        mechanism = _mechanism_of(data) if base is None else mechanism_of(base)
+        mechanism = _find_mechanism(data) if base is None else mechanism_of(base)
     if data.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", data["mechanism"], f"be {mechanism.name}")
     data = {name: value for name, value in data.items() if name != "mechanism"}
@@ -59,7 +59,7 @@ def parameters_from(
 
 
 def parameters_to(parameters: Parameters) -> dict[str, Any]:
-    """Parameters as nested tables of texts with SI units, every digit kept; with the name of the ``mechanism``."""
+    """Write parameters as nested tables of texts with SI units and all digits, with the name of the ``mechanism``."""
     mechanism = mechanism_of(parameters)
     data: dict[str, Any] = {"mechanism": mechanism.name}
     for name, variable in mechanism.mechanism_variables.items():
@@ -88,8 +88,8 @@ def load_parameters(path: str | Path) -> Parameters:
     return parameters_from(files.read_tables(path))
 
 
-def _mechanism_of(data: Mapping[str, Any]) -> Mechanism:
-    """The mechanism that a file is about: its ``mechanism``, or else the one whose parameters it names."""
+def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
+    """Return the mechanism of a file: its entry ``mechanism``, or else the mechanism with the parameters it names."""
     if "mechanism" in data:
         return MECHANISMS[Choice(MECHANISMS)(data["mechanism"], "mechanism")]
     names = set(files.flattened(data))
@@ -107,14 +107,14 @@ COMMON = ("mechanism", "title", "published", "initial", "run")
 
 
 class Acting(NamedTuple):
-    """Something that acts on a mechanism: its name among the inputs of a run, and its unit; a flag has none."""
+    """An input of a mechanism: its name among the inputs of a run, and its unit; a flag has none."""
 
     argument: str
     unit: str
 
 
 def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
-    """Return what may act on a mechanism, by its name in case files.
+    """Return the inputs of a mechanism by their names in case files.
 
     Of a channel it is `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom stands in the table of
     the freedom's mode: ``axial.groove``.
@@ -134,7 +134,7 @@ def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:
-    """The table ``[run]``: how long, and how finely."""
+    """The table ``[run]``: duration and step."""
 
     stop_time: float | None = entry(Quantity("s"), None)
     revolutions: float | None = entry(Quantity("1", above=0.0), None)
@@ -142,7 +142,7 @@ class RunTable:
     tolerance: float = entry(Quantity("1"), 1e-9)
 
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
-        """Return the end of the run and the distance of the samples (s).
+        """Return the stop time and the sampling step (s).
 
         By default three turns of the slowest crank in steps of a degree of the fastest, at constant speeds.
         """
@@ -181,10 +181,10 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
 def case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
-    """A case from the tables of a case file; ``folder`` is where its CSV tables are looked for."""
+    """Build a case from the tables of a case file; its CSV tables are read from ``folder``."""
     named = {**data, **(overrides or {})}
     published = PUBLISHED[Choice(PUBLISHED)(named["published"], "published")] if "published" in named else None
-    mechanism = _mechanism_of(named) if published is None else mechanism_of(published.parameters)
+    mechanism = _find_mechanism(named) if published is None else mechanism_of(published.parameters)
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
     acting = acting_on(mechanism)
@@ -282,7 +282,7 @@ def _check_drives(
 
 
 def _reader(unit: str, folder: Path) -> Reader:
-    """Reader of what acts through one input: a truth value, a signal, or of torques a law or a list of which the sum acts."""
+    """Return the reader of one input: a truth value, a signal or, for a torque, a law or a list of summands."""
     if not unit:
         return files.flag
     kinds, value = signal_kinds(unit, folder), Quantity(unit)
@@ -305,7 +305,7 @@ def _reader(unit: str, folder: Path) -> Reader:
 
 
 def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
-    """Readers of what varies, by its kind: a ramp, a table and so on, of quantities in a unit."""
+    """Return the readers of time-varying signals in a unit, by kind: a ramp, a table and so on."""
     value, values = Quantity(unit), Many(Quantity(unit))
     kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),

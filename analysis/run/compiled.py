@@ -53,7 +53,7 @@ GREATEST_SHARE = 1e-3
 
 @inner
 def _begin_interval(motion):
-    """Sample the inputs, let commanded rates jump, record samples and what the jumps made happen; the status."""
+    """Sample the inputs, apply jumps of commanded rates, record samples and events; return the status."""
     problem, source, carry = motion.problem, motion.source, motion.carry
     x, u, t = motion.x, motion.u, motion.carry.begin
     piece = find(t, source.breaks)
@@ -89,7 +89,7 @@ def _begin_interval(motion):
 
 @inner
 def _end_of_interval(piece, motion):
-    """Time up to which the inputs are smooth, or held."""
+    """Return the time until which the inputs are smooth, or held."""
     end, breaks = motion.problem.end, motion.source.breaks
     if motion.problem.hold > 0.0:
         later = motion.carry.interval + 1
@@ -100,7 +100,7 @@ def _end_of_interval(piece, motion):
 
 @inner
 def _not_finite(u):
-    """Number of a channel, or of another component, that is not finite; -1 if there is none."""
+    """Return the index of the first component that is not finite; -1 if there is none."""
     for i in range(u.shape[0]):
         if not isfinite(u[i]):
             return i
@@ -109,7 +109,7 @@ def _not_finite(u):
 
 @inner
 def _first_step(motion):
-    """Rates at the beginning of the interval, or where it goes on; at the start of the run the step to try."""
+    """Compute the rates at the beginning of the interval and, at the start of the run, the first step size."""
     carry, x, k = motion.carry, motion.x, motion.room.k
     equation(DERIVATIVE, carry.begin + carry.elapsed, x, motion.u, k[0], motion)
     carry.evaluations += 1
@@ -125,7 +125,7 @@ def _first_step(motion):
 
 @inner
 def _attempt(h, motion):
-    """Try a step of size h from x; its error relative to the tolerance."""
+    """Try a step of size h from x and return its error relative to the tolerance."""
     problem, carry, room = motion.problem, motion.carry, motion.room
     carry.steps += 1
     carry.evaluations += STAGES - 1
@@ -136,7 +136,7 @@ def _attempt(h, motion):
 
 @inner
 def _accept(h, last, t_new, motion):
-    """Whether a step within the tolerance can be taken, whether there is something inside it, and the clearance at its end."""
+    """Return whether to accept a step, whether an event may lie inside it, and the clearance at its end."""
     watch, carry, samples, y, u = motion.watch, motion.carry, motion.samples, motion.room.y, motion.u
     renew(carry.elapsed + h, y, u, motion)
     if watch.balance.shape[0] > 0:
@@ -160,7 +160,7 @@ def _accept(h, last, t_new, motion):
 
 @inner
 def _keep_balance(motion):
-    """Scale the rates at the end of a step so that the energy balance is closed, but where it is nearly at rest."""
+    """Scale the rates at the end of a step to close the energy balance, unless the mechanism is nearly at rest."""
     y, outputs, balance = motion.room.y, motion.room.outputs, motion.watch.balance
     equation(OUTPUTS, 0.0, y, motion.u, outputs, motion)
     share = outputs[balance[0]] / outputs[balance[1]]
@@ -172,7 +172,7 @@ def _keep_balance(motion):
 
 @inner
 def _refused(h, motion):
-    """Status of a run whose step has become impossibly short."""
+    """Return the status of a run whose step has become too short."""
     carry, room, x, u = motion.carry, motion.room, motion.x, motion.u
     status = LIMIT if abs(clearance_at(x, u, motion)) < NEAR_LIMIT else NO_STEP
     if carry.piece >= 0:
@@ -220,7 +220,7 @@ def _sample_step(t_new, h, motion):
 
 @inner
 def _cross_interval(motion, most):
-    """Steps, until the interval is over or cut short, or ``most`` steps or a full table of events make a pause; the status.
+    """Integrate to the end of the interval, or pause after ``most`` steps or at a full event table; return the status.
 
     Where it pauses it leaves ``carry.midway`` set.
     """
@@ -269,7 +269,7 @@ def _cross_interval(motion, most):
 
 @part
 def _make_room(states, outputs, inputs):
-    """Room for so many states, outputs and inputs."""
+    """Allocate work arrays for given numbers of states, outputs and inputs."""
     return Room(
         np.empty((16, states)),
         np.empty(states),
@@ -282,7 +282,7 @@ def _make_room(states, outputs, inputs):
 
 @inner
 def _advance(motion, most):
-    """From interval to interval, until the run ends or pauses; the status."""
+    """Integrate interval by interval until the run ends or pauses; return the status."""
     carry, watch = motion.carry, motion.watch
     full = watch.found.shape[0] - (1 + EVENTS_PER_STEP) * watch.table.shape[0]
     while True:
@@ -298,7 +298,7 @@ def _advance(motion, most):
 
 
 class Batch(NamedTuple):
-    """What differs between runs: constants with the energy at the start, scales, whether the inputs are steady, pieces and
+    """Data that differ between runs: constants with the energy at the start, scales, whether the inputs are steady, pieces and
     harmonics of each, and the inputs themselves, one row each."""
 
     p: NDArray[np.float64]
@@ -317,7 +317,7 @@ _BATCH = types.NamedTuple(
 
 
 def of_one(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], steady: bool) -> Batch:
-    """A single run as a batch; its ``laws`` are those of the source."""
+    """Return a single run as a batch, with the torque laws of the source."""
     sizes = [[len(source.coefficients), len(source.harmonics)]]
     inputs = (source.breaks, source.coefficients, source.harmonics, source.laws)
     return Batch(p[None], scale[None], np.array([steady]), np.array(sizes), *(values[None] for values in inputs))
@@ -325,7 +325,7 @@ def of_one(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], s
 
 @part
 def _own(i, source, batch):
-    """The inputs of one run of a batch; ``source`` has what is common to all."""
+    """Return the inputs of one run of a batch; ``source`` holds the data common to all runs."""
     pieces, waves = batch.sizes[i]
     return Source(
         batch.breaks[i, : pieces + 1],
@@ -394,6 +394,6 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
 
 @kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
 def rows(equation, modes, p, states, forces, out):
-    """A function of the equations for rows of states and inputs, shapes (n, states), (n, inputs); out has its values."""
+    """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``."""
     for i in range(states.shape[0]):
         evaluate(equation, 0.0, states[i], modes, forces[i], p, out[i])

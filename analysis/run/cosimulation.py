@@ -150,7 +150,7 @@ class _Stepwise:
         return self.inputs(0, self.start)
 
     def inputs(self, number: int, x: NDArray[np.float64]) -> dict[str, float]:
-        """The inputs at a communication point and a state, until the next one."""
+        """Return the inputs from a communication point to the next, for a state."""
         times, t = self.times, float(self.times[number])
         if self.linear:
             release(self.encoded, x, self.laws)
@@ -160,7 +160,7 @@ class _Stepwise:
         return named(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
-        """How the inputs go from a communication point to the next, where the state is predicted from the outputs."""
+        """Return the slopes of the inputs over the next step, with the state predicted from the outputs."""
         t, ahead = float(self.times[number]), float(self.times[number + 1])
         h, x = ahead - t, self.state(row)
         n, laws = len(self.rates), self.laws.copy()
@@ -174,11 +174,11 @@ class _Stepwise:
         return named(self.encoded, change / h)
 
     def state(self, row: list[float]) -> NDArray[np.float64]:
-        """The state that a row of outputs shows, without the work done."""
+        """Return the state from a row of outputs, without the work done."""
         return np.array([*(row[n] for n in self.coordinates), *(row[n] for n in self.rates), 0.0, 0.0])
 
     def rows(self, run: Any) -> Iterator[tuple[float, list[float]]]:
-        """Times and outputs, until the end or a refused step."""
+        """Yield times and outputs until the end or a refused step."""
         if self.linear and not run.interpolates:
             raise CosimulationError(
                 f"{run.name} does not take inputs that are linear over a step: it can only hold them"
@@ -215,7 +215,7 @@ class _Continuous:
         return named(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
-        """Times and outputs, until the end or the limit of assembly, where the last configuration is given, too."""
+        """Yield times and outputs until the end or the limit of assembly, with the last configuration there."""
         from .exchange import Exchange, ExchangeError
 
         times = self.prepared.settings.times
@@ -251,7 +251,7 @@ class OutputDifference:
 
     @property
     def relative(self) -> float:
-        """Largest difference over scale; zero where both runs are zero throughout."""
+        """Return the largest difference over the scale; zero if both runs are zero throughout."""
         return 0.0 if self.largest == 0.0 else self.largest / self.scale
 
 
@@ -264,12 +264,12 @@ class Comparison:
 
     @property
     def worst(self) -> OutputDifference:
-        """The output with the largest relative difference."""
+        """Return the output with the largest relative difference."""
         return max(self.differences, key=lambda d: d.relative)
 
     @property
     def agrees(self) -> bool:
-        """Whether every output is within the tolerance."""
+        """Return whether every output is within the tolerance."""
         return self.worst.relative <= self.tolerance
 
     def __repr__(self) -> str:
@@ -339,7 +339,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
 
 
 def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float:
-    """Least scale of an output, from the largest magnitudes of the outputs like it."""
+    """Return the smallest scale of an output, from the largest magnitudes of outputs of the same kind."""
 
     def like(unit: str) -> float:
         residuals = ("closure.residual", "energy.residual")

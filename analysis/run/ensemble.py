@@ -1,4 +1,4 @@
-"""Ensembles: many runs over the same times, in batches of compiled calls, over cores, kept on disk, gone on with."""
+"""Ensembles: many runs over the same times, solved in batches on several cores, saved on disk and resumed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .signals import Function
 from .simulation import MOST_STEPS, RunOptions, sample_times, settings_of
 from .trajectory import Trajectory
 
-#: Samples of a batch at most, where its size is ours to choose.
+#: Largest number of samples in a batch whose size the caller leaves open.
 _SAMPLES_OF_BATCH = 1 << 16
 
 
@@ -93,7 +93,7 @@ class Ensemble:
         return len(self.parameters)
 
     def __getitem__(self, index: int) -> Trajectory:
-        """One run as a `Trajectory`: its samples, without the last configuration of one that ended early."""
+        """Return one run as a `Trajectory` of its samples, without the last configuration of a run that ended early."""
         n = int(self.counts[index])
         if self.values is not None:
             values = self.values[index, :n]
@@ -113,11 +113,11 @@ class Ensemble:
 
     @property
     def failures(self) -> dict[int, str]:
-        """Why a run did not reach its end, by the number of each that did not."""
+        """Return the messages of the runs that did not reach their end, by number of the run."""
         return {i: self.messages[i] for i in np.flatnonzero(self.status != 0).tolist()}
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """One output of all runs, shape (m, n), masked after the end of a run that ended early."""
+        """Return one output of all runs, shape (m, n), masked after the end of a run that ended early."""
         shape = (len(self), len(self.time))
         if self.values is not None:
             ended = np.arange(len(self.time)) >= self.counts[:, None]
@@ -152,7 +152,7 @@ def _kept(ensemble: Ensemble, folder: Path | None) -> str:
 
 
 class EnsembleOptions(RunOptions, total=False):
-    """What is seldom asked for of ensembles."""
+    """Less common options of ensembles."""
 
     batch: int | None
 
@@ -298,7 +298,7 @@ class _Gathered:
         self.modes = np.zeros(len(mechanism.modes))
 
     def _room(self, shape: tuple[int, ...], folder: Path | None) -> NDArray[np.float64]:
-        """An array; with a folder in a file there that has no name, so that of it only what is looked at takes memory."""
+        """Allocate an array; with a folder, map it to an unnamed file there so that it takes little memory."""
         size = 8 * prod(shape)
         if folder is None or not size:
             return np.empty(shape)
@@ -330,7 +330,7 @@ class _Gathered:
         self.messages[rows] = result.messages
 
     def samples(self) -> list[NDArray[np.float64]]:
-        """States and channels, or the outputs that were chosen: what a batch fills its rows of."""
+        """Return the arrays that batches fill: states and channels, or the chosen outputs."""
         return [self.states, self.forces] if self.values is None else [self.values]
 
     def ensemble(self) -> Ensemble:
@@ -352,7 +352,7 @@ class _Gathered:
 
 
 def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
-    """Hash of the code that runs depend on, beside their numbers: equations, solver, users' functions."""
+    """Return a hash of the code that runs depend on: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
     from . import batches, compiled
 
@@ -363,7 +363,7 @@ def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Ite
 
 
 def _checked(mechanism: Mechanism, inputs: Any, initial: Any, count: int) -> tuple[list[Inputs], list[InitialState]]:
-    """Inputs and initial states of each run; the inputs have one way of driving and the same functions."""
+    """Return the inputs and initial state of each run; all inputs must drive the same way with the same functions."""
     all_inputs, starts = _each(inputs, count, "inputs"), _each(initial, count, "initial states")
     nothing, rest = given(mechanism, None, None)
     all_inputs = [nothing if i is None else i for i in all_inputs]
@@ -392,7 +392,7 @@ def _checked(mechanism: Mechanism, inputs: Any, initial: Any, count: int) -> tup
 
 
 def column_of(name: str, names: tuple[str, ...]) -> int:
-    """Number of an output among ``names``.
+    """Return the index of an output among ``names``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The equations of a mechanism traced with CasADi, and from that trace their machine code."""
+"""Trace the equations of a mechanism with CasADi and compile the traces to machine code."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _ALLOWED = (
 
 @cache
 def traced(mechanism: Mechanism) -> Rebound:
-    """The functions of the mechanism's modules, for CasADi symbols in the place of floats."""
+    """Return the functions of the mechanism's modules for CasADi symbols instead of floats."""
     return symbolic.traced(mechanism.modules)
 
 
 def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
-    """A column of symbols for the constants of the equations, and the same as the NamedTuple that they take.
+    """Return symbols for the constants of the equations, as a column and as the NamedTuple that the equations take.
 
     The mechanism's switch is a number there, so that the equations can branch on it.
     """
@@ -72,7 +72,7 @@ class OfParameters(NamedTuple):
 
 
 def of_parameters(mechanism: Mechanism) -> OfParameters:
-    """The parameters with symbols in the place of their fields: their ``constants`` and ``error_scale`` can be traced."""
+    """Return the parameters as symbols, so that their ``constants`` and ``error_scale`` can be traced."""
     casadi = symbolic.library()
     functions = symbolic.traced(modules_of(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
     names = [field.name for field in fields(mechanism.parameters)]
@@ -82,14 +82,14 @@ def of_parameters(mechanism: Mechanism) -> OfParameters:
 
 
 def like_parameters(mechanism: Mechanism, functions: Rebound) -> type[SimpleNamespace]:
-    """A type with the methods of a mechanism's parameters, as they are among ``functions``, for fields of another kind."""
+    """Return a type with the methods of a mechanism's parameters, taken from ``functions``, for fields of another kind."""
     own = vars(mechanism.parameters).items()
     methods = {name: functions.of(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
     return type("LikeParameters", (SimpleNamespace,), methods)
 
 
 def modules_of(mechanism: Mechanism) -> tuple[ModuleType, ...]:
-    """The modules of the equations, and of what constants and scales are computed by."""
+    """Return the modules of the equations, and those that compute constants and scales."""
     of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
     further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}
     return tuple(dict.fromkeys((*further, *mechanism.modules)))
@@ -117,7 +117,7 @@ class Traced(NamedTuple):
 
 @cache
 def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
-    """The equations, with the mechanism's switch on or off, as expressions in the channels and modes that a run knows.
+    """Return the equations as expressions in the channels and modes of a run, with the mechanism's switch on or off.
 
     Raises
     ------
@@ -194,7 +194,7 @@ _MACHINES: dict[tuple[Mechanism, bool], Machine] = {}
 
 
 def machine(mechanism: Mechanism, switched: bool = False) -> Machine:
-    """The machine code of a mechanism's equations, made when it is first asked for, by one thread."""
+    """Return the machine code of a mechanism's equations; one thread compiles it at the first call."""
     key = mechanism, switched
     if key not in _MACHINES:
         from ..numerics.codegen import MAKING

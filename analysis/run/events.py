@@ -1,4 +1,4 @@
-"""Events: what to look out for in a run, how a run that is interrupted tells what it has, and its progress."""
+"""Events of a run, the error of an interrupted run, and progress bars."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .trajectory import Trajectory
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something to look out for in a run: an output that crosses a level, or a function that crosses zero.
+    """An event of a run: an output crosses a level, or a function crosses zero.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Event:
             raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
 
     def column(self, mechanism: Mechanism) -> int:
-        """Number of the output among those of a mechanism.
+        """Return the index of the output among those of a mechanism.
 
         Raises
         ------
@@ -85,13 +85,13 @@ class RunInterrupted(Interrupted):
         super().__init__(f"interrupted at t = {trajectory.time[-1]:.6g} s" if len(trajectory) else "interrupted")
 
 
-#: Who hears of progress in the place of a bar on the terminal.
+#: Listener that gets the progress instead of a bar on the terminal.
 _LISTENER: ContextVar[Callable[[str, float], None] | None] = ContextVar("listener", default=None)
 
 
 @contextmanager
 def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
-    """Inside, ``listener(what, share)`` is called with the progress of whatever shows it, in the place of a bar."""
+    """Report progress to ``listener(what, share)`` inside the context instead of showing a bar."""
     token = _LISTENER.set(listener)
     try:
         yield
@@ -101,7 +101,7 @@ def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
 
 @contextmanager
 def shown(progress: bool, duration: float, what: str = "running") -> Iterator[Callable[[float], None]]:
-    """A progress bar over the time of a run, as a function of the time done; nothing at all where it is not wanted."""
+    """Show a progress bar over the time of a run; yield a function that takes the time reached."""
     listener = _LISTENER.get()
     if listener is not None:
         yield lambda done: listener(what, done / duration if duration else 1.0)

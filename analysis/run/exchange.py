@@ -26,7 +26,7 @@ _set_stop_time = sundials_cvode.CVodeSetStopTime
 _set_stop_time.argtypes = [c_void_p, sunrealtype]
 _set_stop_time.restype = c_int
 
-#: What a function that CVode calls returns.
+#: Return values of the functions that CVode calls.
 _GOOD, _SHORTER_STEP, _NO_WAY = 0, 1, -1
 
 
@@ -35,7 +35,7 @@ class ExchangeError(Exception):
 
 
 class Exchange(CVodeSolver):  # type: ignore[misc]
-    """An FMU in model exchange, and what acts on it.
+    """An FMU in model exchange with its inputs, integrated by CVode.
 
     Between the times at which inputs jump they are continuous functions of time and state: a commanded rate moves by its rate
     of change. At those times the FMU is brought into event mode, where it takes commands.
@@ -80,14 +80,14 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """The state at the present time."""
+        """Return the state at the present time."""
         return self._array(self.px)
 
     def _array(self, x: Any) -> NDArray[np.float64]:
         return np.ctypeslib.as_array(x, (self.nx,))
 
     def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
-        """All inputs at a time and a state."""
+        """Return all inputs at a time and a state."""
         return named(self.encoded, sample(self.encoded, t, x, self.laws, left=left))
 
     def begin(self, released: Any = ()) -> bool:
@@ -103,7 +103,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return ended
 
     def advance(self, goal: float) -> bool:
-        """Go on to a time, or to an event before it; returns whether the run ends there.
+        """Integrate to a time, or to an earlier event, and return whether the run ends there.
 
         Raises
         ------
@@ -127,18 +127,18 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return self.begin(roots[self.model.indicators :]) if roots.any() or self.time >= self.ends[0] else False
 
     def _reason(self, error: Exception) -> Exception:
-        """Why CVode failed: because of the inputs, where it was they that could not be had."""
+        """Return the cause of a failure of CVode: the error of the inputs if there was one."""
         if self.failure is None or isinstance(self.failure, FMICallException):
             return ExchangeError(str(error))
         return self.failure
 
     def put(self, t: float, x: Any) -> None:
-        """Bring the FMU to a time and a state of CVode's."""
+        """Set the FMU to a time and state of CVode."""
         self.model.put(t, x)
         if not self.still:
             self.model.set_inputs(self.inputs(t, self._array(x), left=t >= self.ends[0]))
 
-    # What CVode calls
+    # Functions that CVode calls
 
     def _tried(self, work: Callable[[], None]) -> int:
         try:
@@ -152,7 +152,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return _GOOD
 
     def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
-        """Time derivative of the state."""
+        """Compute the time derivative of the state."""
 
         def work() -> None:
             self.put(self.origin + t, NV_DATA_S(y))
@@ -161,7 +161,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         return self._tried(work)
 
     def g(self, t: float, y: Any, gout: Any, user_data: Any) -> int:
-        """Functions whose zeros are events."""
+        """Compute the event indicators, whose zeros are events."""
 
         def work() -> None:
             x = NV_DATA_S(y)

@@ -32,7 +32,7 @@ class CosimulationError(LinkworkError):
 
 
 def unpacking_folder() -> str:
-    """Folder to unpack an FMU in: that for temporary files, or another one if it is none that a Python FMU can read.
+    """Return a folder to unpack an FMU in: the temporary folder, or another if a Python FMU cannot read that one.
 
     An FMU is told the URI of its folder. PythonFMU's wrapper decodes "%20" in it and nothing else, and where it does not find
     its files then it ends the process.
@@ -54,7 +54,7 @@ def unpacking_folder() -> str:
 
 
 def _description(fmu: str | Path) -> Any:
-    """FMPy's model description."""
+    """Read the model description of an FMU with FMPy."""
     if not Path(fmu).is_file():
         raise CosimulationError(f"there is no file {fmu}: build it with 'linkwork build'")
     try:
@@ -68,7 +68,7 @@ def _description(fmu: str | Path) -> Any:
 
 
 def offered(fmu: str | Path) -> dict[str, str]:
-    """The interfaces that an FMU has, as `cosimulate` calls them, each with its name and version in words.
+    """Return the interfaces that an FMU has, by their names in `cosimulate`, each with a description.
 
     Raises
     ------
@@ -199,7 +199,7 @@ class _Instance:
         self._fmu.exitInitializationMode()
 
     def _log(self, *arguments: Any) -> None:
-        """FMPy hands over what FMI 2.0 or 3.0 does; the message is the last."""
+        """Record a log message; of the arguments of FMI 2.0 or 3.0 the message is the last."""
         self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def __enter__(self) -> Self:
@@ -213,11 +213,11 @@ class _Instance:
         self._set_reals(self._inputs, [values[name] for name in self.input_names])
 
     def outputs(self) -> list[float]:
-        """All real outputs, in the order of the contract."""
+        """Return all real outputs, in the order of the contract."""
         return list(self._get_reals(self._outputs))
 
     def trouble(self) -> tuple[int, str]:
-        """solver.status and solver.message."""
+        """Return solver.status and solver.message."""
         found = []
         for name in ("solver.status", "solver.message"):
             variable = self._variables[name]
@@ -253,11 +253,11 @@ class FmuRun(_Instance):
 
     @property
     def interpolates(self) -> bool:
-        """Whether it takes inputs that are linear over a step."""
+        """Return whether the FMU takes inputs that are linear over a step."""
         return bool(getattr(self.description.coSimulation, "canInterpolateInputs", False))
 
     def set_slopes(self, values: Mapping[str, float]) -> None:
-        """Set how all inputs change over the next step, their time derivatives."""
+        """Set the time derivatives of all inputs over the next step."""
         self._fmu.setRealInputDerivatives(self._inputs, [1] * len(values), [values[name] for name in self.input_names])
 
 
@@ -302,13 +302,13 @@ class FmuModel(_Instance):
         self._fmu.getEventIndicators(z, self.indicators)
 
     def event(self, inputs: Mapping[str, float]) -> bool:
-        """An event at which the inputs take other values; returns whether the FMU asks for the end of the run."""
+        """Set new input values in event mode and return whether the FMU asks for the end of the run."""
         self._fmu.enterEventMode()
         self.set_inputs(inputs)
         return self.update()
 
     def update(self) -> bool:
-        """New discrete states, then continuous-time mode; returns whether the FMU asks for the end of the run."""
+        """Update discrete states, enter continuous-time mode, return whether the FMU asks for the end of the run."""
         again, terminate = True, False
         while again and not terminate:
             again, terminate, *_ = self._update()

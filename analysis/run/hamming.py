@@ -124,12 +124,12 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self._node_points: tuple[Point, ...] = ()
 
     def _norm(self, x: Array, size: Array) -> float:
-        """Root mean square of ``x`` relative to the tolerance at states of magnitude ``size``."""
+        """Return the root mean square of ``x`` relative to the tolerance at states of magnitude ``size``."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return float(np.sqrt(np.mean(np.abs(x / (self.atol + self.rtol * size)) ** 2)))
 
     def _first_step(self, span: float) -> float:
-        """A first step from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4)."""
+        """Choose the first step from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4)."""
         if self.n == 0 or span == 0.0:
             return span
         y, f = self._back[0]
@@ -170,7 +170,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return False, self.TOO_SMALL_STEP
 
     def _next_time(self) -> tuple[float, bool]:
-        """Time of the next point, and whether it is the end: nothing shorter than rounding is left over before it."""
+        """Return the time of the next point, and whether it is the end of the run to within rounding."""
         t_new = self._anchor + self.direction * self.h * (self._count + 1)
         slack = 16.0 * np.spacing(max(abs(self.t), abs(self.t_bound))) + 1e-12 * self.h
         if self.direction * (self.t_bound - t_new) <= slack:
@@ -183,7 +183,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self._back = [new, *self._back[: BACK_VALUES - 1]]
 
     def _rescale(self, h: float) -> None:
-        """Go on from here with another step."""
+        """Continue from here with another step size."""
         self.h = h
         self._anchor, self._count = self.t, 0
 
@@ -196,7 +196,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         self._rescale(h)
 
     def _hamming(self, t_new: float) -> tuple[float, Point, Array]:
-        """One step (2.28-2.31): its relative error, the new point, and its p - c."""
+        """Take one step (2.28-2.31); return its relative error, the new point, and its p - c."""
         h = self.direction * self.h
         (y0, f0), (_, f1), (y2, f2), (y3, _) = self._back[:4]
         with np.errstate(invalid="ignore", over="ignore"):
@@ -211,7 +211,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return (error if np.isfinite(new.f).all() else np.inf), new, p - c
 
     def _runge_kutta(self, length: float) -> tuple[float, Point, Point]:
-        """Two Runge-Kutta steps of half the length: their error against one of the whole, the middle, the end."""
+        """Take two Runge-Kutta steps of half the length; return their error against one full step, the middle, the end."""
         t, h = self.t, self.direction * length
         start = self._back[0]
         with np.errstate(invalid="ignore", over="ignore"):
@@ -225,7 +225,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return (error if np.isfinite(new.f).all() else np.inf), middle, new
 
     def _rk4(self, t: float, point: Point, h: float) -> Array:
-        """Kutta's classic step of size ``h`` from a point whose derivative is known."""
+        """Take a classic Runge-Kutta step of size ``h`` from a point with known derivative."""
         y, k1 = point
         k2: Array = self.fun(t + 0.5 * h, y + 0.5 * h * k1)
         k3: Array = self.fun(t + 0.5 * h, y + 0.5 * h * k2)
@@ -263,7 +263,7 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         return True
 
     def _estimate(self) -> Array:
-        """p_n - c_n that belongs to the present back values: the error of the 3/8 rule over them times 242/27."""
+        """Estimate p_n - c_n for the present back values: the error of the 3/8 rule over them times 242/27."""
         h = self.direction * self.h
         (y0, f0), (_, f1), (_, f2), (y3, f3) = self._back[:4]
         return np.asarray(242.0 / 27.0 * (y0 - y3 - 0.375 * h * (f0 + 3.0 * (f1 + f2) + f3)))

@@ -1,4 +1,4 @@
-"""What acts on a mechanism during a run: `Inputs`, and the same as the arrays that the compiled code reads.
+"""Inputs of a run: the class `Inputs`, and the arrays made from it for the compiled code.
 
 One object serves `simulate` and `cosimulate`, and every mechanism: which channels there are, the mechanism says.
 """
@@ -23,7 +23,7 @@ from ..mechanisms import MECHANISMS, InitialState, variable_units
 from ..units import Units, si
 from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, StateFunction, TorsionBar
 
-#: What counts as a number.
+#: Types that count as numbers.
 NUMBER = (int, float, np.floating, np.integer)
 _SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
@@ -106,26 +106,26 @@ class Inputs:
         return f"Inputs({', '.join(f'{name}={value!r}' for name, value in self._given.items())})"
 
     def __iter__(self) -> Iterator[str]:
-        """Names of what is given."""
+        """Iterate over the names of the given inputs."""
         return iter(self._given)
 
     def replace(self, **changes: Any) -> Inputs:
-        """The same inputs with some changed; None takes one away."""
+        """Return the inputs with some changed; None removes one."""
         return Inputs(**{**self._given, **changes})
 
     def parts(self, channel: str) -> tuple[Any, ...]:
-        """The summands of a channel."""
+        """Return the summands of a channel."""
         return _parts(self._given.get(channel))
 
     def modes(self, mechanism: Mechanism) -> dict[str, int]:
-        """The mechanism's modes, by name, that drive it by what is given."""
+        """Return the values of the mechanism's modes, by name, that these inputs select."""
         return {
             mode.name: next((n for n, name in enumerate(mode.arguments) if name in self._given), mode.default)
             for mode in mechanism.modes
         }
 
     def constants(self, names: Sequence[str]) -> list[float] | None:
-        """Values of channels that are constant all; None where one of them is not."""
+        """Return the values of channels if all are constant, else None."""
         values = []
         for name in names:
             value = self._given.get(name)
@@ -140,7 +140,7 @@ class Inputs:
 
     @property
     def held_exactly(self) -> bool:
-        """Whether a master that holds the inputs over its steps loses nothing by it: all are constant.
+        """Return whether all inputs are constant, so that holding them over a master's steps is exact.
 
         A commanded speed goes along the secant of a step, which is exact where it is constant.
         """
@@ -148,14 +148,14 @@ class Inputs:
 
 
 def _of(given: dict[str, Any]) -> Inputs:
-    """Inputs that were checked when they were made: a process that reads them may not know their mechanism."""
+    """Restore pickled inputs unchecked, because the reading process may not know their mechanism."""
     inputs = object.__new__(Inputs)
     object.__setattr__(inputs, "_given", given)
     return inputs
 
 
 def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of all channels of all mechanisms, with the flags that choose a mode; and the flags."""
+    """Return the names of all inputs of all mechanisms, including the flags that choose a mode; and the flags."""
     mechanisms = MECHANISMS.values()
     channels = dict.fromkeys(c.argument for m in mechanisms for c in m.channels if c.kind != "rate")
     modes = dict.fromkeys(name for m in mechanisms for mode in m.modes for name in mode.arguments)
@@ -163,7 +163,7 @@ def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _units(name: str) -> Units:
-    """Unit of a channel; of a flag, and of what is none, nothing has one."""
+    """Return the unit of a channel; a flag or an unknown name has none."""
     channels = (c for m in MECHANISMS.values() for c in m.channels if c.argument == name)
     return next((variable_units()[channel.name] for channel in channels), {})
 
@@ -201,7 +201,7 @@ def parameter_readers(mechanism: Mechanism) -> dict[str, files.Reader]:
 
 
 def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None) -> InitialState:
-    """State at the start from a mapping by its fields, quantities in SI or with their unit, such as {"crank_speed": "420 rpm"}.
+    """Read the initial state from a mapping by its fields, in SI or with units, such as {"crank_speed": "420 rpm"}.
 
     Raises
     ------
@@ -215,19 +215,19 @@ def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None
 
 @lru_cache(maxsize=64)
 def _at_rest(mechanism: Mechanism) -> InitialState:
-    """State at the start by default."""
+    """Return the default initial state."""
     return start_from(mechanism, {})
 
 
 @lru_cache(maxsize=64)
-def _arguments_of(mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of what can act on a mechanism, and of the flags that choose its modes."""
+def _argument_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the names of the inputs of a mechanism and of the flags that choose its modes."""
     modes = [name for mode in mechanism.modes for name in mode.arguments]
     return tuple(dict.fromkeys([*(c.argument for c in mechanism.channels if c.kind != "rate"), *modes]))
 
 
 def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
-    """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
+    """Return the inputs and initial state of a run, by default none and at rest; both must fit the mechanism.
 
     The state may be a mapping, as `start_from` reads it.
 
@@ -240,7 +240,7 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
     if not isinstance(inputs, Inputs):
         raise InputError(f"inputs is {inputs!r}: it must be analysis.Inputs")
     for name in inputs:
-        if name not in (known := _arguments_of(mechanism)):
+        if name not in (known := _argument_names(mechanism)):
             raise InputError(f"a {mechanism.name} has no input {name!r}: its inputs are {', '.join(known)}")
     if initial is None:
         initial = _at_rest(mechanism)
@@ -279,7 +279,7 @@ class Encoded:
 
     @property
     def steady(self) -> bool:
-        """Whether all channels, but for the torsion bar, are constant between the breaks.
+        """Return whether all channels except the torsion bar are constant between the breaks.
 
         A signal whose rate counts, a commanded speed, has to be so by its rate: its value counts at the beginning of an
         interval only.
@@ -294,13 +294,13 @@ class Encoded:
         )
 
     def value_name(self, channel: int) -> str:
-        """Name of a channel for a message."""
+        """Return the name of a channel for a message."""
         return self.mechanism.channels[channel].argument
 
 
 @lru_cache(maxsize=64)
 def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
-    """Of each signal its name and the numbers of its channel and of that of its rate, or -1."""
+    """Return for each signal its name and the numbers of its channel and of its rate's channel, or -1."""
     rates = {channel.freedom: n for n, channel in enumerate(mechanism.channels) if channel.kind == "rate"}
     return tuple(
         (channel.argument, n, rates.get(channel.freedom, -1) if channel.kind == "command" else -1)
@@ -368,7 +368,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
 
 
 def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients of ``part`` about the left ends of finer breaks; its outer pieces go on beyond its ends."""
+    """Return the coefficients of ``part`` on finer breaks; its outer pieces extend beyond its ends."""
     left = breaks[:-1]
     index = np.clip(np.searchsorted(part.breaks, left, side="right") - 1, 0, len(part.coefficients) - 1)
     s = left - part.breaks[index]
@@ -379,7 +379,7 @@ def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float
 
 
 def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
-    """The same inputs with those breaks that miss a sample by rounding alone moved onto it.
+    """Move breaks that miss a sample by rounding alone onto the sample, and return the new inputs.
 
     0.3 is not 3 * 0.1 in floats: a jump at 0.3 s would otherwise be missed by a whole step where inputs are sampled and
     held, and the sample there would belong to what was before the jump.
@@ -400,7 +400,7 @@ def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
 
 @lru_cache(maxsize=256)
 def compile_function(function: StateFunction, freedoms: int) -> Any:
-    """A user's function as a C function of time and state, NaN where it raises; compiled code calls its ``address``.
+    """Compile a user's function to a C function of time and state that returns NaN where the original raises.
 
     Raises
     ------
@@ -419,14 +419,14 @@ def compile_function(function: StateFunction, freedoms: int) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """The line of Numba's report that names the cause."""
+    """Return the line of Numba's report that names the cause."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     telling = [line for line in lines if not line.startswith(("Failed in nopython", "During", "File", "- During"))]
     return (telling or lines or [type(error).__name__])[0]
 
 
 def compiled_source(encoded: Encoded) -> tuple[Source, list[Any]]:
-    """The inputs as the compiled code reads them, with laws of their own, and what has to stay alive meanwhile."""
+    """Return the inputs for the compiled code with their own copy of the laws, and the objects to keep alive."""
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
