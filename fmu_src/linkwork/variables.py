@@ -170,25 +170,10 @@ def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Vari
 
 
 def output(
-    name: str,
-    unit: str,
-    description: str,
-    symbol: str = "",
-    depends: str = "all",
-    level: str = "all",
-    *,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    display: str = "",
-    rate_of: str = "",
-    role: str = "",
-    of: str = "",
+    name: str, unit: str, description: str, symbol: str = "", depends: str = "all", level: str = "all", **rest: Any
 ) -> Variable:
-    """Return a real output."""
-    return Variable(
-        name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level, rate_of,
-        role=role, of=of,
-    )  # fmt: skip
+    """Return a real output; ``rest`` are further fields of `Variable`, such as ``display`` and ``rate_of``."""
+    return Variable(name, "output", unit, description, symbol, 0.0, "Real", depends=depends, level=level, **rest)
 
 
 #: Dependencies (``depends``, ``level``) of outputs that follow from the positions, and of those that follow from the rates too.

@@ -10,8 +10,10 @@ import pytest
 
 from analysis import find_orbit, find_orbits
 from analysis.periodic import Drive, OrbitError, Stability, confirm, orbit_of, sweep
+from analysis.periodic.motion.drive import coordinate_ranges, starts_of
 from analysis.units import RAD_S_PER_RPM
-from linkwork.errors import InputError
+from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.published import SETS
 
 RIG_1_B = SETS["rig-1-spring-b"].parameters
@@ -33,6 +35,20 @@ def test_one_motion_is_found_where_all_of_them_are() -> None:
     parameters, drive = replace(RIG_1_B, slider_damping=2.0), Drive(speed=1031.5 * RAD_S_PER_RPM)
     (only,) = find_orbits(parameters, speed=drive.speed).orbits
     assert orbit_of(parameters, drive).start == pytest.approx(only.start, rel=1e-8)
+
+
+def test_starts_fill_a_range_that_is_wider_on_one_side() -> None:
+    """With a coupler of 20 cm the slider goes from -6 to 24 cm: both sides are searched, not the nearer one alone."""
+    parameters, guess = replace(TABLE_3_1, coupler_length=0.2), np.zeros(2)
+    low, high = coordinate_ranges(parameters, Drive(speed=40.0), guess)
+    for end in (low[0], high[0]):
+        check_assembly(parameters, 0.0, end / 1.25)
+        with pytest.raises(AssemblyError):
+            check_assembly(parameters, 0.0, end)
+    starts = starts_of(parameters, Drive(speed=40.0), guess, 64)
+    assert starts[:, 0].min() < 0.7 * low[0]
+    assert starts[:, 0].max() > 0.7 * high[0] > 2.0 * -low[0]
+    assert np.ptp(starts[:, 1]) > 40.0 * (high[0] - low[0]) * 0.7
 
 
 @pytest.mark.parametrize("rpm", [980.0, 1020.0])

@@ -300,7 +300,7 @@ def test_jobs_fail_in_a_sentence_come_one_at_a_time_and_stop_where_they_are_canc
         ("linkages", {}, {"points": [[0.0, 0.0], [1.0, 1.0]]}, "at least 3"),
         ("linkages", {}, {"points": "/etc/passwd"}, "be a list"),
         ("linkages", {}, {"points": ELLIPSE, "longest": 0.001}, "cannot span the target"),
-        ("slider", {"mechanism": "slider-crank"}, {"points": ELLIPSE}, "of five-bars"),
+        ("slider", {"mechanism": "slider-crank"}, {"points": ELLIPSE}, "five-bars"),
         ("slider", {"values": {"coupler.point_distance": 0.0}}, {"points": ELLIPSE}, "which the slider does not move"),
         ("tune", {}, {"speeds": [40.0, 41.0], "change": [], "share": 0.1}, "at least 1"),
         ("tune", {}, {"speeds": [41.0, 40.0], "change": ["slider.stiffness"], "share": 0.1}, "least, greatest"),

@@ -18,7 +18,7 @@ from ...files import write_csv
 from ...mechanisms import Parameters
 from ...run import takes_published
 from ..motion.discretisation import OperatingPoint
-from ..motion.drive import Drive, extent_of, starts_of
+from ..motion.drive import Drive, coordinate_ranges, starts_of
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, PLAIN, VARIATIONAL
 from ..motion.orbit import PeriodicOrbit, first_guess, require_turns
@@ -299,7 +299,8 @@ def basins(
     if not motions:
         raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one")
     first = motions[0].start
-    extent, scale, half = extent_of(parameters, drive, first)[0], motions[0].scale, len(first) // 2
+    low, high = (side[0] for side in coordinate_ranges(parameters, drive, first))
+    extent, scale, half = min(-low, high), motions[0].scale, len(first) // 2
     spans = position or (-extent, extent), rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0))
     for name, (low, high) in zip(("position", "rate"), spans):
         if not (np.isfinite(low) and np.isfinite(high) and low < high):

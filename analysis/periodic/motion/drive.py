@@ -434,6 +434,8 @@ def _turning(
 SAME = 1e-6
 #: How far starts reach where no limit of assembly is met, in the scale of y, and the step to it.
 _WIDEST, _WIDER = 16.0, 1.25
+#: Ratio of both sides of a range beyond which it is one-sided: more than one step of the above.
+_ONE_SIDED = 1.3
 #: Crank speeds of starts under a torque, relative to the guess.
 _SPEEDS = (0.25, 1.5)
 
@@ -463,28 +465,35 @@ def is_smooth(parameters: Parameters) -> bool:
     )
 
 
-def extent_of(parameters: Parameters, drive: Drive, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far each free coordinate can go to both sides of zero at the crank angle 0; shape (free coordinates,)."""
+def coordinate_ranges(
+    parameters: Parameters, drive: Drive, guess: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far below and above zero each free coordinate can go at the crank angle 0, two arrays of shape (free,)."""
     mechanism = mechanism_of(parameters)
     flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), scale_of(parameters, drive, guess)
-    found = scale[: flow.size // 2].copy()
-    for i in range(len(found)):
-        while found[i] < _WIDEST * scale[i]:
-            try:
-                for sign in (-1.0, 1.0):
-                    y = guess.copy()
-                    y[i] = sign * found[i]
+    sides = []
+    for sign in (-1.0, 1.0):
+        found = scale[: flow.size // 2].copy()
+        for i in range(len(found)):
+            while found[i] < _WIDEST * scale[i]:
+                y = guess.copy()
+                y[i] = sign * found[i]
+                try:
                     mechanism.check_assembly(parameters, flow.state(y, vector))
-            except AssemblyError:
-                break
-            found[i] *= _WIDER
-    return found
+                except AssemblyError:
+                    break
+                found[i] *= _WIDER
+        sides.append(sign * found)
+    return sides[0], sides[1]
 
 
 def starts_of(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
-    """Starts with all amplitudes up to the extent and all phases, by a scrambled Sobol sequence; shape (count, n).
+    """Return starts of all amplitudes and phases within the ranges of the coordinates, by a scrambled Sobol sequence.
+
+    In the plane of a coordinate and its rate they fill the greatest ellipse about zero. Where a coordinate can go much further
+    to one side, as many again fill the ellipse about the middle of the whole range; shape (count or 2 count, n).
 
     Parameters
     ----------
@@ -495,17 +504,24 @@ def starts_of(
     number : int
         Of the set; sets of different numbers have different starts.
     """
-    flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
-    half = flow.size // 2
-    extent = extent_of(parameters, drive, guess)
     from scipy.stats import qmc  # takes half a second
 
+    flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
+    half = flow.size // 2
+    low, high = coordinate_ranges(parameters, drive, guess)
     sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
-    found = np.tile(guess, (count, 1))
-    found[:, :half] = extent * amplitude * np.cos(phase)
-    found[:, half : 2 * half] = extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
-    if flow.torque:
-        low, high = _SPEEDS
-        found[:, -1] *= low + (high - low) * sequence[:, -1]
-    return found
+    # the centre and the half axes of each ellipse
+    ellipses = [(np.zeros(half), np.minimum(-low, high))]
+    if (np.maximum(-low, high) > _ONE_SIDED * np.minimum(-low, high)).any():
+        ellipses.append((0.5 * (low + high), 0.5 * (high - low)))
+    sets = []
+    for centre, extent in ellipses:
+        found = np.tile(guess, (count, 1))
+        found[:, :half] = centre + extent * amplitude * np.cos(phase)
+        found[:, half : 2 * half] = extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
+        if flow.torque:
+            slow, fast = _SPEEDS
+            found[:, -1] *= slow + (fast - slow) * sequence[:, -1]
+        sets.append(found)
+    return np.vstack(sets)
