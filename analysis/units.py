@@ -159,12 +159,25 @@ _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·.]\s*|\s+){_FACTOR})*"
 _GRAMMAR = re.compile(rf"\s*({_NUMBER})\s*({_PRODUCT}(?:\s*/\s*\({_PRODUCT}\))?)?\s*")
 #: Longest text that is read.
 _LONGEST = 100
+#: Units by SI unit as machine builders spell them and pint does not: a pattern, and what it stands for.
+_SPELLINGS = {
+    "rad/s": (re.compile(r"(?:(?<=[0-9.\s])(?:RPM|U/min)|(?<=\s)1/min)(?=\s*$)"), "rpm"),
+    "N.m": (re.compile(r"(?<=[0-9.\s])N(m?m)(?=\s*$)"), r"N*\1"),
+}
 _PLAIN = "write a number with a decimal point, without spaces or separators in it, and a unit"
+
+
+def _respelled(text: str, unit: str) -> str:
+    """Return a quantity's text in pint's spelling: "200 U/min" becomes "200 rpm", "20 Nmm" becomes "20 N*mm"."""
+    if unit not in _SPELLINGS:
+        return text
+    pattern, spelling = _SPELLINGS[unit]
+    return pattern.sub(spelling, text)
 
 
 def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
     """Convert a text with a unit to SI by pint."""
-    match = _GRAMMAR.fullmatch(text) if len(text) <= _LONGEST else None
+    match = _GRAMMAR.fullmatch(_respelled(text, unit)) if len(text) <= _LONGEST else None
     if match is None:
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         raise ParameterError(name, shown, f"{wanted}: {_PLAIN}")

@@ -210,6 +210,13 @@ def main() -> None:
     parser.add_argument("--fmu", type=Path, help="FiveBarSlider.fmu to run instead of the plant in process")
     parser.add_argument("--figures", type=Path, help="folder to write the figures into")
     options = parser.parse_args()
+    if options.fmu and not options.fmu.exists():
+        parser.error(f"--fmu {options.fmu}: it does not exist")
+    if options.figures:
+        try:
+            options.figures.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            parser.error(f"--figures {options.figures}: the folder cannot be made ({error.strerror})")
     models, designs, loop = still(options.fmu)
     steps(options.fmu)
     balance(options.fmu)

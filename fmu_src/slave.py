@@ -10,6 +10,7 @@ import atexit
 import ctypes
 import json
 import sys
+import zlib
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -376,13 +377,17 @@ class LinkworkSlave(Fmi2Slave):
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
         # repr of a float, as JSON writes it, comes back as the same float
-        return json.dumps(state).encode("utf-8")
+        text = json.dumps(state).encode("utf-8")
+        return text[:-1] + b', "check": "%08x"}' % zlib.crc32(text)
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         # no exception may leave here, where there is no instance to keep: a damaged state is reported when it is set
+        text, _, check = state.rpartition(b', "check": "')
+        if check != b'%08x"}' % zlib.crc32(text + b"}"):
+            return {"damaged": "its checksum is not that of its text"}
         try:
-            saved = json.loads(state.decode("utf-8"))
+            saved = json.loads(text.decode("utf-8") + "}")
         except (ValueError, RecursionError) as error:
             return {"damaged": repr(error)}
         return saved if isinstance(saved, dict) else {"damaged": "it is not one of a Linkwork slave"}

@@ -29,14 +29,14 @@ errors = Console(emoji=False, stderr=True)
 
 
 def visible(text: str) -> str:
-    """A text without characters that a terminal would act on: they are written as Python writes them, such as \\x1b."""
+    """Return a text with a terminal's control characters escaped as Python writes them, such as \\x1b."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
 def plain(text: str) -> Text:
-    """A text for a table, as it was typed: neither markup nor emoji codes count."""
+    """Return a text for a table as it was typed, without reading markup or emoji codes in it."""
     return Text(visible(text))
 
 
@@ -88,14 +88,14 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_tolerance(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
-    """Callback of an option that is a tolerance; written so that NaN is refused too."""
+    """Check the value of a tolerance option, as its callback; NaN is refused too."""
     if value is not None and not 0.0 < value <= 1.0:
         raise click.BadParameter(f"{value} is not between 0 and 1")
     return value
 
 
 def tolerance_option(*names: str, default: float | None = None, help: str) -> Callable[..., Any]:
-    """An option that is a tolerance, between 0 and 1."""
+    """Return an option for a tolerance between 0 and 1."""
     return click.option(
         *(names or ["--tolerance"]),
         type=float,
@@ -107,7 +107,7 @@ def tolerance_option(*names: str, default: float | None = None, help: str) -> Ca
 
 
 def out_option(default: str = "out", help: str = "Folder for CSV and plots.") -> Callable[..., Any]:
-    """The options --out and --force."""
+    """Return a decorator that adds the options --out and --force."""
     out = click.option("--out", default=default, show_default=True, type=click.Path(file_okay=False), help=help)
     return lambda command: out(force_option(command))
 
@@ -138,7 +138,7 @@ def _join(context: click.Context, parameter: click.Parameter, address: str | Non
 
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
-    """Inside, work goes over the workers of a Dask cluster."""
+    """Run the work inside this context on the workers of a Dask cluster."""
     _check_libraries("distributed")
     import joblib
     from distributed import Client
@@ -152,7 +152,7 @@ def _cluster(address: str) -> Iterator[None]:
 
 
 def workers_options(default: int | None = None) -> Callable[..., Any]:
-    """The options --jobs and --scheduler: over which cores and machines work goes."""
+    """Return a decorator that adds the options --jobs and --scheduler: the cores or the cluster to compute on."""
     jobs = click.option(
         "--jobs",
         "--cores",
@@ -174,14 +174,14 @@ def workers_options(default: int | None = None) -> Callable[..., Any]:
 
 
 def folder_of(out: str | Path) -> Path:
-    """The folder that --out names, made where it is not there."""
+    """Return the folder of the option --out; make it if it does not exist."""
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
 def set_option(example: str) -> Callable[..., Any]:
-    """The option --set, which can be given often; ``example`` ends the sentence "Change a value, such as"."""
+    """Return the repeatable option --set; ``example`` completes its help text "Change a value, such as"."""
     return click.option(
         "--set", "settings", multiple=True, metavar="NAME=VALUE", help=f"Change a value, such as {example}."
     )
@@ -221,7 +221,7 @@ def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
 
 
 def plotted(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
-    """The picture of a result, where pictures are wanted: what was written."""
+    """Plot a result into a file if plots are wanted, and return the paths written."""
     from .. import figures
     from ..files import save_figure
 
@@ -242,7 +242,7 @@ def case_options(published: Iterable[str]) -> Callable[..., Any]:
 
 
 def number_or_text(text: str) -> bool | int | float | str:
-    """A value of the command line: true, false, a bare number in SI, or else a text with its unit."""
+    """Read a value from the command line: true, false, a bare number in SI, or else a text with its unit."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -254,7 +254,7 @@ def number_or_text(text: str) -> bool | int | float | str:
 
 
 def unknown(name: str, known: Iterable[str], words: str) -> click.UsageError:
-    """The error for a name on the command line that nothing has, with the one that was probably meant."""
+    """Return the error for an unknown name on the command line, with the closest known names."""
     from ..files import unknown_name
 
     return click.UsageError(str(unknown_name(name, known, words)))
@@ -277,7 +277,7 @@ _OTHERS = {
 
 
 def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
-    """What tables are about, by the names that only one kind of file has; None where they do not show it."""
+    """Return the kind of a case file, judged by the names of its tables; None if they do not show it."""
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, acting_on
 
@@ -296,7 +296,7 @@ def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
 
 
 def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()) -> None:
-    """Make sure that a file is of a kind that the command takes.
+    """Check that a file is of a kind that the command takes.
 
     Parameters
     ----------
@@ -322,14 +322,14 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
 
 
 def quantity(text: str, unit: str, option: str) -> float:
-    """The value of an option in SI, from a text with its unit or a bare number."""
+    """Return the value of an option in SI, from a text with its unit or a bare number."""
     from .. import units
 
     return units.quantity(number_or_text(text), unit, option)
 
 
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
-    """Values by dotted name from the options ``--set NAME=VALUE``."""
+    """Return values by dotted name from the options ``--set NAME=VALUE``."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -340,7 +340,7 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    """The case of a file or a published set, with the changes of ``--set``."""
+    """Return the case of a file or of a published set, with the changes of ``--set``."""
     from ..run import case_from, load_case, published_case
 
     if (file is None) == (published is None):

@@ -108,10 +108,10 @@ def _motions(title: str, found: Sequence[Orbits]) -> None:
     show_table(title, headings, rows, words=("stability",))
     for turns, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"
-        index = (
-            ""
-            if part.index == 1
-            else f"; their indices add up to {part.index}, not 1: one may be missing, or come to the limit of assembly"
-        )
+        if part.index != 1:
+            sure = (
+                "there may be another motion, or one that reaches the limit of assembly: the indices of these add up to "
+                f"{part.index} instead of 1"
+            )
         of = "" if len(found) == 1 else f"of {format_count(turns, 'turn')}: "
-        say(of + sure + index)
+        say(of + sure)

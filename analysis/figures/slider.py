@@ -12,7 +12,7 @@ from .dispatch import plot
 
 @plot.register
 def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
-    """Position, force, power and pin forces over the turn."""
+    """Plot slider position, force, power and pin forces over the turn."""
     x = np.degrees(np.abs(drive.crank_angle))
     parts = [
         ("slider position [mm]", [Curve(x=x, y=1e3 * drive.states[:, 1])]),
@@ -32,7 +32,7 @@ def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_tracking(run: TrackingResult, *, title: str = "") -> Figure:
-    """Errors of slider and coupler point, and the force, over the time of the run."""
+    """Plot the errors of slider and coupler point, and the slider force, over the time of the run."""
     time = run.loop.time
     panels = [
         Panel(x_label="time [s]", y_label=label, curves=[Curve(x=time, y=values)])

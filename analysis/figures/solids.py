@@ -23,7 +23,7 @@ _LIGHT = np.array([-0.25, 0.75, 0.61])
 
 
 def tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
-    """A cylinder with closed ends; in pieces along its length, each painted at its own depth."""
+    """Return a cylinder with closed ends, in pieces along its length, each painted at its own depth."""
     way = (end - start) / np.linalg.norm(end - start)
     first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
     first /= np.linalg.norm(first)
@@ -41,7 +41,7 @@ def tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, 
 
 
 def ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
-    """A sphere."""
+    """Return a sphere."""
     turn, rise = np.meshgrid(
         np.linspace(0.0, 2.0 * pi, sides + 1), np.linspace(-0.5 * pi, 0.5 * pi, sides // 2 + 1), indexing="ij"
     )

@@ -76,13 +76,13 @@ def styled(*, laid_out: bool = True) -> Iterator[None]:
 
 
 def write_title(figure: Figure, title: str) -> None:
-    """The title of a figure, on as many lines as it takes; nothing if it is empty."""
+    """Write the title of a figure over as many lines as it needs; write nothing if it is empty."""
     if title:
         figure.suptitle(fill(title, int(_LETTERS * figure.get_figwidth())))
 
 
 def write_notes(figure: Any, notes: Sequence[str]) -> None:
-    """Sentences at the foot of a figure: what its reader must know, and what was left out of it."""
+    """Write notes at the foot of a figure: remarks for its reader, and what was left out of it."""
     width = int(_NOTED * figure.get_figure(root=True).get_figwidth())
     lines = "\n".join(fill(note, width, subsequent_indent="    ") for note in notes)
     if lines:
@@ -90,7 +90,7 @@ def write_notes(figure: Any, notes: Sequence[str]) -> None:
 
 
 def legend_above(axis: Axes, **options: Any) -> None:
-    """A legend over the axes, where no curve can be."""
+    """Place a legend above the axes, clear of all curves."""
     where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1, "ncols": 4}
     axis.legend(**where | {"borderpad": 0.2, "columnspacing": 1.2} | options)
 

@@ -7,9 +7,9 @@
 #include <string.h>
 
 /* The text is JSON. Its numbers are written as the hexadecimal digits of their bits, which are the same on every platform and in
-   every locale. */
+   every locale. The last of them is a checksum of all the text before it. */
 
-#define HEADER "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\",\"format\":1,\"numbers\":\""
+#define HEADER "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\",\"format\":2,\"numbers\":\""
 
 static const char hexadecimal[] = "0123456789abcdef";
 
@@ -32,15 +32,29 @@ Status instance_restore(Instance *c, const void *state) {
     return OK;
 }
 
+/* Add a character to a checksum: FNV-1a of 64 bits, which tells of every change of a single character. */
+static uint64_t summed(uint64_t sum, char character) {
+    return (sum ^ (unsigned char)character) * 0x100000001b3u;
+}
+
+static const uint64_t NOTHING = 0xcbf29ce484222325u; /* the checksum of no text */
+
 /* Text that is counted where there is no room for it. */
 typedef struct {
     char *text;
     size_t size;
+    uint64_t sum;
 } Out;
 
 static void put(Out *out, const char *text) {
-    for (; *text; text++, out->size++)
+    for (; *text; text++, out->size++) {
         if (out->text) out->text[out->size] = *text;
+        out->sum = summed(out->sum, *text);
+    }
+}
+
+static void put_bits(Out *out, uint64_t bits) {
+    for (int shift = 60; shift >= 0; shift -= 4) put(out, (char[]){hexadecimal[bits >> shift & 15], 0});
 }
 
 static void put_saved(Out *out, const Saved *saved) {
@@ -48,12 +62,14 @@ static void put_saved(Out *out, const Saved *saved) {
     for (size_t i = 0; i < NUMBERS; i++) {
         uint64_t bits;
         memcpy(&bits, (const char *)saved + i * sizeof bits, sizeof bits);
-        for (int shift = 60; shift >= 0; shift -= 4) put(out, (char[]){hexadecimal[bits >> shift & 15], 0});
+        put_bits(out, bits);
     }
     put(out, "\",\"message\":\"");
     put(out, saved->message);
     put(out, "\",\"cause\":\"");
     put(out, saved->cause_message);
+    put(out, "\",\"check\":\"");
+    put_bits(out, out->sum);
     put(out, "\"}");
 }
 
@@ -65,13 +81,13 @@ void instance_forget_saved(void **state) {
 }
 
 size_t instance_serialized_size(const void *state) {
-    Out out = {0};
+    Out out = {.sum = NOTHING};
     put_saved(&out, state);
     return out.size;
 }
 
 Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size) {
-    Out out = {.text = text};
+    Out out = {.text = text, .sum = NOTHING};
     if (!instance_counts(c, function, size, instance_serialized_size(state))) return ERROR;
     put_saved(&out, state);
     return OK;
@@ -111,6 +127,14 @@ static bool take_number(In *in, char *number) {
     return true;
 }
 
+/* Whether the checksum follows of all the text up to there. */
+static bool take_check(In *in, const char *text) {
+    uint64_t sum = NOTHING, found;
+    if (!take(in, "\",\"check\":\"")) return false;
+    for (const char *c = text; c < in->at; c++) sum = summed(sum, *c);
+    return take_number(in, (char *)&found) && found == sum;
+}
+
 static bool whole(double value, double least, double most) {
     return least <= value && value <= most && value == floor(value);
 }
@@ -137,7 +161,8 @@ Status instance_deserialize(Instance *c, const char *text, size_t size, void **s
     bool good = take(&in, HEADER);
     for (size_t i = 0; i < NUMBERS && good; i++) good = take_number(&in, (char *)saved + i * sizeof(double));
     good = good && take_text(&in, "\",\"message\":\"", saved->message) &&
-           take_text(&in, "\",\"cause\":\"", saved->cause_message) && take(&in, "\"}") && in.at == in.end && sound(saved);
+           take_text(&in, "\",\"cause\":\"", saved->cause_message) && take_check(&in, text) && take(&in, "\"}") &&
+           in.at == in.end && sound(saved);
     if (!good) {
         free(saved);
         return instance_say(c, ERROR, "the serialised state is damaged, or not one of a " MODEL_IDENTIFIER);

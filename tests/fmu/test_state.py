@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -285,17 +286,31 @@ def damaged(fmu: str, folder: str, pieces: list[str]) -> list[Any]:
     return found
 
 
+def checked(state: Any) -> str:
+    """Return a state as text with the checksum that it must have."""
+    text = json.dumps(state)
+    return text[:-1] + f', "check": "{zlib.crc32(text.encode()):08x}"}}'
+
+
 def test_damaged_state_is_refused(fmu: Path, model: Model, tmp_path: Path) -> None:
     arguments = (ONE[model.name], WAITING[model.name], OTHER[model.name])
-    whole = json.loads(run_in_process(save_diverge_restore, fmu, tmp_path / "a", *arguments)["data"])
+    data = run_in_process(save_diverge_restore, fmu, tmp_path / "a", *arguments)["data"]
+    whole = json.loads(data)
+    del whole["check"]
+    assert checked(whole) == data
+    digits = [place for place, character in enumerate(data) if character.isdigit()]
+    changed = [data[:place] + str((int(data[place]) + 1) % 10) + data[place + 1 :] for place in digits]
     pieces = [
         "not JSON",
         "[" * 200_000,
         "[1, 2]",
-        json.dumps(whole | {"interface": "another"}),
-        json.dumps({name: value for name, value in whole.items() if name != "phase"}),
-        json.dumps(whole | {"plant": {"time": 0.0}}),
-        json.dumps(whole | {"plant": whole["plant"] | {"parameters": {"crank_length": -1.0}}}),
+        data + " ",
+        data.replace('"check"', '"chick"'),
+        *changed,
+        checked(whole | {"interface": "another"}),
+        checked({name: value for name, value in whole.items() if name != "phase"}),
+        checked(whole | {"plant": {"time": 0.0}}),
+        checked(whole | {"plant": whole["plant"] | {"parameters": {"crank_length": -1.0}}}),
     ]
     for status, log, same in run_in_process(damaged, fmu, tmp_path / "b", pieces):
         assert status == 4

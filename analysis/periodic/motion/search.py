@@ -234,7 +234,7 @@ class Orbits(Shown):
     orbits : tuple of PeriodicOrbit
         By amplitude, the smallest first.
     agreed : bool
-        Whether the two methods found the same motions; if not, there may be more.
+        Whether the two methods found the same motions and ``index`` is 1; if not, there may be more.
     index : int
         Sum of the signs of det(I - monodromy matrix) over these motions and those whose period divides theirs, each counted
         once per turn. It is 1 if every motion stays clear of the limit of assembly, since motions come and go in pairs of
@@ -427,7 +427,7 @@ def orbits_of(
             deflated.add(orbit)
         places = [*many.places(MANY, number + 1), *many.between()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
-    return Orbits(orbits=tuple(orbits), agreed=agreed, index=many.index)
+    return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == 1, index=many.index)
 
 
 class _Found:
