@@ -191,7 +191,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
 
 
 def _form(family: Any, special: Any) -> str:
-    """Whether stability is lost gently or with a jump."""
+    """Return in words whether stability is lost gently or with a jump."""
     from ..periodic import OrbitError, normal_form
 
     try:
@@ -201,7 +201,7 @@ def _form(family: Any, special: Any) -> str:
 
 
 def _friction(parameters: Any) -> bool:
-    """Whether there is friction that is not viscous."""
+    """Return whether there is friction that is not viscous."""
     return any(getattr(parameters, field_name(name)) for name in mechanism_of(parameters).names("friction"))
 
 

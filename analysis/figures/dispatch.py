@@ -169,5 +169,5 @@ def last_samples(run: Trajectory) -> tuple[slice, str]:
 
 
 def has_picture(parameters: object) -> bool:
-    """Whether `draw_mechanism` draws the mechanism of these parameters."""
+    """Return whether `draw_mechanism` draws the mechanism of these parameters."""
     return _find(draw_mechanism, type(parameters), MECHANISMS) is not None

@@ -196,7 +196,7 @@ def _jump(jump: FoldJump, look: _Scale) -> str:
 
 
 def _is_met(branch: Branch, special: SpecialPoint) -> bool:
-    """Whether a motion beside a special point is stable: a machine comes there."""
+    """Return whether a motion beside a special point is stable, so that a machine reaches it."""
     return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
 
 
