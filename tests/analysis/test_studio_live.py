@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,32 @@ def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> N
     after = page.evaluate("window.studio.state.values['drive.speed']")
     assert after - before == pytest.approx(100.0 * RPM / 200.0, rel=1e-9)
     assert page.evaluate("window.studio.charts.response.done")
+
+
+@in_browser
+@pytest.mark.parametrize(
+    ("name", "change", "low", "high"),
+    [
+        ("rig-1-spring-b", {}, 1000.0, 1100.0),
+        ("rig-1-spring-b", {"slider_damping": 12.0}, 1000.0, 1250.0),
+        ("rig-2-spring-c", {}, 450.0, 700.0),
+        ("table-3.1", {}, 250.0, 500.0),
+    ],
+)
+def test_the_ranges_to_avoid_are_pythons(
+    page: Any, name: str, change: dict[str, float], low: float, high: float
+) -> None:
+    """The page's own search for ranges is the twin of `analysis.periodic.response.advice`, for motions of one turn."""
+    known = PUBLISHED[name]
+    parameters = replace(known.parameters, **change)
+    inputs = Drive(speed=0.5 * (low + high) * RPM).inputs(mechanism_of(parameters))
+    _load(page, state_of(Case(title="", parameters=parameters, inputs=inputs, stop_time=1.0)))
+    _explored(page, "response", {"What varies": (low, high)})
+    found = page.evaluate("window.studio.charts.response.avoided")
+    wanted = frequency_response(parameters, low * RPM, high * RPM, doublings=0).speeds_to_avoid
+    np.testing.assert_allclose(
+        [[one["low"], one["high"]] for one in found], [[one.low, one.high] for one in wanted], rtol=1e-4
+    )
 
 
 @in_browser

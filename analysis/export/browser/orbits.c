@@ -1,4 +1,5 @@
-/* Periodic motions over the crank's angle: by Newton's method, one after another along a branch, and how far they swing. */
+/* Periodic motions over the crank's angle: by Newton's method, one after another along a branch, and how far they swing. The twin, for
+   a browser without Python, of analysis/periodic/motion and response/branch.py; tests of the studio hold the numbers equal. */
 #include "studio.h"
 
 #include <complex.h>
