@@ -137,6 +137,11 @@ def test_a_rotor_on_a_motor_locks_to_the_commanded_one_with_the_multipliers_of_a
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(np.column_stack(columns))), np.sort_complex(orbit.multipliers), atol=1e-6
     )
+    response = frequency_response(P, 23.95, 24.05, drive=drive, vary="left.speed", start=orbit.start, doublings=0)
+    assert not response.problems
+    at = min(response.branches[0].orbits, key=lambda point: abs(point.drive.speed - 24.0))
+    again = orbit_of(P, at.drive, start=at.start, settle=False)
+    np.testing.assert_allclose(again.start, at.start, rtol=1e-6, atol=1e-7)
 
 
 def test_speeds_without_a_common_period_and_drives_that_say_too_little_are_refused() -> None:

@@ -245,8 +245,20 @@ def period_from(
 
 
 def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
-    """Return whether collocation serves for motions under these drives: at prescribed speed and with smooth rates."""
-    return all(drive.speed_drive for drive in drives) and all(map(is_smooth, dict.fromkeys(mechanisms)))
+    """Return whether collocation serves for motions under these drives: at prescribed speed and with smooth rates.
+
+    It takes the slopes of the coordinates for their rates over the speed, which they are not of a crank that turns freely
+    with a ratio.
+    """
+    mechanisms = list(dict.fromkeys(mechanisms))
+
+    def follows(drive: Drive) -> bool:
+        if not (drive.speed_drive and drive.ratios):
+            return drive.speed_drive
+        flow = drive.flow(mechanism_of(mechanisms[0]))
+        return not {*flow.free} & {*flow.others}
+
+    return all(map(follows, drives)) and all(map(is_smooth, mechanisms))
 
 
 class Stations(NamedTuple):
