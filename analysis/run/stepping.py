@@ -52,8 +52,9 @@ class Flow(NamedTuple):
 
 @inner
 def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
-    """Take a step of size h from x at ``begin + elapsed`` into room.y, with initial rates room.k[0]; return its error relative to
-    ``flow.scale``.
+    """Take a step of size h from x at ``begin + elapsed`` into room.y; return its error relative to ``flow.scale``.
+
+    The rates at the start of the step are room.k[0].
 
     ``u`` is what acts; where ``piece`` is not negative it is sampled from ``source`` at each stage.
     """
