@@ -64,7 +64,7 @@ _libraries: set[Path] = set()
 
 
 def _end_library_in_order(resources: str, model: str) -> None:
-    """Have the wrapper's library let go of the interpreter when Python ends, not while the process tears itself down.
+    """Make the wrapper's library release the interpreter when Python ends, not while the process is torn down.
 
     On Linux the library clears its pointer to the interpreter's state in a destructor that runs after the pointer itself
     was destroyed: a use after free that now and then aborts a process whose run was good. Cleared before, it is harmless.
@@ -144,7 +144,7 @@ class LinkworkSlave(Fmi2Slave):
         self._master_tolerance: float | None = None
 
     def _build(self) -> Plant:
-        """The plant for the present parameters and inputs, at its start."""
+        """Build the plant for the present parameters and inputs, at its start."""
         values = dict(zip(self._names, self._values))
         own, master = values["solver.tolerance"], self._master_tolerance
         tolerance = own if master is None else min(own, max(master, TOLERANCE_RANGE[0]))

@@ -78,7 +78,7 @@ class Commands(click.Group):
 
 
 def _sentence(error: click.ClickException) -> str:
-    """What click says, as one sentence in small letters, and where there is help."""
+    """Return Click's message as one sentence in small letters, with a pointer to the help."""
     text = error.format_message().strip().removesuffix(".").replace(". Did you mean", "; did you mean")
     # S1, a4 and the like stay as they are
     if text[1:2].islower() or text[1:2] == " ":

@@ -52,7 +52,7 @@ def print_written(paths: Iterable[Path]) -> None:
 
 
 def handled(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Turn the project's errors into a sentence and an exit code, and keep files that the command did not write."""
+    """Turn Linkwork's errors into a sentence and an exit code, and protect files that the command did not write."""
 
     @wraps(command)
     def run(*arguments: Any, **options: Any) -> Any:
@@ -232,7 +232,7 @@ plot_option = click.option("--plot/--no-plot", default=True, show_default=True, 
 
 
 def case_options(published: Iterable[str]) -> Callable[..., Any]:
-    """The argument CASE, --published with these sets, and --set: what `chosen_case` takes."""
+    """Add the argument CASE and the options --published, for these sets, and --set, which `chosen_case` takes."""
     options = (
         click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
         click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(published)}."),

@@ -38,7 +38,7 @@ POSES = 6
 
 
 def settings_of(settings: Sequence[str]) -> dict[str, Any]:
-    """Overrides of a case file from NAME=VALUE: a value of TOML, else a text with its unit."""
+    """Return the overrides of a case file given as NAME=VALUE; a value is read as TOML, or else as text with a unit."""
 
     def value(text: str) -> Any:
         try:
@@ -57,7 +57,7 @@ def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
 
 
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options that commands with a search share."""
+    """Add the options that all commands with a search share."""
     for option in (
         click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots."),
         out_option(help="Folder for the results."),
@@ -74,7 +74,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
-    """Overrides of a case file: those of ``--set``, and the options that were given, ``table__name=value``."""
+    """Return the overrides of a case file from ``--set`` and from the given options, ``table__name=value``."""
     given = {name.replace("__", "."): value for name, value in options.items() if value is not None}
     return settings_of(settings) | given
 

@@ -38,7 +38,7 @@ class Chosen:
     folder: Path
 
     def drive(self, speed: str | None = None) -> Any:
-        """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
+        """Return the drive of the case with its constant forces; a given speed replaces the drive of the crank."""
         from ..periodic import VaryingInputError, drive_of
 
         speed = speed or self.speed
@@ -56,7 +56,7 @@ class Chosen:
             raise InputError(f"{self.case.title}: {error}{hint}") from None
 
     def start(self, drive: Any) -> list[float] | None:
-        """Guess of the orbit's start: none at prescribed speed, else all at zero with a crank speed."""
+        """Return a guess of the orbit's start: none at prescribed speed, else zero with a crank speed."""
         if drive.speed_drive:
             if self.guess_speed is not None:
                 raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
@@ -82,7 +82,7 @@ class Chosen:
 
 
 def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
-    """Options of a command about a case, which it receives as one `Chosen`."""
+    """Add the options of a command about a case, which it receives as one `Chosen`."""
 
     @handled
     @wraps(command)
@@ -110,6 +110,6 @@ def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def swing_of(orbit: Any) -> tuple[str, float, str]:
-    """What the amplitude is of, and the factor and unit in which it is printed: centimetres of lengths."""
+    """Return the coordinate whose amplitude is printed, with factor and unit: centimetres for lengths."""
     what, unit = orbit.swing
     return (what, 100.0, "cm") if unit == "m" else (what, 1.0, unit)

@@ -17,7 +17,7 @@ EXAMPLES = (PACKAGE.parent / "examples", PACKAGE / "_examples")
 
 
 def _several(context: click.Context, parameter: click.Parameter, values: Sequence[str]) -> tuple[str, ...]:
-    """Callback of an option that can be given often, or once with commas."""
+    """Read an option that can be given several times, or once with commas."""
     return tuple(name for value in values for name in value.split(",") if name)
 
 

@@ -93,7 +93,7 @@ def basins(
 
 
 def _motions(title: str, found: Sequence[Orbits]) -> None:
-    """All motions at one speed, by the turns of their periods, and how sure it is that there are no others."""
+    """Print all motions at one speed by the turns of their periods, and whether others may exist."""
     from ..periodic import Stability
 
     headings = ("motion", "turns", "amplitude", "stability", "largest multiplier")

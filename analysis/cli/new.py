@@ -55,7 +55,7 @@ _WISH: Mapping[str, Any] = {
 
 
 def kinds() -> dict[str, str]:
-    """What `linkwork new` writes, and the command that takes it."""
+    """Return the kinds of files that `linkwork new` writes, each with the command that reads it."""
     runs = dict.fromkeys(MECHANISMS, "linkwork run")
     return (
         runs
@@ -68,7 +68,7 @@ def kinds() -> dict[str, str]:
 
 
 def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
-    """The text of a case file of a kind; of a mechanism, with ``parameters`` these alone."""
+    """Return the text of a case file of a kind; for a mechanism with ``parameters``, of the parameters alone."""
     if kind in MECHANISMS:
         mechanism = MECHANISMS[kind]
         command = f"linkwork {kind if kind == 'slider-crank' else ''} info".replace("  ", " ")
@@ -83,7 +83,7 @@ def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
 
 
 def _grouped(rows: Mapping[str, str]) -> Iterator[str]:
-    """Lines by dotted name in their tables, those of no table first."""
+    """Group lines by the table of their dotted names, lines without a table first."""
     for group in dict.fromkeys(sorted((name.rpartition(".")[0] for name in rows), key=bool)):
         if group:
             yield f"\n[{group}]"
@@ -99,7 +99,7 @@ def _value(variable: Any, value: Any) -> Any:
 
 
 def _parameter_rows(mechanism: Mechanism) -> dict[str, str]:
-    """Parameters of the first published set."""
+    """Return the rows of the parameters of the first published set."""
     from ..files import line
 
     made = next(iter(mechanism.published.values())).parameters
@@ -115,7 +115,7 @@ def _parameters(mechanism: Mechanism) -> Iterator[str]:
 
 
 def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
-    """A run of the first published set at its speed; without a prescribed speed, of a second with nothing acting on it."""
+    """Return the table of a run of the first published set at its speed, or of one second without inputs."""
     from ..files import entries, in_words, line
     from ..run import RunTable, acting_on, signal_kinds
 
@@ -160,7 +160,7 @@ def _tuning(file: str) -> Iterator[str]:
 
 
 def _synthesis(kind: str, file: str) -> Iterator[str]:
-    """A task with its tables; of a slider's motion those of both."""
+    """Return the tables of a synthesis task, or of a task and the motion of its slider."""
     from ..files import Quantity, entries, line
     from ..slider import TABLES as MOTION
     from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES

@@ -104,7 +104,7 @@ def _write(report: Report, path: Path) -> Path:
 
 
 def _show(findings: Sequence[Finding]) -> None:
-    """A table of the findings, those of one kind in one row."""
+    """Print a table of the findings, one row for each kind."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.severity, finding.kind), []).append(finding)

@@ -86,7 +86,7 @@ def decrement(
 
 
 def _found(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:
-    """What a decay shows: names, values, standard errors and units; friction where ``metre``, the record's unit, is given."""
+    """Return the rows of a fitted decay: names, values, standard errors, units; friction if the unit ``metre`` is given."""
     natural, error = decay.natural_frequency, decay.natural_frequency_error
     rows = [
         ("logarithmic decrement", decay.decrement, decay.decrement_error, ""),

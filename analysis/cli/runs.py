@@ -140,7 +140,7 @@ def run(
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
-    """For each speed of a turn that was given as a bare number: what it is taken for, and whether rpm was meant."""
+    """Return a note for each speed given as a bare number: its value in rad/s and the question whether rpm was meant."""
     from ..files import flattened, read_tables
     from ..mechanisms import mechanism_of
     from ..run import acting_on
@@ -260,7 +260,7 @@ def check(
 
 
 def _fmus_to_check(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
-    """FMUs of a model, each with its interfaces (or the one asked for) by name and in words."""
+    """Return the FMUs of a model, each with its interfaces, or the requested one, by name and in words."""
     from ..run import CHECKED, offered
 
     if only is not None and only not in CHECKED:
@@ -275,7 +275,7 @@ def _fmus_to_check(model: str, fmu: str | None, only: str | None) -> list[tuple[
 
 
 def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:
-    """Standard cases and case files with their names; without names the first case of each mechanism, or all.
+    """Return the standard cases and case files of these names; without names the first case of each mechanism, or all.
 
     Where an FMU is named, the standard cases are those of its mechanism.
     """
@@ -302,7 +302,7 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
 
 
 def _model_name(path: Path) -> str | None:
-    """Name of the model in an FMU; None where there is none to read, which the check reports."""
+    """Return the name of the model in an FMU; None if it cannot be read, which the check reports."""
     from fmpy import read_model_description
 
     from ..files import check_fmu

@@ -87,7 +87,7 @@ def slider_motion(
 
 
 def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """The simplest mechanism within the tolerance; and the interruption of the search, if there was one."""
+    """Return the simplest mechanism within the tolerance, and the interruption of the search if there was one."""
     from ..slider import StrategyInterrupted
 
     stopped = None
@@ -107,7 +107,7 @@ def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """The best motion, harmonic by harmonic, beside the fixed pivot; and the interruption, if there was one."""
+    """Return the best motion for each number of harmonics beside the fixed pivot, and the interruption if there was one."""
     from ..synthesis import SynthesisInterrupted
 
     stopped = None
@@ -129,7 +129,7 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
-    """The fixed pivot and the motions, a row each, in mm and degrees."""
+    """Print the fixed pivot and the motions, one row each, in mm and degrees."""
     from ..slider import greatest_derivative
     from ..synthesis import SliderMotion, format_transmission, quality_cells, quality_headings, quality_name
 
@@ -171,7 +171,7 @@ def _write_solution(solution: Solution, folder: Path, title: str, plots: bool) -
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
-    """The slider's position and its derivatives by the crank's rotation."""
+    """Return columns of the slider's position and of its derivatives with respect to the crank's rotation."""
     columns = {"crank rotation [rad]": rotation, "slider position [m]": series(rotation)}
     columns["du/dphi [m/rad]"] = series.derivative()(rotation)
     columns["d2u/dphi2 [m/rad2]"] = series.derivative().derivative()(rotation)
@@ -182,7 +182,7 @@ def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
 
 
 def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
-    """Force, torque and pin forces; a case that runs; and the run under control, where asked for."""
+    """Compute force, torque and pin forces; write a case to run, and run it under control if requested."""
     from ..files import write_csv, write_tables
     from ..run import save_parameters
     from ..slider import run_case

@@ -150,7 +150,7 @@ def resonance(
 
 
 def _natural(parameters: Any) -> float | None:
-    """The natural frequency, None where there is no spring."""
+    """Return the natural frequency; None without a spring."""
     from ..periodic import natural_frequency
 
     try:
@@ -160,7 +160,7 @@ def _natural(parameters: Any) -> float | None:
 
 
 def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None) -> tuple[float, float]:
-    """The range to follow, by default about the natural frequency."""
+    """Return the range to follow, by default around the natural frequency."""
     from ..periodic import speed_names, unit_of
 
     unit = unit_of(mechanism_of(parameters), vary)
@@ -191,7 +191,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
 
 
 def _form(family: Any, special: Any) -> str:
-    """Whether stability is lost gently or with a jump."""
+    """Return in words whether stability is lost gently or with a jump."""
     from ..periodic import OrbitError, normal_form
 
     try:
@@ -201,7 +201,7 @@ def _form(family: Any, special: Any) -> str:
 
 
 def _friction(parameters: Any) -> bool:
-    """Whether there is friction that is not viscous."""
+    """Return whether there is friction that is not viscous."""
     return any(getattr(parameters, field_name(name)) for name in mechanism_of(parameters).names("friction"))
 
 
@@ -231,7 +231,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 
 
 def _avoid(response: Any, factor: float, unit: str) -> None:
-    """The ranges to avoid, and what happens at the folds, in words."""
+    """Print the ranges to avoid and the jumps at folds in words."""
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if not ranges:
@@ -352,7 +352,7 @@ def _axis_range(
 
 
 def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None:
-    """The verdict on the motion at one speed, beside that of the linear equation."""
+    """Print the verdict on the motion at one speed beside the verdict of the linear equation."""
     from ..periodic import orbit_of
     from ..youssef import linear_verdict
 

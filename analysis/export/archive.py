@@ -73,7 +73,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
 def documentation(
     mechanism: Mechanism, variables: Sequence[Variable], title: str, made: str, notes: Sequence[str]
 ) -> dict[str, bytes]:
-    """Icon, licence and the HTML page inside an FMU: what the model is, how it is ``made``, and the table of its variables."""
+    """Return icon, licence and the HTML page of an FMU: the model, the way it is ``made``, and the table of its variables."""
     rows = []
     for variable in variables:
         bounds = [

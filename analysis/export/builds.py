@@ -27,7 +27,7 @@ class Built(NamedTuple):
 
 
 def kinds_here() -> tuple[str, ...]:
-    """The kinds of FMU that can be built here: without Zig only those in Python."""
+    """Return the kinds of FMU that can be built here: without Zig only those in Python."""
     zig = importlib.util.find_spec("ziglang") is not None
     return tuple(name for name, kind in KINDS.items() if zig or kind is PYTHON)
 

@@ -81,7 +81,7 @@ for place, name in enumerate(names):
 
 
 def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
-    """Time and the most important outputs of the default experiment, by the plant in Python, a row each step."""
+    """Compute time and the most important outputs of the default experiment with the plant in Python, one row for each step."""
     start, stop, step, _ = mechanism.experiment
     first = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
     names = list(dict.fromkeys([*first, *mechanism.output_names]))[: VARIABLES - 1]
@@ -102,7 +102,7 @@ def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
 
 
 def table(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
-    """Comma-separated values in the form that fmi-standard.org asks for: names in quotes, numbers as in C."""
+    """Return comma-separated values in the form of fmi-standard.org: names in quotes, numbers as in C."""
     text = io.StringIO()
     csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(names)
     csv.writer(text, lineterminator="\n").writerows([[repr(float(value)) for value in row] for row in rows])
@@ -110,7 +110,7 @@ def table(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
 
 
 def options(mechanism: Mechanism) -> str:
-    """What the reference was computed with, and within what of it an importer should be."""
+    """Return the options of the reference and the tolerance for an importer."""
     start, stop, step, _ = mechanism.experiment
     values: Mapping[str, float | str] = {
         "StartTime": start,
@@ -125,7 +125,7 @@ def options(mechanism: Mechanism) -> str:
 
 
 def readme(mechanism: Mechanism, kind: Kind) -> str:
-    """What the FMU is, what of FMI can be tested with it, and what imports it."""
+    """Return a text on the FMU, the parts of FMI that it tests, and its importers."""
     features = {
         2: "saved and serialised states, directional derivatives, derivatives of inputs and outputs over time, a state event",
         3: "saved and serialised states, directional and adjoint derivatives, intermediate update, early return, terminals, "
@@ -154,6 +154,6 @@ Importers that the tests of this version run it in, by kind of FMU:
 
 
 def _version(package: str) -> str | None:
-    """Version of an installed package; CoFMUPy is in a folder of its own."""
+    """Return the version of an installed package; CoFMUPy has a folder of its own."""
     found = metadata.distributions(name=package, path=[*sys.path, f"{sys.prefix}/cofmupy"])
     return next((distribution.version for distribution in found), None)

@@ -61,7 +61,7 @@ class Kind(NamedTuple):
         return "ModelExchange" in self.interfaces
 
     def identifier(self, mechanism: Mechanism) -> str:
-        """Model identifier."""
+        """Return the model identifier."""
         return f"{mechanism.fmu}{self.suffix}"
 
     def file_name(self, mechanism: Mechanism) -> str:
@@ -114,7 +114,7 @@ KINDS = {"python": PYTHON, "native": NATIVE, "native-fmi3": NATIVE_FMI3}
 
 
 def token(mechanism: Mechanism, kind: Kind) -> str:
-    """GUID or instantiation token: it changes when a variable, its type, unit or start does, and only then."""
+    """Return the GUID or instantiation token, which changes only with a variable, its type, unit or start value."""
     lines = [
         "|".join((v.name, v.causality, v.kind, v.unit, repr(v.start), repr(v.minimum), repr(v.maximum)))
         for v in (entry.variable for entry in _entries(mechanism, kind))
@@ -123,7 +123,7 @@ def token(mechanism: Mechanism, kind: Kind) -> str:
 
 
 def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -> bytes:
-    """``modelDescription.xml`` of an FMU.
+    """Return ``modelDescription.xml`` of an FMU.
 
     The same mechanism gives the same bytes, but for the date of generation, which ``SOURCE_DATE_EPOCH`` sets.
 
@@ -252,7 +252,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
 
 
 def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
-    """Attributes of a variable that are those of its type."""
+    """Return the attributes of a variable that belong to its type."""
     kind = {"Real": float, "Integer": int, "String": str}[variable.kind]
 
     def text(value: Any) -> str:
@@ -273,7 +273,7 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
 
 
 def started(mechanism: Mechanism) -> Plant:
-    """The mechanism at its start, where all parameters and inputs have their start values."""
+    """Return the mechanism at its start with the start values of all parameters and inputs."""
     values = {v.name: v.start for v in mechanism.variables}
     return Plant.of_values(mechanism, values, time=mechanism.experiment[0])
 
@@ -282,7 +282,7 @@ def started(mechanism: Mechanism) -> Plant:
 
 
 def _number(kind: Kind, reference: int) -> str:
-    """How the model structure and derivatives refer to a variable: by its index, in FMI 3.0 by its value reference."""
+    """Return the number by which the model structure names a variable: its index, in FMI 3.0 its value reference."""
     return str(reference + 1 if kind.fmi == 2 else reference)
 
 
@@ -321,7 +321,7 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
 
 
 def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
-    """Inputs that each output depends on, as the table states it, by value references."""
+    """Return the inputs on which each output depends by the table of variables, as value references."""
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     inputs = {
         "state": frozenset[int](),
@@ -333,7 +333,7 @@ def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
 
 @cache
 def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
-    """What outputs, derivatives and the event indicator depend on by the equations, by value references.
+    """Return the dependencies of outputs, derivatives and event indicator by the equations, as value references.
 
     On the states, and on the inputs: directly, and through the jump of a commanded rate.
     """
@@ -359,7 +359,7 @@ def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
 
 
 def _reinitialised(mechanism: Mechanism) -> tuple[int, ...]:
-    """Value references of the states that a jump of a commanded rate changes."""
+    """Return the value references of the states that a jump of a commanded rate changes."""
     casadi = symbolic.library()
     traced = expressions(mechanism)
     before, after = casadi.vertsplit(traced.symbols.x), casadi.vertsplit(traced.jump)
@@ -370,7 +370,7 @@ def _reinitialised(mechanism: Mechanism) -> tuple[int, ...]:
 
 
 def terminals(mechanism: Mechanism) -> bytes:
-    """``terminalsAndIcons.xml``: what belongs together at a shaft, a slider or a loaded point.
+    """Return ``terminalsAndIcons.xml`` with the terminals of shafts, sliders and loaded points.
 
     A terminal for each freedom, with coordinate, rate and acceleration, its inputs, and the torque or force applied; one for
     the inputs of each point that a load acts on, with its displacement.
@@ -389,7 +389,7 @@ def terminals(mechanism: Mechanism) -> bytes:
 
 
 def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
-    """Terminals by name: the description, and variables by the name of the member."""
+    """Return the terminals by name: description, and variables by the name of the member."""
     rate = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
     found: dict[str, tuple[str, dict[str, str]]] = {}
 
@@ -419,7 +419,7 @@ def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:
-    """``buildDescription.xml``: how to compile the files ``sources`` below ``sources/``, C11 with no options."""
+    """Return ``buildDescription.xml``, by which the files below ``sources/`` are compiled as C11 without options."""
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     files = SubElement(configuration, "SourceFileSet", {"language": "C11"})

@@ -29,7 +29,7 @@ TINY = 1e-300
 
 
 def generated(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
-    """The generated files by name: sizes.h, tables.c, tableau.h and equations.c."""
+    """Return the generated files by name: sizes.h, tables.c, tableau.h and equations.c."""
     return {
         "sizes.h": _sizes(mechanism, kind),
         "tables.c": _tables(mechanism),
@@ -50,7 +50,7 @@ def _equations(mechanism: Mechanism) -> str:
 
 
 def c_of(functions: Iterable[Any], file: str) -> str:
-    """Functions of CasADi as C, for the shell; ``file`` is the name that what they share begins with."""
+    """Return functions of CasADi as C for the shell; ``file`` begins the names that they share."""
     options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
     generator = symbolic.library().CodeGenerator(f"{file}.c", options)
     for function in functions:
@@ -63,7 +63,7 @@ def c_of(functions: Iterable[Any], file: str) -> str:
 
 
 def _choices(mechanism: Mechanism, numbers: int) -> str:
-    """Of the functions traced with the mechanism's switch on and off: which is called, by the constants.
+    """Return C that calls the function traced with the mechanism's switch on or off, by the constants.
 
     With the switch on the solution that the equations contain, of so many numbers, is computed once, and given to the function
     that needs it. What is differentiated is always all there is: the constants may change too.
@@ -96,7 +96,7 @@ _CHOSEN = {
 
 
 def functions(mechanism: Mechanism) -> list[Any]:
-    """The equations that the C shell calls, as functions of CasADi; see model.h for their arguments."""
+    """Return the equations that the C shell calls as functions of CasADi; see model.h for their arguments."""
     casadi = symbolic.library()
     named = _table(mechanism, False)
     del named["solution"], named["values"]
@@ -116,7 +116,7 @@ def functions(mechanism: Mechanism) -> list[Any]:
 
 
 def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], list[Any]]]:
-    """Arguments and results of the functions, with the mechanism's switch on or off."""
+    """Return arguments and results of the functions, with the mechanism's switch on or off."""
     casadi = symbolic.library()
     sx, join = casadi.SX, casadi.vertcat
     trace = equations.expressions(mechanism, switched)
@@ -138,7 +138,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         return [casadi.densify(casadi.jtimes(result, of, change)) for result in results]
 
     def reverse(results: list[Any], of: Any, parts: list[Any]) -> tuple[list[Any], list[Any]]:
-        """Weights of the results, and the gradient of their weighted sum by the parts of what they are of."""
+        """Return weights of the results, and the gradient of their weighted sum with respect to the arguments."""
         weights = [sx.sym(f"g{n}", *result.shape) for n, result in enumerate(results)]
         gradient = casadi.densify(casadi.jtimes(join(*results), of, join(*weights), True))
         ends = [0]
@@ -171,7 +171,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
 def _in_solution(
     mechanism: Mechanism, s: equations.Symbols, switched: bool, *, smooth: bool
 ) -> tuple[list[Any], Any, Any]:
-    """Outputs, derivative and clearance in symbols for the solution that they contain, these, and what they stand for.
+    """Return outputs, derivative and clearance in symbols for the solution inside them, the symbols, and their values.
 
     A last sweep of Newton's method begins from the solution, so that the derivatives of that sweep are those of the solution.
     As they are differentiated (``smooth``) a length, the root of squares, changes by 0 where it is 0, not by 0/0.
@@ -211,7 +211,7 @@ def _in_solution(
 
 
 def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
-    """Parameters and given state as symbols; constants with the energy, state, its scale and the least parameters of these."""
+    """Trace the start: symbols of parameters and given state; constants with energy, state, scale and least parameters."""
     casadi = symbolic.library()
     own, parameters, functions = equations.of_parameters(mechanism)
     state = casadi.SX.sym("state", 2 * len(mechanism.freedoms))
@@ -352,7 +352,7 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
 
 
 def _place(mechanism: Mechanism, entry: Entry) -> str:
-    """Row of what is computed; number of an input."""
+    """Return the row of a computed variable or the number of an input."""
     if entry.role == "input":
         return str(mechanism.input_names.index(entry.variable.name))
     if entry.role == "output":
@@ -365,7 +365,7 @@ def _place(mechanism: Mechanism, entry: Entry) -> str:
 
 
 def _rule(mechanism: Mechanism, entry: Entry) -> tuple[str, float, float, str]:
-    """What a parameter must be: the rule, bounds, and the requirement in words."""
+    """Return the condition on a parameter: rule, bounds, and the requirement in words."""
     rules = mechanism.rules
     name = entry.variable.name.replace(".", "_", 1)
     if entry.role == "tolerance":
@@ -384,7 +384,7 @@ def _rule(mechanism: Mechanism, entry: Entry) -> tuple[str, float, float, str]:
 
 
 def _commands(mechanism: Mechanism) -> list[str]:
-    """Which channel commands which rate, in which mode."""
+    """Return the commanded channels with their rates and modes."""
     rows = []
     for number, channel in enumerate(mechanism.channels):
         if channel.kind != "command":
@@ -405,7 +405,7 @@ def _commands(mechanism: Mechanism) -> list[str]:
 
 
 def _tableau() -> str:
-    """The coefficients of the integrator."""
+    """Return the coefficients of the integrator as C."""
     rows = tableau.A[: tableau.STAGES + 1]
     ends = [0, 0]
     for row in rows[1:]:

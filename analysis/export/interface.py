@@ -51,7 +51,7 @@ class Entry(NamedTuple):
 
 
 def with_starts(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
-    """A mechanism with other start values of parameters and inputs, by FMI name: `build_native` makes an FMU with these.
+    """Return a mechanism with other start values by FMI name, from which `build_native` makes an FMU with these values.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def with_starts(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
 
 @cache
 def interface(mechanism: Mechanism) -> tuple[Entry, ...]:
-    """All variables of a native FMU of the mechanism, in the order of their value references."""
+    """Return all variables of a native FMU of the mechanism, in the order of their value references."""
     table = [*((v, _role(mechanism, v)) for v in mechanism.variables), *_additions(mechanism)]
     reference = {variable.name: number for number, (variable, _) in enumerate(table)}
     return tuple(
@@ -82,19 +82,19 @@ def interface(mechanism: Mechanism) -> tuple[Entry, ...]:
 
 
 def states(mechanism: Mechanism) -> tuple[int, ...]:
-    """Value references of the components of the state, in their order."""
+    """Return the value references of the components of the state, in their order."""
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     return tuple(reference[name] for name in _state_names(mechanism))
 
 
 def derivatives(mechanism: Mechanism) -> tuple[int, ...]:
-    """Value references of the time derivatives of the components of the state, in their order."""
+    """Return the value references of the time derivatives of the components of the state, in their order."""
     derivative = {entry.derivative_of: entry.reference for entry in interface(mechanism)}
     return tuple(derivative[reference] for reference in states(mechanism))
 
 
 def indicator(mechanism: Mechanism) -> int:
-    """Value reference of the event indicator."""
+    """Return the value reference of the event indicator."""
     return next(entry.reference for entry in interface(mechanism) if entry.role == "indicator")
 
 
@@ -114,7 +114,7 @@ def _role(mechanism: Mechanism, variable: Variable) -> str:
 
 
 def _additions(mechanism: Mechanism) -> list[tuple[Variable, str]]:
-    """What a native FMU has beside the mechanism's variables, each with its role."""
+    """Return the variables that a native FMU has beside those of the mechanism, each with its role."""
     units = {v.name: v.unit for v in mechanism.variables}
     differentiated = {v.rate_of for v in mechanism.variables}
     added = [(Variable("time", "independent", "s", "Time"), "time")]
@@ -134,7 +134,7 @@ def _additions(mechanism: Mechanism) -> list[tuple[Variable, str]]:
 
 
 def _unit_of_rate(unit: str) -> str:
-    """The unit of the time derivative of a variable in ``unit``."""
+    """Return the unit of the time derivative of a variable in ``unit``."""
     of = UNITS[unit]
     wanted = of._replace(s=of.s - 1, displays=())
     for name, candidate in UNITS.items():

@@ -71,7 +71,7 @@ _NOTES = (
 
 
 def this_platform() -> str:
-    """Name of the platform that this process runs on.
+    """Return the name of the platform that this process runs on.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def build_native(
 
 
 def source_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
-    """All C files of a native FMU by name: the shell, the standard's headers, what is generated."""
+    """Return all C files of a native FMU by name: the shell, the headers of the standard, and the generated files."""
     shell = SOURCES / "native"
     headers = resources.files("fmpy") / "c-code"
     files = {name: (shell / name).read_text(encoding="utf-8") for name in (f"fmi{kind.fmi}.c", *_SHELL)}
@@ -141,7 +141,7 @@ def source_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
 
 
 def _binaries(identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]) -> dict[str, bytes]:
-    """The libraries by their place in the archive; those of one place, for two architectures of macOS, joined."""
+    """Compile the libraries and return them by place in the archive; two architectures of macOS share one file."""
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:
         for name, text in sources.items():
@@ -190,7 +190,7 @@ def compile_library(
 
 
 def _universal(parts: Sequence[bytes]) -> bytes:
-    """Libraries of macOS for several architectures in one file, as Apple's loader reads it (<mach-o/fat.h>)."""
+    """Join libraries of macOS for several architectures in one file, as Apple's loader reads it (<mach-o/fat.h>)."""
     align = 14  # pages of 16 KiB
     header = struct.pack(">II", 0xCAFEBABE, len(parts))
     body = b""

@@ -108,7 +108,7 @@ class _Staged(NamedTuple):
 
 
 def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
-    """Copy plant and slave under names that carry a hash of their content; a mechanism from elsewhere joins the plant."""
+    """Copy plant and slave under names with a hash of their content; a mechanism from elsewhere joins the plant."""
     shared = sources / "linkwork"
     package = str(mechanism.modules[-1].__package__)
     folder = package.rpartition(".")[2]
@@ -143,7 +143,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
 
 
 def _describe(staged: _Staged) -> bytes:
-    """The model description of what was staged, not of what is imported here; its slave takes the GUID."""
+    """Return the model description of the staged files, not of the modules imported here, and give its slave the GUID."""
     sys.path.insert(0, str(staged.script.parent))
     mechanism = import_module(staged.mechanism).MECHANISM
     guid = f'guid_of_interface = "{token(mechanism, PYTHON)}"'
@@ -154,7 +154,7 @@ def _describe(staged: _Staged) -> bytes:
 
 @contextmanager
 def _import_state() -> Iterator[None]:
-    """Undo what pythonfmu's builder does to the import state of this process."""
+    """Undo the changes that pythonfmu's builder makes to the import state of this process."""
     path, modules = list(sys.path), set(sys.modules)
     writes_bytecode = sys.dont_write_bytecode
     sys.dont_write_bytecode = True

@@ -33,7 +33,7 @@ _OPTIONS = (
 
 
 def build_web(mechanism: Mechanism) -> bytes:
-    """The WebAssembly of a mechanism; see `browser/studio.c` for what it exports.
+    """Build the WebAssembly of a mechanism; see `browser/studio.c` for its functions.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def build_web(mechanism: Mechanism) -> bytes:
 
 
 def web_sources(mechanism: Mechanism) -> dict[str, str]:
-    """All C files of a mechanism's module by name."""
+    """Return all C files of a mechanism's module by name."""
     files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHARED}
     files |= {path.name: path.read_text(encoding="utf-8") for path in sorted(_OWN.glob("*.[ch]"))}
     others = [f"Equation driven_{name};\n#define equations_{name} driven_{name}\n" for name in _DRIVEN]
@@ -62,12 +62,12 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
 
 
 def crank_number(mechanism: Mechanism) -> int:
-    """Which freedom turns; -1 without."""
+    """Return the number of the first freedom that turns; -1 without one."""
     return next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
 
 
 def _header(mechanism: Mechanism) -> str:
-    """drawing.h: what the module has beside a native FMU."""
+    """Return the text of drawing.h, the declarations that a native FMU does not have."""
     joints = mechanism.drawing.joints if mechanism.drawing else ()
     freedoms = mechanism.freedoms
     crank = crank_number(mechanism)
@@ -103,12 +103,12 @@ def _header(mechanism: Mechanism) -> str:
 
 
 def _torque_of(mechanism: Mechanism, crank: int) -> int:
-    """Number of the input that is the torque on the crank; -1 without."""
+    """Return the number of the input that is the torque on the crank; -1 without one."""
     return next((n for n, c in enumerate(mechanism.channels) if c.kind == "force" and c.freedom == crank >= 0), -1)
 
 
 def _drawing(mechanism: Mechanism) -> str:
-    """drawing.c: where the joints are, and how that changes with what is given."""
+    """Return the text of drawing.c: positions of the joints and their derivatives with respect to the given values."""
     casadi = symbolic.library()
     join, sx = casadi.vertcat, casadi.SX
     modes, u = sx.sym("modes", len(mechanism.modes)), sx.sym("u", len(mechanism.channels))
@@ -130,7 +130,7 @@ def _drawing(mechanism: Mechanism) -> str:
 
 
 def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
-    """The torque of a motor, slopes with it, how these change, and what is at rest: names, arguments and results."""
+    """Return functions as names, arguments and results: motor torque, derivatives under it, and matrices at rest."""
     casadi = symbolic.library()
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
     motor, speed, d_motor, d_speed = (sx.sym(n, size) for n, size in zip("mvde", (len(MOTOR), 1, len(MOTOR), 1)))

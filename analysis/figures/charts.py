@@ -93,7 +93,7 @@ def plot_charts(
 
 
 def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
-    """The scale of a map's values and its colours."""
+    """Return the scale of a map's values and its colours."""
     values = np.ma.masked_invalid(chart.values)
     if chart.classes:
         n = len(chart.classes)
@@ -109,7 +109,7 @@ def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
 
 
 def keys_of(chart: HeatMap) -> list[tuple[str, str, str]]:
-    """Colour, hatching and name of what the legend has of a map besides its curves."""
+    """Return colour, hatching and name of a map's entries in the legend besides its curves."""
     keys = [(colour, hatch, name) for (name, colour), hatch in zip(chart.classes.items(), cycle(_HATCHES))]
     if chart.sides is not None:
         keys += [(_BELOW, "", chart.sides[0]), (_ABOVE, _UNSTABLE, chart.sides[1])]
@@ -152,7 +152,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
 
 
 def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:
-    """What is hatched, as ones among zeros, and how."""
+    """Return the hatched points, as ones among zeros, and the hatching."""
     if chart.sides is not None and chart.middle is not None:
         return [(np.asarray(values.filled(-np.inf) > chart.middle + TOLERANCE, dtype=float), _UNSTABLE)]
     hatches = [_HATCHES[i % len(_HATCHES)] for i in range(len(chart.classes))]
@@ -161,7 +161,7 @@ def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64],
 
 @pictured
 def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
-    """What is stable, unstable or not found, the largest multiplier in colours, the boundaries, and the long runs."""
+    """Plot stable, unstable and missing points with the largest multiplier in colours, the boundaries, and the long runs."""
     x, y = chart.axes
     looks = {
         Crossing.PERIOD_DOUBLING: ("0.1", "-", "period doubling"),
@@ -226,7 +226,7 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
 
 
 def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Picture:
-    """How many stable motions there are, and how large the smallest and the largest are, with the boundaries over them."""
+    """Plot the number of stable motions and the amplitudes of the smallest and the largest, with the boundaries."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
     factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
@@ -260,7 +260,7 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
 
 @pictured
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
-    """The motion that each start ends in by its colour, and the motions themselves at the crank angle 0."""
+    """Plot each start in the colour of the motion in which it ends, and the motions at the crank angle 0."""
     x_label, y_label = found.labels
     half = len(found.motions[0].start) // 2
     what, unit = found.motions[0].swing

@@ -88,7 +88,7 @@ class _Margins(NamedTuple):
 
     @classmethod
     def of(cls, system: Any) -> _Margins:
-        """The least factors up and down, and the least angle, at which the closed loop ceases to be stable, if it is."""
+        """Return the least gain factors up and down and the least angle at which a stable closed loop becomes unstable."""
         poles = control.feedback(system, 1).poles()
         if not np.all(np.abs(poles) < 1.0 if system.isdtime(strict=True) else poles.real < 0.0):
             return cls(stable=False)
@@ -99,7 +99,7 @@ class _Margins(NamedTuple):
         return cls((*down[-1:], *up[:1]), min(angles, key=lambda pair: abs(pair[0]), default=None))
 
     def report(self) -> str:
-        """In words."""
+        """Return the margins in words."""
         if not self.stable:
             return "the closed loop is not stable"
         words = [f"gain {'reduction ' if gain < 1.0 else ''}margin {gain:.3g}" for gain, _ in self.gains]
@@ -108,7 +108,7 @@ class _Margins(NamedTuple):
 
 
 def _mark_margins(above: Axes, below: Axes, found: _Margins, omega: FloatArray, phase: FloatArray, colour: str) -> None:
-    """Bars: from the magnitude to 1 where the phase is -180 deg, and from the phase to -180 deg where the magnitude is 1."""
+    """Draw the gain margin as a bar at the phase -180 deg, and the phase margin as a bar at the magnitude 1."""
     look: dict[str, Any] = {"color": colour, "linewidth": BOLD, "marker": "o", "zorder": 4}
     for gain, at in found.gains:
         above.plot([at, at], [1.0 / gain, 1.0], gid="gain margin", **look)
@@ -120,7 +120,7 @@ def _mark_margins(above: Axes, below: Axes, found: _Margins, omega: FloatArray, 
 
 @plot.register
 def plot_design(design: Design, *, frequencies: ArrayLike | None = None, title: str = "") -> Figure:
-    """Magnitude and phase of a controller's open loop, with its margins; see `plot_bode`."""
+    """Plot magnitude and phase of a controller's open loop with its margins; see `plot_bode`."""
     return plot_bode({design.method: design.loop}, frequencies=frequencies, margins=True, title=title)
 
 
@@ -128,7 +128,7 @@ def plot_design(design: Design, *, frequencies: ArrayLike | None = None, title: 
 def plot_linear_model(
     model: LinearModel, output: str | None = None, input: str | None = None, **options: Any
 ) -> Figure:
-    """Magnitude and phase of a linear model from one input to one output, by their FMI names; see `plot_bode`.
+    """Plot magnitude and phase of a linear model from one input to one output, by FMI names; see `plot_bode`.
 
     By default from the force on the last free freedom to the last free coordinate.
     """

@@ -203,7 +203,7 @@ def pictured(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
 
 
 def draw(picture: Picture) -> Figure:
-    """A figure of a picture, one pair of axes per part."""
+    """Draw a picture as a figure with one pair of axes for each part."""
     parts, columns, size = picture.parts, picture.columns, picture.size
     rows = ceil(len(parts) / columns)
     heights = picture.heights or [1.0] * rows
@@ -283,7 +283,7 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
 
 
 def shades_by_label(panel: Panel) -> list[tuple[str, int, list[Shade]]]:
-    """The shades of a panel that are one entry of the legend each: label, look, ranges."""
+    """Return the shades of a panel by entry of the legend: label, look, ranges."""
     kinds = dict.fromkeys((shade.label, shade.number) for shade in panel.shades)
     return [(*kind, [shade for shade in panel.shades if (shade.label, shade.number) == kind]) for kind in kinds]
 

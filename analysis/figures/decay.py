@@ -15,7 +15,7 @@ from .style import COLOURS, Figure
 def plot_decay(
     decay: Decay, record: tuple[ArrayLike, ArrayLike] | None = None, *, unit: str = "", title: str = ""
 ) -> Figure:
-    """The turning points of a free decay with their envelope, and the decrement of each cycle.
+    """Plot the turning points of a free decay with their envelope, and the decrement of each cycle.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class DrawingError(LinkworkError, TypeError):
 
 
 def _find(pictures: Any, kind: type, modules: Sequence[str] = MODULES) -> Callable[..., Any] | None:
-    """The function that draws results of a type, looked for in one module after another; None if there is none."""
+    """Return the function that draws results of a type from the first module that has one; None if there is none."""
     nothing = pictures.dispatch(object)
     for module in modules:
         import_module(f".{module}", __package__)
@@ -162,12 +162,12 @@ def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
-    """The samples over which paths of a run are drawn, and in words: of a long run the last, as many as can be drawn."""
+    """Return the samples over which paths of a run are drawn, in words too: of a long run the last ones."""
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"
 
 
 def has_picture(parameters: object) -> bool:
-    """Whether `draw_mechanism` draws the mechanism of these parameters."""
+    """Return whether `draw_mechanism` draws the mechanism of these parameters."""
     return _find(draw_mechanism, type(parameters), MECHANISMS) is not None

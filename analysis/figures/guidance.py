@@ -41,7 +41,7 @@ VIEW = 2.2
 
 @plot.register
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
-    """The poses with every dyad, and beside them every four-bar with what is wrong with it."""
+    """Plot the poses with every dyad, and beside them every four-bar with its defects."""
     count = len(found.solutions)
     columns = min(4, max(1, count))
     rows = max(1, ceil(count / columns)) if count else 0
@@ -73,7 +73,7 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
-    """The poses with the curves of pivots and points, the best linkage, and which pairs of dyads make a sound four-bar."""
+    """Plot the poses with the curves of pivots and points, the best linkage, and the pairs of dyads that are sound."""
     with styled():
         figure = Figure(figsize=(10.4, 4.8))
         left, right = figure.subplots(1, 2)
@@ -107,7 +107,7 @@ def _parts(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _poses(found: Guidance | GuidanceMap) -> tuple[NDArray[np.complex128], NDArray[np.float64], float]:
-    """Places (mm), directions (rad) and the size of the poses (mm)."""
+    """Return places (mm), directions (rad) and the size of the poses (mm)."""
     points = MM_PER_METRE * np.asarray(found.task.points)
     return points @ np.array([1.0, 1j]), np.asarray(found.task.angle), float(np.hypot(*np.ptp(points, axis=0)))
 
@@ -119,7 +119,7 @@ def _view(found: Guidance | GuidanceMap) -> tuple[complex, complex]:
 
 
 def _draw_poses(axis: Axes, found: Guidance | GuidanceMap) -> None:
-    """Each pose as a mark with a long arm along the body and a short one across, and its number."""
+    """Draw each pose as a mark with a long arm along the body and a short one across, with its number."""
     places, angles, size = _poses(found)
     for number, (place, angle) in enumerate(zip(places, angles), start=1):
         along = ARM * size * np.exp(1j * angle)
@@ -130,7 +130,7 @@ def _draw_poses(axis: Axes, found: Guidance | GuidanceMap) -> None:
 
 
 def _draw_links(axis: Axes, solution: Solution) -> None:
-    """The links in the first pose."""
+    """Draw the links in the first pose."""
     assert solution.evaluation.rotation is not None
     pins = {
         name: MM_PER_METRE * complex(*place)

@@ -41,7 +41,7 @@ _PAGE = """<!DOCTYPE html>
 
 
 def to_html(result: Any, *details: Any, **options: Any) -> str:
-    """The picture of a result as a page of HTML with values under the pointer.
+    """Return the picture of a result as an HTML page with values under the pointer.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def to_html(result: Any, *details: Any, **options: Any) -> str:
 
 
 def to_plotly(picture: Picture) -> dict[str, Any]:
-    """A picture as Plotly takes it: the traces with their values, and the layout."""
+    """Return a picture in Plotly's form: traces with their values, and the layout."""
     columns = picture.columns
     heights = list(picture.heights) or [1.0] * ceil(len(picture.parts) / columns)
     figure = _Figure(picture, heights)
@@ -143,7 +143,7 @@ class _Axes:
         self.figure.traces.append(trace | {"xaxis": f"x{self.suffix}", "yaxis": f"y{self.suffix}"})
 
     def legend(self, title: str) -> dict[str, Any]:
-        """What puts entries of the legend together under a title."""
+        """Return the group of the legend for a title."""
         return {"legendgroup": str(self.number), "legendgrouptitle": {"text": _line(title)}}
 
     def over(self, low: float, high: float, **shape: Any) -> None:
@@ -168,7 +168,7 @@ def _panel(part: Any) -> Panel:
 
 
 def _line(text: str) -> str:
-    """A label of more than one line, on one."""
+    """Return a label of several lines on one line."""
     return escape(text.replace("\n", " "))
 
 
@@ -177,13 +177,13 @@ def _hex(colour: Any) -> str:
 
 
 def _values(values: ArrayLike) -> list[Any]:
-    """Values to full precision, None in the place of those that are no numbers."""
+    """Return values to full precision, with None for NaN."""
     listed = np.atleast_1d(np.asarray(values)).tolist()
     return [None if isinstance(value, float) and not isfinite(value) else value for value in listed]
 
 
 def _template(title: str, names: Iterable[str], hover: Mapping[str, Any]) -> str:
-    """What stands under the pointer."""
+    """Return the template of the text under the pointer."""
     lines = [f"{_line(name)}: %{{{axis}:.10g}}" for name, axis in zip(names, "xy")]
     lines += [f"{_line(name)}: %{{customdata[{n}]}}" for n, name in enumerate(hover)]
     head = [f"<b>{_line(title)}</b>"] if title else []
@@ -219,7 +219,7 @@ def _(panel: Panel, axes: _Axes) -> None:
     logarithmic = {axis: axis in panel.logarithmic for axis in "xy"}
 
     def at(axis: str, value: float) -> float:
-        """A place on an axis as annotations and ranges have it."""
+        """Return a place on an axis in the form of annotations and ranges."""
         return log10(value) if logarithmic[axis] else value
 
     for arrow in panel.arrows:
@@ -242,7 +242,7 @@ def _(panel: Panel, axes: _Axes) -> None:
 
 
 def _trace(curve: Curve, colour: str, panel: Panel) -> dict[str, Any]:
-    """A curve in Plotly's terms; one without points is an entry of the legend."""
+    """Return a curve in Plotly's form; one without points is an entry of the legend."""
     x, y = (np.atleast_1d(np.asarray(v, dtype=float)) for v in (curve.x, curve.y))
     # of what is left out one point is enough for the gap
     finite = np.isfinite(y)
@@ -296,7 +296,7 @@ def _(part: HeatMap, axes: _Axes) -> None:
 
 
 def _scale(part: HeatMap) -> dict[str, Any]:
-    """The colours of a map as Matplotlib has them, with the range of its values."""
+    """Return Matplotlib's colours of a map with the range of its values."""
     norm, colours = colours_of(part)
     low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     if part.classes:

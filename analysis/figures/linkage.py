@@ -64,7 +64,7 @@ class _Pins:
 
 
 def _pins(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> _Pins:
-    """Where the pins are; raises AssemblyError if the links cannot be joined there."""
+    """Return the positions of the pins; raise AssemblyError if the links cannot be joined there."""
     k = parameters.constants()
     try:
         g = kinematics.position(crank_angle, slider_position, k)
@@ -115,7 +115,7 @@ class _Scene:
         self.low, self.high = points.min(axis=0) - 1.4 * self.unit, points.max(axis=0) + 1.4 * self.unit
 
     def at(self, s: float, n: float) -> NDArray[np.float64]:
-        """The point at s along the guide from the slider's zero and n to its left."""
+        """Return the point at s along the guide from the slider's zero and n to its left."""
         return self.zero + s * self.along + n * self.left
 
     def prepare(self, axis: Axes) -> None:
@@ -139,7 +139,7 @@ class _Scene:
         axis.plot(*np.array(points).T, **look | options)
 
     def _hatch(self, axis: Axes, start: NDArray[np.float64], end: NDArray[np.float64], count: int) -> None:
-        """Short strokes to the right of the line from start to end: what does not move."""
+        """Draw the ground: short strokes to the right of the line from start to end."""
         way = (end - start) / hypot(*(end - start))
         stroke = 0.55 * self.unit * (np.array([way[1], -way[0]]) - way)
         feet = [start + share * (end - start) for share in (np.arange(count) + 0.9) / count]
@@ -296,7 +296,7 @@ def draw_linkage(
 
 @draw_mechanism.register
 def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -> str:
-    """As it starts, with the path of P; of C where P is no point of its own."""
+    """Draw the linkage at its start with the path of P, or of C if P coincides with it."""
     shown = np.linspace(0, len(run) - 1, min(len(run), _FRAMED)).astype(int)
     configurations = [_pins(parameters, run["crank.angle"][i], run["slider.position"][i]) for i in shown]
     if parameters.coupler_point_distance:

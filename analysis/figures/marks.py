@@ -31,7 +31,7 @@ _ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
 
 
 def mark_place(axis: Axes, place: float, text: str) -> None:
-    """A dotted line across a panel, and its name along it; `place_marks` puts the name where there is room."""
+    """Draw a dotted line across a panel with its name, which `place_marks` moves to a free place."""
     axis.axvline(place, gid=_GID, **MARK)
     axis.annotate(
         text,
@@ -49,7 +49,7 @@ def mark_place(axis: Axes, place: float, text: str) -> None:
 
 
 def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
-    """A text about a point, with a line to it; `place_marks` puts it where there is room."""
+    """Write a text about a point with a line to it; `place_marks` moves the text to a free place."""
     axis.annotate(
         text,
         place,
@@ -97,7 +97,7 @@ class _Scene:
         )
 
     def covered(self, box: Bbox, others: Sequence[Bbox]) -> int:
-        """How many curves, markers, names, and edges of the axes a box covers."""
+        """Count the curves, markers, names and edges of the axes that a box covers."""
         inside = self.inside
         count = sum(box.overlaps(other) for other in others)
         count += 10 * (box.x0 < inside.x0 or box.x1 > inside.x1 or box.y0 < inside.y0 or box.y1 > inside.y1 + _GAP)
@@ -114,7 +114,7 @@ class _Scene:
 
 
 def place_marks(figure: Figure) -> Figure:
-    """Move the letters of marks and of points to where they cover nothing, or least; the figure must be laid out."""
+    """Move the texts of marks and points to places where they cover least; the figure must be laid out."""
     for axis in figure.axes:
         texts = [text for text in axis.texts if isinstance(text, Annotation)]
         scene = _Scene.of(axis) if any(text.get_gid() in _MOVES for text in texts) else None
@@ -165,7 +165,7 @@ def _turn(label: Annotation, distance: float, direction: float) -> Bbox:
 def roomiest(
     pin: FloatArray, reach: float, drawn: Sequence[object], marks: Sequence[FloatArray], away: FloatArray | None = None
 ) -> FloatArray:
-    """The place at a distance from a pin where a letter has most room from geometries of shapely.
+    """Return the place at a distance from a pin where a letter is farthest from the given shapes.
 
     Pins and other letters, ``marks``, count as nearer than they are. Of places with as much room that in the direction ``away``
     is taken, whose length is how much that counts.

@@ -18,7 +18,7 @@ _SAMPLES = 512
 
 @plot.register
 def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
-    """A periodic motion over the crank angle, in a plane of displacement and velocity, and its multipliers.
+    """Plot a periodic motion over the crank angle and in the phase plane, and its Floquet multipliers.
 
     The curves over the angle are of the coordinates that are free beside the crank, the crank's speed where it varies, and
     the torque that drives it.
@@ -40,7 +40,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     names += [name for n in mechanism.cyclic for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)]
 
     def closed(name: str) -> tuple[np.ndarray, str]:
-        """An output over the period, its first value once more at the end, as it is drawn, and its label."""
+        """Return an output over the period in drawn units, with its first value repeated at the end, and its label."""
         unit, factor = display_unit(variables[name])
         return factor * np.append(turn[name], turn[name][0]), f"{name} [{unit}]"
 
@@ -62,7 +62,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
 
 
 def _multipliers(orbit: PeriodicOrbit) -> Panel:
-    """Floquet multipliers and the unit circle, outside of which deviations grow."""
+    """Draw the Floquet multipliers and the unit circle, outside of which deviations grow."""
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
     return Panel(
         x_label="real part",
@@ -84,7 +84,7 @@ def _title(orbit: PeriodicOrbit, period: float) -> str:
 
 @plot.register
 def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
-    """All motions at a point: the first free coordinate of each over the period, unstable ones dashed."""
+    """Plot the first free coordinate of all motions at a point over the period, unstable ones dashed."""
     curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)

@@ -70,12 +70,12 @@ class _Scale:
         return f"{self.family.name} [{self.unit}]" if self.unit else self.family.name
 
     def place(self, value: float) -> str:
-        """A value of the parameter as it is drawn, to four figures and more where they differ."""
+        """Return a value of the parameter in drawn units as text, to four digits or more to tell values apart."""
         number = self.factor * value
         return f"{number:.0f} {self.unit}" if abs(number) >= 1e3 else f"{number:.4g} {self.unit}".rstrip()
 
     def size(self, value: float) -> str:
-        """An amplitude as it is drawn, without its unit."""
+        """Return an amplitude in drawn units as text, without the unit."""
         return f"{self.scale * value:.3g}"
 
 
@@ -87,7 +87,7 @@ def plot_branches(
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[Avoided] = (),
 ) -> Figure:
-    """Amplitude, harmonics, crank torque and pin force along branches: stable parts solid, unstable ones dashed.
+    """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
     At folds an arrow goes to the motion that the machine jumps to. Of approximations there is a panel of the relative error;
     those that the true motion covers are drawn only there.
@@ -116,7 +116,7 @@ def describe_branches(
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[Avoided] = (),
 ) -> Picture:
-    """What `plot_branches` draws."""
+    """Return the picture that `plot_branches` draws."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     rpm &= family.unit == "rad/s"
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
@@ -139,7 +139,7 @@ def describe_branches(
 def _amplitudes(
     branches: Sequence[Branch], look: _Scale, others: Sequence[_Approximated], shades: Sequence[Shade]
 ) -> Panel:
-    """The amplitude along all branches, special points, jumps, and the approximations that can be told from it."""
+    """Return the panel of the amplitude along all branches, with special points, jumps, and visible approximations."""
     # what is linear has resonances without bound; the true motion sets the scale
     top = 1.15 * max(look.scale * float(branch.amplitude.max()) for branch in branches)
     found = fold_jumps(branches)
@@ -186,7 +186,7 @@ def _amplitudes(
 
 
 def _jump(jump: FoldJump, look: _Scale) -> str:
-    """Which motion lies on which side of a fold, and where the machine goes."""
+    """Return the text of a fold: the motions on its sides and the jump of the machine."""
     side, change = ("below", "rising") if jump.direction > 0 else ("above", "falling")
     there = f"{look.size(jump.before)} {look.shown} only {side} {look.place(jump.parameter)};\n{change}, it "
     if not jump.after:
@@ -196,12 +196,12 @@ def _jump(jump: FoldJump, look: _Scale) -> str:
 
 
 def _is_met(branch: Branch, special: SpecialPoint) -> bool:
-    """Whether a motion beside a special point is stable: a machine comes there."""
+    """Return whether a motion beside a special point is stable, so that a machine reaches it."""
     return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
 
 
 def _along(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
-    """A quantity along a branch, a curve for each stability that it has; colours are by the turns of a period."""
+    """Return the curves of a quantity along a branch, one for each stability, coloured by the turns of the period."""
     words = _words(branch)
     order = branch.turns.bit_length() - 1
     style: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "order": 2.0 + 0.1 * order}
@@ -220,7 +220,7 @@ def _along(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: 
 
 
 def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
-    """What is said of the points of a branch under the pointer."""
+    """Return the texts under the pointer for the points of a branch."""
     table, torque = branch.columns(), "greatest crank torque [N.m]"
     return {
         "branch": np.full(len(branch), number + 1),
@@ -231,7 +231,7 @@ def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
 
 
 def _letters(x: FloatArray, y: FloatArray, text: str, **options: Any) -> Curve:
-    """Letters at a few places of a curve, evenly along x."""
+    """Return letters at a few places of a curve, evenly along x."""
     finite = np.flatnonzero(np.isfinite(y))
     if len(finite):
         places = np.linspace(x[finite].min(), x[finite].max(), 2 * _LETTERS + 1)[1::2]
@@ -240,7 +240,7 @@ def _letters(x: FloatArray, y: FloatArray, text: str, **options: Any) -> Curve:
 
 
 def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump]) -> list[Curve]:
-    """The special points, by their kinds."""
+    """Return the special points by kind."""
     curves = []
     says = {jump.parameter: _jump(jump, look).replace("\n", " ") for jump in found}
     for kind, (marker, _) in _MARKERS.items():
@@ -269,7 +269,7 @@ def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump
 
 
 def _keys(branches: Sequence[Branch]) -> list[Curve]:
-    """Entries of the legend for what has to be told apart: nothing of a single branch that is stable throughout."""
+    """Return the entries of the legend; none for a single branch that is stable throughout."""
     turns = sorted({branch.turns for branch in branches})
     words = {str(word) for branch in branches for word in _words(branch)}
     keys = []
@@ -308,14 +308,14 @@ class _Approximated:
 
     @property
     def look(self) -> dict[str, Any]:
-        """How it is drawn."""
+        """Return the look of the curve."""
         return {"colour": COLOURS[(self.number + 1) % len(COLOURS)], "line": _LINES[self.number % len(_LINES)]}
 
 
 def _approximated(
     branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]
 ) -> list[_Approximated]:
-    """The approximations where a machine may be: at stable motions, and evenly over the range besides."""
+    """Return the approximations at stable motions and evenly over the range."""
     chosen = [(branch, _chosen(branch)) for branch in branches if branch.turns == 1]
     every = np.concatenate([branch.parameter for branch, _ in chosen])
     spread = np.linspace(every.min(), every.max(), _BESIDE)
@@ -336,7 +336,7 @@ def _approximated(
 
 
 def _words(branch: Branch) -> NDArray[np.str_]:
-    """What `Branch.stability` says at each point."""
+    """Return the stability of each point in words."""
     margin = 1.0 - branch.largest_multiplier
     return np.select(
         [margin > TOLERANCE, margin < -TOLERANCE],
@@ -350,7 +350,7 @@ def _unstable(branch: Branch) -> NDArray[np.bool_]:
 
 
 def _chosen(branch: Branch) -> NDArray[np.int64]:
-    """Numbers of points of a branch that are not unstable, evenly along the curve as it is seen."""
+    """Return the numbers of points of a branch that are not unstable, evenly along the drawn curve."""
     steps = [np.diff(v, prepend=v[0]) / (float(np.ptp(v)) or 1.0) for v in (branch.parameter, branch.amplitude)]
     way = np.cumsum(np.hypot(*steps))
     chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], _COMPARED)))
@@ -358,7 +358,7 @@ def _chosen(branch: Branch) -> NDArray[np.int64]:
 
 
 def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: _Scale, top: float) -> list[Curve]:
-    """The approximations that can be told from the true motion, as a figure of the usual size has them."""
+    """Return the approximations that a figure of usual size shows apart from the true motion."""
     if not others:
         return []
     x = look.factor * others[0].parameter
@@ -379,7 +379,7 @@ def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: 
 
 
 def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> Panel:
-    """The first harmonics of the motions of one turn, each with its number on it."""
+    """Return the panel of the first harmonics of one-turn motions, each marked with its number."""
     single = [(n, branch) for n, branch in enumerate(branches) if branch.turns == 1] or list(enumerate(branches))
     names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
     curves, top = [], 0.0
@@ -409,7 +409,7 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
 
 
 def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shade]) -> Panel:
-    """Relative errors of the approximations against the stable motions of one turn, in per cent."""
+    """Return the panel of the approximations' errors relative to the stable one-turn motions, in per cent."""
     curves = [
         Curve(
             x=look.factor * parameter,
@@ -434,7 +434,7 @@ def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shad
 
 
 def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> list[Panel]:
-    """Crank torque and forces in joints along the branches, of what the mechanism has."""
+    """Return the panels of crank torque and joint forces along the branches, as far as the mechanism has them."""
     names = list(branches[0].columns())
     torque, forces = "greatest crank torque [N.m]", [name for name in names if name.startswith(FORCE)]
     rows: dict[str, Callable[[Branch], FloatArray]] = {}
@@ -457,7 +457,7 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
 
 @pictured
 def plot_branch(branch: Branch, *, title: str = "") -> Picture:
-    """One branch: amplitude, harmonics, crank torque and pin force over its parameter, with its special points.
+    """Plot amplitude, harmonics, crank torque and pin force of one branch over its parameter, with its special points.
 
     Ranges to avoid are shaded.
     """
@@ -469,7 +469,7 @@ def plot_branch(branch: Branch, *, title: str = "") -> Picture:
 def plot_response(
     response: Response, *, title: str = "", rpm: bool = True, beside: Approximations | None = None
 ) -> Picture:
-    """All branches of a response, the speeds to avoid shaded, with the classical approximations beside; see `plot_branches`."""
+    """Plot all branches of a response with speeds to avoid shaded and classical approximations; see `plot_branches`."""
     return describe_branches(
         response.branches,
         title=title,

@@ -110,20 +110,20 @@ def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
 
 
 def _mechanism(run: Trajectory) -> Mechanism:
-    """The mechanism of a run; of one that does not say, the one that it has most outputs of."""
+    """Return the mechanism of a run, or the one with most outputs in common."""
     if run.parameters is not None:
         return mechanism_of(run.parameters)
     return max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
 
 
 def _variables(run: Trajectory) -> dict[str, Variable]:
-    """The variables of a run's outputs, of whatever mechanism they are."""
+    """Return the variables of a run's outputs, of any mechanism."""
     mechanisms = (*MECHANISMS.values(), _mechanism(run))
     return {v.name: v for m in mechanisms for v in m.variables if v.name in run.names}
 
 
 def display_unit(variable: Variable) -> tuple[str, float]:
-    """The unit that people think in, and what a value in SI is multiplied by."""
+    """Return the display unit, and the factor from SI to it."""
     displays = dict(UNITS[variable.unit].displays)
     unit = variable.display or next(iter(displays), variable.unit)
     return unit, displays.get(unit, 1.0)
@@ -136,7 +136,7 @@ def _output(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
 
 
 def _telling(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
-    """What tells most of a run: coordinates but the crank's, its speed, what drives, the angle of transmission, forces."""
+    """Return the outputs drawn by default: coordinates except the crank's, its speed, drives, transmission angle, forces."""
     mechanism = _mechanism(run)
     first, *others = mechanism.freedoms
     moving = [freedom.coordinate for freedom in others or (first,)]
@@ -159,7 +159,7 @@ def _magnitudes(run: Trajectory) -> dict[str, FloatArray]:
 
 
 def _moving(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]:
-    """Panels without what is constant, and the sentence that states it."""
+    """Return the panels without constant outputs, and the sentence that states these."""
     kept, still = [], []
     for panel in panels:
         curves = {name: values for name, values in panel.curves.items() if not _constant(values)}
@@ -182,7 +182,7 @@ def _constant(values: FloatArray) -> bool:
 
 
 def _value(values: FloatArray) -> str:
-    """The value of what is constant, for print: what is below the resolution is zero."""
+    """Return the text of a constant value; below the resolution it is zero."""
     mean = float(values.mean()) if len(values) else 0.0
     return f"{mean:.4g}" if abs(mean) > _STILL else "0"
 

@@ -77,18 +77,18 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
 
 
 def _largest(curves: Iterable[Any]) -> float:
-    """Largest magnitude of curves, where they are determined."""
+    """Return the largest magnitude of curves where they are determined."""
     return max(float(np.nanmax(np.abs(np.ma.filled(values, np.nan)), initial=0.0)) for values in curves)
 
 
 def _marks(turn: ForceTurn) -> dict[str, float]:
-    """Crank angles (deg) of the dead centres and of the limits of assembly, by their names."""
+    """Return the crank angles (deg) of dead centres and limits of assembly by name."""
     marks = {f"dead centre {np.degrees(d.crank_angle):.1f}°": np.degrees(d.crank_angle) for d in turn.dead_centres}
     return marks | {f"limit of assembly {np.degrees(end):.1f}°": np.degrees(end) for end in turn.limits}
 
 
 def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, components: Mapping[str, Any]) -> Panel:
-    """Curves over the turn by their labels, in a unit of the value ``one`` in SI."""
+    """Plot curves over the turn by label, in a unit of the value ``one`` in SI."""
     angle = np.degrees(turn.angle)
     grows = si != "m"
     poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()
@@ -219,7 +219,7 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
 
 
 def _broken(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
-    """Values (n,) with one more after each of the numbers: NaN, or what ``fill`` (n,) has next."""
+    """Return values (n,) with one more after each of the numbers: NaN, or the next of ``fill`` (n,)."""
     after = np.array(breaks, dtype=int) + 1
     return np.insert(values, after, np.nan if fill is None else fill[after])
 
@@ -293,10 +293,10 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
 
 
 def _normal_share(low: float, high: float, deviation: float) -> float:
-    """Share of a normal distribution of the mean zero between two values."""
+    """Return the share of a normal distribution of mean zero between two values."""
     return 0.5 * (erf(high / (deviation * sqrt(2.0))) - erf(low / (deviation * sqrt(2.0))))
 
 
 def _figure(value: float, digits: int = 3) -> str:
-    """A number for print, zeros of rounding as 0."""
+    """Return a number as text, with rounding errors as 0."""
     return f"{value:.{digits}g}" if abs(value) > 1e-12 else "0"

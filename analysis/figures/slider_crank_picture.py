@@ -91,7 +91,7 @@ def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor:
 
 
 def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
-    """The joints at a configuration that was asked for.
+    """Return the joints at the requested configuration.
 
     Raises AssemblyError if the rod does not reach the guide there; InputError if angle or shift are not finite.
     """
@@ -103,7 +103,7 @@ def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float,
 
 
 def _angles(part: Range, law: PeriodicShift) -> FloatArray:
-    """Crank angles over a range, clear of its ends if it has any."""
+    """Return crank angles over a range, clear of its ends if it has any."""
     inset = min(_INSET, 0.25 * (part.high - part.low)) if not part.full(law.span) else 0.0
     count = max(9, ceil(_POINTS * (part.high - part.low) / (2.0 * pi)))
     return np.linspace(part.low + inset, part.high - inset, count)
@@ -193,11 +193,11 @@ class _Scene:
         self.lines: list[FloatArray] = []
 
     def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-        """The point at a slider position, off the guide by x and y of frame 4."""
+        """Return the point at a slider position, off the guide by x and y of frame 4."""
         return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
 
     def page(self, points: ArrayLike) -> FloatArray:
-        """Points (..., 3) of the ground frame on the page, (..., 2)."""
+        """Project points (..., 3) of the ground frame onto the page, (..., 2)."""
         return np.asarray(np.asarray(points, dtype=float) @ self.view[:2].T)
 
     def _extent(self) -> tuple[FloatArray, FloatArray]:
@@ -276,7 +276,7 @@ class _Scene:
         self._line(axis, ring + pose.centre, color="0.6", linewidth=THIN, linestyle=":", zorder=1)
 
     def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
-        """Paths of the pins; crank and rod in thin lines at the dead centres and at the limits of assembly."""
+        """Draw the paths of the pins, and crank and rod in thin lines at dead centres and limits of assembly."""
         for part in self.parts:
             self._line(axis, part.crank_pins, color=TRACE, linewidth=BOLD, zorder=2)
             self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
@@ -412,7 +412,7 @@ def plot_mechanism(
 
 @draw_mechanism.register
 def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajectory) -> str:
-    """As it starts, with the paths of both pins."""
+    """Draw the mechanism at its start with the paths of both pins."""
     factor = UNITS["mm"]
     shown = np.linspace(0, len(run) - 1, min(len(run), _POINTS)).astype(int)
     poses = [_pose(parameters, run["crank.angle"][i], run["shift.position"][i], factor) for i in shown]
@@ -427,7 +427,7 @@ def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajector
 
 
 def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tuple[Figure, Axes]:
-    """A figure ``wide`` inches wide with the scene's axes between a head and a foot (inches)."""
+    """Return a figure ``wide`` inches wide with the scene's axes between a head and a foot (inches)."""
     width, height = scene.high - scene.low
     tall = float(np.clip(wide * height / width, 2.6, 0.9 * wide))
     figure = Figure(figsize=(wide, head + tall + foot))
@@ -505,7 +505,7 @@ def animate_mechanism(
 
 
 def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
-    """Slider position over the crank angle, with dead centres and limits."""
+    """Plot the slider position over the crank angle with dead centres and limits."""
     for part in parts:
         axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=COLOURS[0], zorder=3)
         for places, _, colour, marker in part.marks:
@@ -571,7 +571,7 @@ def plot_range(
 
 
 def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:
-    """The crank pin's circle seen against the crank axis, with what of it the crank can reach."""
+    """Draw the crank pin's circle seen along the crank axis, with the part that the crank can reach."""
     turn = np.linspace(0.0, 2.0 * pi, 181)
     axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=LINE)
     for part in parts:

@@ -51,7 +51,7 @@ def ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
 
 
 def box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *, pieces: int = 1) -> FloatArray:
-    """A box between corners given along the rows, right-handed, from an origin; in pieces along the first of them."""
+    """Return a box between corners along right-handed rows from an origin, in pieces along the first row."""
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     faces = []
     cuts = np.linspace(low[0], high[0], pieces + 1)

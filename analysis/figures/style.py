@@ -70,7 +70,7 @@ _LETTERS, _NOTED = 11.6, 15.0
 
 @contextmanager
 def styled(*, laid_out: bool = True) -> Iterator[None]:
-    """Matplotlib with this style, whatever the user's is; ``laid_out`` unless the axes are placed by hand."""
+    """Use this style of Matplotlib whatever the user's is; ``laid_out`` unless the axes are placed by hand."""
     with matplotlib.style.context(STYLE | {"figure.constrained_layout.use": laid_out}, after_reset=True):
         yield
 

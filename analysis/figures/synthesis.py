@@ -94,7 +94,7 @@ class _Frame:
 
 
 def _one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
-    """One scale on both axes, and at least this box in view: what is left of the panel shows more of the plane."""
+    """Give both axes one scale with at least this box in view; the rest of the panel shows more of the plane."""
     axis.update_datalim(np.array([low, high]))
     axis.margins(0.0)
     axis.set_aspect("equal", adjustable="datalim")
@@ -108,7 +108,7 @@ def _line(axis: Axes, points: Any, **options: Any) -> None:
 
 
 def _support(axis: Axes, at: FloatArray, unit: float) -> None:
-    """The bearing of a pin that does not move."""
+    """Draw the bearing of a fixed pin."""
     foot, half = at[1] - 1.5 * unit, 0.85 * unit
     corners = np.array([at, [at[0] - half, foot], [at[0] + half, foot]])
     axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=THIN, zorder=5))
@@ -145,7 +145,7 @@ def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> Non
 def _draw_linkage(
     axis: Axes, scene: LinkageScene, frame: _Frame, pins: Mapping[str, tuple[float, float]], *, letters: bool = True
 ) -> None:
-    """Links, pins and supports at one position."""
+    """Draw links, pins and supports at one position."""
     unit = frame.unit
     at = {name: MM_PER_METRE * np.array(place) for name, place in pins.items()}
     a, b, c, d, e = (at[name] for name in "ABCDE")
@@ -187,7 +187,7 @@ def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> N
 
 
 def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
-    """Each pin's letter where it has most room: from the links, the supports, the curve and the letters before."""
+    """Write each pin's letter where it is farthest from links, supports, curve and other letters."""
     names = [n for n in scene.lettered if n in at]
     lines = [(at["A"], at["B"]), (at["B"], at["C"]), (at["C"], at["D"]), (at["A"], at["E"])]
     if "P" in at:
@@ -210,7 +210,7 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
 
 
 def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:
-    """The first crank rotation at which there is something to draw, and the pins there."""
+    """Return the first crank rotation at which the linkage can be drawn, and the pins there."""
     for phi in (*scene.rotation, *scene.transmission[0]):
         pins = scene.pins(float(phi))
         if pins is not None:
@@ -219,7 +219,7 @@ def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]
 
 
 def _around(scene: LinkageScene) -> FloatArray:
-    """Rotations by which the scene is framed."""
+    """Return the rotations by which the scene is framed."""
     rotation, angle = scene.transmission
     joined = rotation[np.isfinite(angle)]
     chosen: FloatArray = joined[np.linspace(0, len(joined) - 1, min(len(joined), FRAMED + 1)).round().astype(int)]
@@ -227,7 +227,7 @@ def _around(scene: LinkageScene) -> FloatArray:
 
 
 def magnification(worst: float, extent: float) -> float:
-    """Factor 1, 2 or 5 times a power of ten by which error vectors are drawn so that the longest is `LONGEST` of an extent."""
+    """Return the factor, 1, 2 or 5 times a power of ten, that makes the longest error vector `LONGEST` of an extent."""
     if not (np.isfinite(worst) and worst > 1e-9 * extent):
         return 1.0
     most = LONGEST * extent / worst
@@ -236,7 +236,7 @@ def magnification(worst: float, extent: float) -> float:
 
 
 def _enlarged(axis: Axes, scene: LinkageScene) -> None:
-    """Target and path alone, with the error vectors magnified."""
+    """Plot target and path alone with magnified error vectors."""
     assert scene.target is not None
     columns = scene.stations
     wanted = MM_PER_METRE * np.column_stack([columns["target x [m]"], columns["target y [m]"]])
@@ -259,7 +259,7 @@ def _enlarged(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
-    """What stations are plotted over, and what it is called."""
+    """Return the abscissa of the stations and its label."""
     rotation = np.degrees(scene.stations["crank rotation [rad]"])
     if scene.timed:
         return rotation, "crank rotation [deg]"
@@ -267,7 +267,7 @@ def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
 
 
 def _rocker(axis: Axes, scene: LinkageScene) -> None:
-    """Angle of the rocker over the crank's rotation, with the target."""
+    """Plot the angle of the rocker over the crank's rotation with the target."""
     assert scene.function is not None
     columns = scene.stations
     x = np.degrees(columns["crank rotation [rad]"])
@@ -280,7 +280,7 @@ def _rocker(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _errors(axis: Axes, scene: LinkageScene) -> None:
-    """Errors station by station."""
+    """Plot the errors station by station."""
     x, words = _stations(scene)
     columns = scene.stations
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
@@ -305,7 +305,7 @@ def _errors(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _transmission(axis: Axes, scene: LinkageScene) -> None:
-    """The angle between coupler and rocker over a turn; the part of the task strong."""
+    """Plot the transmission angle over a turn, the part of the task as a strong line."""
     rotation, angle = scene.transmission
     turns, angles = np.degrees(rotation), np.degrees(angle)
     begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
@@ -320,7 +320,7 @@ def _transmission(axis: Axes, scene: LinkageScene) -> None:
 
 
 def _motion(axis: Axes, scene: LinkageScene) -> None:
-    """How the rocker pivot moves over a turn."""
+    """Plot the motion of the rocker pivot over a turn."""
     assert scene.motion is not None
     name, values = scene.motion
     if name.endswith("[m]"):
@@ -339,7 +339,7 @@ def _quarters(axis: Axes, turns: FloatArray) -> None:
 
 
 def _panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool = True) -> None:
-    """The linkage as it starts, with its curve and the target."""
+    """Draw the linkage at its start with its curve and the target."""
     _, pins = _start(scene)
     frame = _Frame(scene, _around(scene))
     frame.prepare(axis)
@@ -349,7 +349,7 @@ def _panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool = True
 
 
 def _task(axis: Axes, scene: LinkageScene) -> None:
-    """What was asked for beside what was found: the function, or the path with magnified errors."""
+    """Plot target and result: the function, or the path with magnified errors."""
     if scene.function is not None:
         _rocker(axis, scene)
     else:
@@ -358,7 +358,7 @@ def _task(axis: Axes, scene: LinkageScene) -> None:
 
 @plot.register
 def plot_solution(solution: Solution, *, title: str = "") -> Figure:
-    """A linkage to scale; its target and path with magnified errors, or its function; errors and transmission angle.
+    """Plot a linkage to scale, target and path with magnified errors or the function, errors and transmission angle.
 
     Raises
     ------
@@ -388,7 +388,7 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
 def plot_sheet(
     solution: Solution | Assessment, forces: PinForces | None = None, *, title: str = "", made: str = ""
 ) -> Figure:
-    """A page for the workshop, A4: the linkage, its curve against the target, transmission angle, pin forces, dimensions.
+    """Plot an A4 page for the workshop: linkage, curve and target, transmission angle, pin forces, dimensions.
 
     Parameters
     ----------
@@ -437,7 +437,7 @@ def plot_sheet(
 
 
 def _forces(axis: Axes, forces: PinForces, last: str) -> None:
-    """The resultant force on each pin over the rotation of the crank, the last of them by another name."""
+    """Plot the resultant force on each pin over the rotation of the crank; the last pin has another name."""
     for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, COLOURS):
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
     _quarters(axis, np.degrees(forces.rotation))
@@ -447,7 +447,7 @@ def _forces(axis: Axes, forces: PinForces, last: str) -> None:
 
 @plot.register
 def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
-    """The ranked linkages beside one another, each to its own scale, with its curve, the target and its errors.
+    """Plot the ranked linkages beside one another, each to its own scale, with curve, target and errors.
 
     Raises
     ------
@@ -473,7 +473,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
-    """Quality function and worst error over the limit, a panel each; limits without a linkage are marked below.
+    """Plot quality function and worst error over the limit in a panel each; limits without a linkage are marked below.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from .style import COLOURS
 
 @plot.register
 def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
-    """Amplitude and largest Floquet multiplier over the speed, before the change and after it; unstable motions are dashed."""
+    """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
     what, si = orbit.swing
     factor, unit = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
@@ -55,7 +55,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
 
 
 def _curves(survey: Survey, value: object, colour: str, name: str, scale: float) -> Iterator[Curve]:
-    """Branches of the response, stable parts solid; only the first has a name."""
+    """Plot branches of the response, stable parts solid; only the first has a name."""
     for branch in survey.response.branches:
         stable = branch.largest_multiplier <= 1.0
         for part, line in ((stable, "-"), (~stable, "--")):

@@ -43,7 +43,7 @@ def main(path: str) -> int:
 
 
 def _context(job: dict[str, Any]) -> Context | None:
-    """What the check works with; None where the library cannot be loaded."""
+    """Return the context of the check; None if the library cannot be loaded."""
     from .model import read_model
 
     folder, work = Path(job["folder"]), Path(job["work"])

@@ -50,19 +50,19 @@ class Context:
     _shown: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def session(self) -> Session:
-        """A session without an instance yet."""
+        """Open a session without an instance."""
         return Session(self.library, self.model, self.journal, self.folder)
 
     def random(self, case: int, check: str = "") -> random.Random:
-        """The random numbers of a case of a check (this one by default): the same each time."""
+        """Return the random numbers of a case of a check (by default this one), the same each time."""
         return random.Random(f"{self.seed}/{self.model.interface}/{check or self.check}/{case}")
 
     def replay(self) -> str:
-        """The name of the case at hand, for --replay."""
+        """Return the name of the current case, for --replay."""
         return f"{self.seed}/{self.model.interface}/{self.check}/{self.journal.case}"
 
     def note(self, severity: str, key: str, text: str) -> None:
-        """Note a finding; of one kind only the first and those with fewer calls carry them."""
+        """Note a finding; of one kind only the first, and those with fewer calls, keep their calls."""
         lines = self.journal.lines()
         best = self._shown.get((severity, key), 1 << 30)
         self._shown[severity, key] = min(best, len(lines))
@@ -74,7 +74,7 @@ class Context:
         self._write({"subject": subject, "case": self.journal.case})
 
     def say(self, sentence: str) -> None:
-        """A sentence for the table of checks: what was measured, or why it was not."""
+        """Add a sentence to the table of checks: the measured value, or the reason why there is none."""
         self._write({"said": sentence})
 
     def finish(self) -> None:

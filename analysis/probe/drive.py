@@ -52,7 +52,7 @@ class Run:
         self.finish_initialization()
 
     def initialize(self, stop: float | None = None) -> None:
-        """Into the initialization mode."""
+        """Enter the initialization mode."""
         setup = [False, 0.0, self.time, stop is not None, stop or 0.0]
         if self.model.version == 2:
             self.session.need("SetupExperiment", *setup)
@@ -60,7 +60,7 @@ class Run:
         self.session.need("EnterInitializationMode", *setup)
 
     def finish_initialization(self) -> None:
-        """Out of it, to where steps can be made."""
+        """Leave the initialization mode and go to the mode in which steps are made."""
         self.session.need("ExitInitializationMode")
         if self.model.interface == "me":
             self._iterate()
@@ -72,7 +72,7 @@ class Run:
         self.session.need("EnterContinuousTimeMode")
 
     def _update(self) -> bool:
-        """One update of the discrete states; whether another is needed."""
+        """Update the discrete states once; return whether another update is needed."""
         if self.model.version == 2:
             info = fmi2.fmi2EventInfo()
             self.session.need("NewDiscreteStates", info)
@@ -95,7 +95,7 @@ class Run:
                 self.session.need("Set" + group, references(chosen), len(chosen), array, *extra)
 
     def get(self, variables: Sequence[Variable]) -> Any:
-        """The values of variables of one group, as a C array."""
+        """Return the values of variables of one group as a C array."""
         group = variables[0].group
         size = sum(variable.size for variable in variables)
         array = (self.model.c_types[group] * size)()
@@ -104,7 +104,7 @@ class Run:
         return array
 
     def values(self) -> Values:
-        """Every variable, bit by bit."""
+        """Return the values of all variables, bit by bit."""
         found = {}
         for group in self.model.groups:
             array = self.get(self.model.named(group))
@@ -114,7 +114,7 @@ class Run:
         return found
 
     def states(self, name: str) -> Any:
-        """Continuous states or their derivatives."""
+        """Return the continuous states or their derivatives."""
         array = (ctypes.c_double * self.model.states)()
         if self.model.states:
             self.session.need(name, array, self.model.states)
@@ -137,7 +137,7 @@ class Run:
         self.time += size
 
     def _euler(self, size: float, inputs: Inputs) -> None:
-        """One explicit step, with an event where a time event or a new discrete input asks for one."""
+        """Make one explicit step, with an event if a time event or a new discrete input needs one."""
         continuous = {v: x for v, x in inputs.items() if CONDITIONS["5"](v)}
         others = {v: x for v, x in inputs.items() if v not in continuous}
         self.set(continuous)
@@ -161,13 +161,13 @@ class Run:
         return "Derivatives" if self.model.version == 2 else "ContinuousStateDerivatives"
 
     def save(self, into: Any = None) -> Any:
-        """The saved state."""
+        """Save and return the state."""
         state = ctypes.c_void_p() if into is None else into
         self.session.need("GetFMUstate" if self.model.version == 2 else "GetFMUState", state)
         return state
 
     def restore(self, state: Any, time: float, next_event: float = math.inf) -> None:
-        """Back to a saved state, of this time."""
+        """Restore a saved state, which belongs to this time."""
         self.session.need("SetFMUstate" if self.model.version == 2 else "SetFMUState", state)
         self.time, self.next_event = time, next_event
 
@@ -177,7 +177,7 @@ class Run:
 
 
 def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[Variable, Any]]:
-    """Values of the inputs for so many steps; continuous ones change each step, others seldom."""
+    """Return values of the inputs for a number of steps; continuous ones change at each step, others seldom."""
     inputs = [v for v in run_model.variables if v.causality == "input" and v.size == 1]
     steps = []
     for number in range(count):
@@ -187,12 +187,12 @@ def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[V
 
 
 def step_size(model: Any) -> float:
-    """The step of a run: the default one, a tenth of it where the probe integrates by Euler's method."""
+    """Return the step of a run: the default one, or a tenth of it if the probe integrates by Euler's method."""
     return float(model.step if model.interface == "cs" else model.step / 10)
 
 
 def differing(one: Values, other: Values, model: Any) -> str:
-    """The first variable that differs between two sets of values; empty where none does."""
+    """Return the first variable that differs between two sets of values; empty if none does."""
     for group, data in one.items():
         if data == other[group]:
             continue

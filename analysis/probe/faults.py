@@ -44,7 +44,7 @@ class Fault:
 
 
 def put(position: int, value: Any) -> Change:
-    """Another value at a position (counted from the end where negative)."""
+    """Put another value at a position, counted from the end if negative."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) <= position:
@@ -91,7 +91,7 @@ def _constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
 
 
 def _longer(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
-    """One value more than there should be, in an array that has room for it."""
+    """Return a count that is one too large, with an array that has room for it."""
     array = arguments[-2]
     longer = (array._type_ * (len(array) + 1))()
     longer[: len(array)] = list(array)
@@ -116,7 +116,7 @@ def _unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
 
 
 def _start(position: int, value: float) -> Change:
-    """Another time or tolerance at the start: of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
+    """Change the time or the tolerance at the start: of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
 
     def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
         if len(arguments) != 5:
@@ -201,7 +201,7 @@ _DEMANDED_IN_3 = ("step of zero",)
 
 
 def catalogue(walk: Walk) -> list[Fault]:
-    """Every fault that can be tried on this FMU, in an order that does not change."""
+    """Return every fault that can be tried on this FMU, always in the same order."""
     model, machine = walk.model, walk.machine
     groups = "(" + "|".join(model.groups) + ")"
     faults = [
@@ -238,7 +238,7 @@ class BadStart:
 
 
 def bad_starts(model: Model) -> list[BadStart]:
-    """Every bad instantiation that can be tried on this FMU."""
+    """Return every bad instantiation that can be tried on this FMU."""
     two = model.version == 2
     token = {2: 2, 3: 1}[model.version]
     starts = [

@@ -45,12 +45,12 @@ class Finding:
 
     @property
     def about(self) -> str:
-        """The function, variable or folder that it is about: the first part of the key after the interface."""
+        """Return the function, variable or folder concerned: the first part of the key after the interface."""
         return self.key.split(": ")[1] if self.key.count(": ") > 1 else ""
 
     @property
     def kind(self) -> str:
-        """What it has in common with findings about others: the rest of the key."""
+        """Return the kind of the finding, the rest of the key."""
         return ": ".join(self.key.split(": ")[2:]) or self.text
 
 
@@ -81,7 +81,7 @@ class Report:
         return sum(outcome.calls for outcome in self.outcomes)
 
     def of(self, *severities: str) -> list[Finding]:
-        """The findings of these severities."""
+        """Return the findings of these severities."""
         return [finding for finding in self.findings if finding.severity in severities]
 
     def add(self, finding: Finding) -> None:
@@ -96,11 +96,11 @@ class Report:
         self.findings.sort(key=lambda f: SEVERITIES.index(f.severity))
 
     def to_dict(self) -> dict[str, Any]:
-        """The report as plain data, for JSON."""
+        """Return the report as plain data, for JSON."""
         return asdict(self)
 
     def to_markdown(self) -> str:
-        """The report as Markdown."""
+        """Return the report as Markdown."""
         counts = ", ".join(f"{len(self.of(severity))} {severity}" for severity in SEVERITIES)
         lines = [
             f"# Probe of {self.fmu}",
@@ -123,5 +123,5 @@ class Report:
 
 
 def last_calls(calls: Sequence[str], most: int) -> list[str]:
-    """The last calls of a list, with a line that says how many were left out."""
+    """Return the last calls of a list, with a line that counts those left out."""
     return list(calls) if len(calls) <= most else [f"... {len(calls) - most} calls", *calls[-most:]]

@@ -39,7 +39,7 @@ class Journal:
         self._mark()
 
     def call(self, text: str) -> None:
-        """Note a call that is about to be made."""
+        """Note the next call before it is made."""
         self.calls += 1
         self.write("\n" + text)
 
@@ -56,7 +56,7 @@ class Journal:
         self._mark()
 
     def lines(self) -> list[str]:
-        """The calls of the case at hand."""
+        """Return the calls of the current case."""
         return _lines(self._text())
 
     def _text(self) -> bytes:
@@ -67,7 +67,7 @@ class Journal:
 
 
 def read(path: Path) -> Entry:
-    """A journal as another process left it; case -1 where none was begun."""
+    """Read the journal that another process left; case -1 if none was begun."""
     data = path.read_bytes() if path.exists() else b""
     if len(data) < _HEADER.size:
         return Entry(-1, 0, [])

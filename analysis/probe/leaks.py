@@ -50,7 +50,7 @@ class _MallInfo(ctypes.Structure):
 
 
 def memory() -> Memory | None:
-    """The memory of this process; None where the system does not say it simply."""
+    """Return the memory of this process; None if the system has no simple way to tell it."""
     status = Path("/proc/self/statm")
     if not status.exists():
         return None
@@ -65,7 +65,7 @@ def memory() -> Memory | None:
 
 
 def leaks(context: Context, case: int) -> None:
-    """Case 0: lives of instances. Case 1: steps of one. Case 2: saved states of one."""
+    """Measure the growth of memory over lives of instances (case 0), steps (case 1), or saved states (case 2)."""
     if memory() is None:
         context.say("not made: this system does not say how much memory is used")
         return
@@ -82,7 +82,7 @@ def leaks(context: Context, case: int) -> None:
 
 
 def _measure(repeat: Callable[[], None]) -> tuple[int, Memory]:
-    """Repetitions in the second half of a measurement, and by how much the memory grew over them."""
+    """Return the repetitions in the second half of a measurement, and the growth of the memory over them."""
     until = time.monotonic() + _SECONDS / 2
     warm = 0
     while warm < 20 or (warm < _MOST // 2 and time.monotonic() < until):

@@ -154,19 +154,19 @@ class Machine:
     allowed: dict[str, dict[str, str]]
 
     def cell(self, function: str, state: str, event_mode: bool = False) -> str:
-        """The cell of a function in a state, with `e` decided."""
+        """Return the cell of a function in a state, with `e` decided."""
         cell = self.allowed[function][state]
         return ("x" if event_mode else ".") if cell == "e" else cell
 
     def follow(self, function: str, state: str, event_mode: bool = False) -> str:
-        """The state after a call that returned OK."""
+        """Return the state after a call that returned OK."""
         if function == "ExitInitializationMode":
             return "event" if self.interface == "me" or event_mode else "step"
         following = LEADS_TO.get(function, state)
         return "error" if following == "terminated" and self.version == 3 else following
 
     def path(self, target: str, event_mode: bool = False) -> list[str] | None:
-        """The shortest calls from `instantiated` to a state; None where no call that returns OK leads there."""
+        """Return the shortest sequence of calls from `instantiated` to a state; None if no successful calls lead there."""
         reached: dict[str, list[str]] = {"instantiated": []}
         queue = deque(["instantiated"])
         while queue:

@@ -108,7 +108,7 @@ class Model:
     dependencies: tuple[tuple[Variable, tuple[Variable, ...]], ...] = field(repr=False)
 
     def named(self, group: str, condition: str = "x") -> list[Variable]:
-        """The variables of a group of functions that meet a condition."""
+        """Return the variables of a group of functions that meet a condition."""
         meets = CONDITIONS[condition]
         if condition == "2":
             return [v for v in self.variables if v.group == group and (meets(v) or v.name in self.initial_unknowns)]
@@ -124,12 +124,12 @@ class Model:
 
 
 def interfaces(description: Any) -> list[str]:
-    """The interfaces of an FMU that the probe knows: cs, me."""
+    """Return the interfaces of an FMU that the probe knows: cs, me."""
     return [name for name, value in (("cs", description.coSimulation), ("me", description.modelExchange)) if value]
 
 
 def read_model(folder: Path, interface: str) -> Model:
-    """The interface of an extracted FMU."""
+    """Read the interface of an extracted FMU."""
     from fmpy import read_model_description
 
     description = read_model_description(str(folder), validate=False)
@@ -183,7 +183,7 @@ def read_model(folder: Path, interface: str) -> Model:
 
 
 def _dependencies(description: Any, by_name: dict[str, Variable]) -> list[tuple[Variable, tuple[Variable, ...]]]:
-    """Each derivative and output that is a scalar Real, with the inputs and states that may influence it."""
+    """Return each scalar Real derivative and output with the inputs and states that may influence it."""
     knowns = [v for v in by_name.values() if v.is_real and v.size == 1 and CONDITIONS["5"](v)]
     pairs = []
     for unknown in [*description.derivatives, *description.outputs]:
@@ -239,7 +239,7 @@ def _variable(variable: Any, version: int, is_state: bool) -> Variable:
 
 
 def _capabilities(folder: Path, interface: str) -> set[str]:
-    """The flags of an interface that are true, from the file: FMPy does not read all of them."""
+    """Return the true flags of an interface from the file, since FMPy does not read all of them."""
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     element = root.find({"cs": "CoSimulation", "me": "ModelExchange"}[interface])
     return set() if element is None else {name for name, value in element.items() if value in ("true", "1")}

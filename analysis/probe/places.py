@@ -60,12 +60,12 @@ def _all(part: str) -> str:
 
 
 def count(model: Model) -> int:
-    """How many places are tried."""
+    """Return the number of places."""
     return len(FOLDERS) + len(_URIS if model.version == 2 else _PATHS)
 
 
 def places(context: Context, case: int) -> None:
-    """A short run of the FMU in a folder of an unusual name, or with its resources said in another way."""
+    """Run the FMU shortly in a folder with an unusual name, or with another form of the address of its resources."""
     if case < len(FOLDERS):
         _folder(context, FOLDERS[case])
         return

@@ -33,7 +33,7 @@ def _compare(context: Context, one: Sequence[Values], other: Sequence[Values], k
 
 
 def repeated(context: Context, case: int) -> None:
-    """The same calls give the same values: in a new instance, after a reset, and beside another instance."""
+    """Check that the same calls give the same values in a new instance, after a reset, and beside another instance."""
     steps = random_inputs(context.random(case), context.model, _STEPS)
     first = Run(context.session())
     expected = _course(first, steps)
@@ -67,7 +67,7 @@ def repeated(context: Context, case: int) -> None:
 
 
 def restored(context: Context, case: int) -> None:
-    """A run continued from a restored state is bit-identical, from whatever state it is restored."""
+    """Check that a run continued from a restored state is bit-identical, whatever the instance did before."""
     rng = context.random(case)
     steps = random_inputs(rng, context.model, 2 * _STEPS)
     run = Run(context.session())
@@ -114,7 +114,7 @@ def serialize_here(context: Context, case: int) -> None:
 
 
 def deserialize_there(context: Context, case: int) -> None:
-    """Continue from the bytes that another process wrote."""
+    """Continue from a state that another process wrote as bytes."""
     path = context.work / f"serialized-{context.model.interface}-{case}.json"
     if not path.exists():
         context.say("not made: no bytes were written")
@@ -136,7 +136,7 @@ def deserialize_there(context: Context, case: int) -> None:
 
 
 def split(context: Context, case: int) -> None:
-    """One step of h against two of h/2, with inputs that do not change; the largest difference of an output."""
+    """Compare one step of h with two of h/2 at constant inputs; measure the largest difference of an output."""
     model = context.model
     if model.fixed_step:
         context.say("not made: the FMU takes steps of one size only")

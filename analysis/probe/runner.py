@@ -144,7 +144,7 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
 
 
 def _extract(fmu: Path, folder: Path) -> Any:
-    """Extract an FMU; its description."""
+    """Extract an FMU and return its description."""
     from fmpy import extract, read_model_description
 
     check_fmu(fmu)

@@ -17,7 +17,7 @@ _LENGTH = 60
 
 
 def legal(context: Context, case: int) -> None:
-    """A life of random legal calls."""
+    """Run one instance through random legal calls."""
     rng = context.random(case)
     session = context.session()
     if not session.instantiate(event_mode=rng.random() < 0.7, early_return=rng.random() < 0.5):
@@ -46,7 +46,7 @@ class Forbidden:
 
     @property
     def least(self) -> int:
-        """Cases that are run whatever number of calls was asked for: each fault once."""
+        """Return the least number of cases, each fault once, whatever number of calls was requested."""
         return len(self.faults)
 
     def __call__(self, context: Context, case: int) -> None:
@@ -133,7 +133,7 @@ class Forbidden:
 
 
 def _aftermath(walk: Walk) -> None:
-    """What may follow a forbidden call: reading, going on, a new start, the end. Only a crash counts."""
+    """Make calls that may follow a forbidden one: read, go on, start anew, end. Only a crash counts."""
     for _ in range(walk.rng.randint(0, 12)):
         walk.step()
     if walk.state == "error" and walk.rng.random() < 0.5 and walk.session.call("Reset") == OK:

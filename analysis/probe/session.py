@@ -64,7 +64,7 @@ class Library:
             self.messages.append((message or b"").decode("utf-8", "replace"))
 
     def function(self, name: str) -> Any:
-        """A function by its name without the prefix."""
+        """Return a function by its name without the prefix."""
         return getattr(self._dll, self._prefix + name)
 
 
@@ -89,7 +89,7 @@ class Session:
         self.event_mode = False
 
     def instantiation(self, *, event_mode: bool = False, early_return: bool = False) -> tuple[str, list[Any]]:
-        """The function that makes an instance and its legal arguments, which a fault may change."""
+        """Return the function that makes an instance, with its legal arguments, which a fault may change."""
         model = self.model
         token = model.token.encode()
         self.event_mode = event_mode and model.event_mode
@@ -151,14 +151,14 @@ class Session:
 
 
 def uri(folder: Path) -> bytes:
-    """The URI of a folder, every character that has a meaning in one percent-encoded."""
+    """Return the URI of a folder, with reserved characters percent-encoded."""
     return (
         "file://" + quote(("" if folder.as_posix().startswith("/") else "/") + folder.as_posix(), safe="/:")
     ).encode()
 
 
 def show(argument: Any) -> str:
-    """An argument as text for the list of calls."""
+    """Return an argument as text for the list of calls."""
     if argument is None:
         return "NULL"
     if isinstance(argument, bytes):

@@ -9,7 +9,7 @@ from .findings import WRONG, Finding
 
 
 def check_statically(fmu: Path, description: Any) -> list[Finding]:
-    """A finding for each problem that FMPy sees: schema, variables, structure, archive."""
+    """Note a finding for each problem that FMPy sees: schema, variables, structure, archive."""
     from fmpy.validation import validate_fmu
 
     return [

@@ -19,7 +19,7 @@ DERIVATIVE_TOLERANCE = 1e-4
 
 
 def derivatives(context: Context, case: int) -> None:
-    """Directional derivatives against differences, at the start and after random steps; adjoint against directional ones."""
+    """Compare directional derivatives with differences, and adjoint with directional ones, at random states."""
     model, rng = context.model, context.random(case)
     run = _at_a_point(context, case)
     worst, name = 0.0, ""
@@ -43,12 +43,12 @@ def derivatives(context: Context, case: int) -> None:
 
 
 def _floor(unknown: Variable) -> float:
-    """Derivatives that are smaller than this may be rounding alone."""
+    """Return the size below which a derivative may be rounding alone."""
     return 1e-8 * abs(unknown.nominal)
 
 
 def _at_a_point(context: Context, case: int) -> Run:
-    """A run at which derivatives can be asked for: in continuous-time mode; for co-simulation in initialization mode."""
+    """Return a run in a mode that allows derivatives: continuous-time mode, or initialization mode for co-simulation."""
     if context.model.interface == "me":
         run = Run(context.session())
         for inputs in random_inputs(context.random(case), context.model, 5 * case):
@@ -71,7 +71,7 @@ def _directional(
 
 
 def _difference(run: Run, unknown: Variable, known: Variable, step: float, declared: float) -> tuple[float, float]:
-    """How far a central difference is from the declared derivative, and the difference."""
+    """Return the distance of a central difference from the declared derivative, and the difference itself."""
     here = run.get([known])[0]
     step *= max(abs(here), 0.01 * min(abs(known.nominal), 1.0))
     sides = []
@@ -104,7 +104,7 @@ def _sums(
     seed: Sequence[float],
     row: Sequence[float],
 ) -> None:
-    """A derivative along several knowns is the sum over them; the adjoint one of a row is that row."""
+    """Check that a derivative along several knowns is the sum over them, and that the adjoint of a row is the row."""
     terms = [a * b for a, b in zip(row, seed)]
     floor = _floor(unknown)
     room = 1e-9 * sum(map(abs, terms)) + floor
@@ -125,7 +125,7 @@ def _sums(
 
 
 def bounds(context: Context, case: int) -> None:
-    """Over a run with random inputs every variable stays within its declared bounds, and no output is NaN."""
+    """Check that over a run with random inputs each variable stays within its declared bounds and no output is NaN."""
     model = context.model
     numbers = [v for v in model.variables if v.group not in ("String", "Boolean") and v.size == 1]
     watched = [v for v in numbers if v.causality == "output" or math.isfinite(v.minimum) or math.isfinite(v.maximum)]
@@ -147,7 +147,7 @@ def bounds(context: Context, case: int) -> None:
 
 
 def starts(context: Context, case: int) -> None:
-    """After the initialization parameters and inputs have the start values of the model description."""
+    """Check that parameters and inputs have the start values of the model description after the initialization."""
     run = Run(context.session())
     for group in context.model.groups:
         chosen = [v for v in context.model.named(group, "3") if v.size == 1 and v.causality in ("parameter", "input")]
@@ -160,7 +160,7 @@ def starts(context: Context, case: int) -> None:
 
 
 def past_the_end(context: Context, case: int) -> None:
-    """A step past the stop time that was set is refused, as both standards ask."""
+    """Check that a step past the stop time is refused, as both standards require."""
     size = step_size(context.model)
     run = Run(context.session(), stop=context.model.start_time + 4 * size)
     for _ in range(4):
@@ -178,7 +178,7 @@ def past_the_end(context: Context, case: int) -> None:
 
 
 def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
-    """Each parameter with a value beyond each of its declared bounds."""
+    """Return each parameter with a value beyond each of its declared bounds."""
     parameters = [
         v
         for v in model.variables
@@ -194,7 +194,7 @@ def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
 
 
 def out_of_bounds(context: Context, case: int) -> None:
-    """A parameter beyond its declared bounds is refused, when it is set or at the end of the initialization."""
+    """Check that a parameter beyond its bounds is refused when set or at the end of the initialization."""
     variable, beyond = bounded_parameters(context.model)[case]
     session = context.session()
     if not session.instantiate():

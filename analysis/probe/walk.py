@@ -35,12 +35,12 @@ _STATES = 3
 
 
 def references(variables: Sequence[Variable]) -> Any:
-    """The value references of variables, for C."""
+    """Return the value references of variables as a C array."""
     return (ctypes.c_uint * len(variables))(*(v.reference for v in variables))
 
 
 def value(rng: random.Random, variable: Variable) -> Any:
-    """A value that a variable should take: its start, or one near it and within its bounds."""
+    """Return a value that a variable should take: its start, or one near it within its bounds."""
     if variable.group == "String":
         return (
             variable.start
@@ -105,7 +105,7 @@ class Walk:
         }.get(key, "continuousstate" not in key or "number" in key or model.states > 0)
 
     def cell(self, name: str) -> str:
-        """What the standard's table says of a function in the present state; after Fatal nothing is allowed."""
+        """Return the cell of the standard's table for a function in the present state; after Fatal nothing is allowed."""
         if self.session.journal.fatal:
             return "."
         return self.machine.cell(name, self.state, self.session.event_mode)
@@ -122,7 +122,7 @@ class Walk:
                 return
 
     def go(self, target: str, most: int = 2) -> bool:
-        """Walk to a state, with up to ``most`` random calls in each state on the way; whether it was reached."""
+        """Walk to a state, with up to ``most`` random calls in each state on the way; return whether it was reached."""
         if target == "ready" and self.model.version == 3:
             return False
         for function in self.machine.path(target, self.session.event_mode) or []:
@@ -189,7 +189,7 @@ class Walk:
             self.forced = "EnterEventMode"
 
     def arguments(self, name: str, whatever: bool = False) -> list[Any] | None:
-        """Legal arguments of a function; None where there are none now, but ``whatever`` allows those of any variable."""
+        """Return legal arguments of a function; None if there are none now, unless ``whatever`` allows any variable."""
         group = name[3:]
         if name[:3] in ("Get", "Set") and group in self.model.c_types:
             return self._access(name[:3], group, whatever)
@@ -208,7 +208,7 @@ class Walk:
         return access(self, verb, self.rng.sample(variables, min(len(variables), self.rng.randint(1, 4))))
 
     def pick(self, pairs: Sequence[tuple[Variable, tuple[Variable, ...]]]) -> tuple[Variable, Variable] | None:
-        """A random unknown and a known that it depends on."""
+        """Return a random unknown and a known on which it depends."""
         if not pairs:
             return None
         unknown, knowns = self.rng.choice(pairs)
@@ -218,7 +218,7 @@ class Walk:
 
 
 def access(walk: Walk, verb: str, variables: Sequence[Variable]) -> list[Any]:
-    """Arguments that get or set these variables, which are of one group."""
+    """Return the arguments that get or set these variables of one group."""
     c_type = walk.model.c_types[variables[0].group]
     size = sum(v.size for v in variables)
     values = (c_type * size)()
@@ -248,7 +248,7 @@ def _get_state(walk: Walk) -> list[Any] | None:
 
 
 def serialized(session: Session, state: Any) -> bytes:
-    """The bytes of a saved state."""
+    """Return the bytes of a saved state."""
     serialize = {2: "SerializeFMUstate", 3: "SerializeFMUState"}[session.model.version]
     size = ctypes.c_size_t()
     session.need(serialize.replace("Serialize", "Serialized") + "Size", state, size)
@@ -258,7 +258,7 @@ def serialized(session: Session, state: Any) -> bytes:
 
 
 def byte_array(session: Session, data: bytes) -> Any:
-    """Bytes as the array that the functions of a version take."""
+    """Return bytes as the array that the functions of a version take."""
     kind = ctypes.c_char if session.model.version == 2 else ctypes.c_ubyte
     return (kind * len(data)).from_buffer_copy(data)
 
@@ -319,7 +319,7 @@ def derivative_arguments(
     seed: Sequence[float],
     transposed: bool = False,
 ) -> list[Any]:
-    """Arguments of a directional (or adjoint) derivative; the last array (FMI 2) or the last but one takes the result."""
+    """Return the arguments of a derivative along a seed; the result goes to the last array (FMI 2) or the one before."""
     given = (ctypes.c_double * len(seed))(*seed)
     result = (ctypes.c_double * len(knowns if transposed else unknowns))()
     about = [references(unknowns), len(unknowns), references(knowns), len(knowns)]

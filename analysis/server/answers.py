@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 
 
 def chart(title: str, unit: str, angle: FloatArray, values: FloatArray) -> Answer:
-    """A curve over the crank angle (rad)."""
+    """Return a curve over the crank angle (rad)."""
     return {
         "title": title,
         "unit": unit,
@@ -26,10 +26,10 @@ def chart(title: str, unit: str, angle: FloatArray, values: FloatArray) -> Answe
 
 
 def folder() -> tempfile.TemporaryDirectory[str]:
-    """A folder for the time of a job."""
+    """Return a folder that exists while the job runs."""
     return tempfile.TemporaryDirectory(prefix="linkwork-", ignore_cleanup_errors=True)
 
 
 def file(path: Path) -> Answer:
-    """A file that was written, for the browser to save."""
+    """Return a written file for the browser to save."""
     return {"name": path.name, "base64": base64.b64encode(path.read_bytes()).decode()}

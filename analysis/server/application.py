@@ -159,14 +159,14 @@ def _json(content: Mapping[str, Any]) -> bytes:
 
 
 def _hashes(page: str) -> str:
-    """The scripts of a page, as its policy names them."""
+    """Return the hashes of a page's scripts for its content policy."""
     scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
     found = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     return " ".join(f"'sha256-{one}'" for one in found)
 
 
 def hosts_of(port: int) -> tuple[str, ...]:
-    """What a browser has as the host of a server at a port; it leaves out the usual one."""
+    """Return the host names that a browser sends for a server at a port; the usual port is left out."""
     return tuple(name if port == 80 else f"{name}:{port}" for name in (ADDRESS, "localhost"))
 
 
@@ -214,7 +214,7 @@ class Server:
 
     @property
     def address(self) -> str:
-        """Of the page, with its token."""
+        """Return the address of the page with its token."""
         return f"http://{ADDRESS}:{self.port}/?token={self.application.token}"
 
     def run(self) -> None:
@@ -227,7 +227,7 @@ class Server:
             self._close()
 
     def stop(self) -> None:
-        """Let `run` come to its end."""
+        """End `run`."""
         self._server.trigger.pull_trigger(self._close)
 
     def _close(self) -> None:

@@ -55,7 +55,7 @@ class _Export:
 
 
 def do(kind: str, request: Mapping[str, Any]) -> Answer:
-    """Do a job of `JOBS` with the ``state`` and what is ``wanted`` of a request.
+    """Run a job of `JOBS` with the ``state`` and the ``wanted`` options of a request.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def do(kind: str, request: Mapping[str, Any]) -> Answer:
 
 
 def _tuned(case: Case, wanted: _Tuning) -> Answer:
-    """The least change, as a state of the page."""
+    """Find the least change and return it as a state of the page."""
     low, high = wanted.speeds
     wish = Wish(
         parameters=case.parameters,
@@ -103,7 +103,7 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
 
 
 def _run(case: Case, wanted: _Run) -> Answer:
-    """A run of the native FMU, or where Zig is not installed of the Python FMU, at the samples of the page."""
+    """Run the native FMU, or the Python FMU if Zig is not installed, at the samples of the page."""
     if wanted.rows > _ROWS:
         raise InputError(f"{wanted.rows} rows are more than {_ROWS}: ask for less")
     mechanism = mechanism_of(case.parameters)
@@ -133,7 +133,7 @@ def _run(case: Case, wanted: _Run) -> Answer:
 
 
 def _exported(case: Case, wanted: _Export) -> Answer:
-    """A native FMU with the values of the page as its start values."""
+    """Build a native FMU with the values of the page as start values."""
     mechanism = mechanism_of(case.parameters)
     values = given_values(mechanism, state_of(case)["values"])
     motor = of_the_motor(mechanism)

@@ -78,7 +78,7 @@ class Linkages(_Drawn):
         return [*found, LargestLink(length=self.longest)] if isfinite(self.longest) else found
 
     def tables(self, title: str, **search: Any) -> dict[str, Any]:
-        """The same as a case file of `linkwork synthesize`, every digit kept."""
+        """Return the tables of the same search as a case file of `linkwork synthesize`, with all digits."""
         angle: dict[str, Any] = {"least_transmission_angle": self.least_transmission or False}
         turn = {} if self.least_transmission else {"full_turn": True}
         longest = {"largest_link": self.longest} if isfinite(self.longest) else {}
@@ -100,7 +100,7 @@ class Moved(_Drawn):
 
 
 def linkages(case: Case, wanted: Linkages) -> Answer:
-    """Ranked linkages, drawn, each as a state of the page with the path as that has it: its x axis is the ground link.
+    """Return ranked linkages with drawings, each as a state of the page and with the path in the frame of its ground link.
 
     A geared five-bar, of which there is no mechanism to run, is a drawing for CAD and a case of its own that is searched for.
     """
@@ -152,7 +152,7 @@ def _state(solution: Solution, title: str) -> Answer:
 
 
 def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[Answer]:
-    """A drawing of a linkage that the page cannot show, and a case that searches its kind and its gears alone."""
+    """Return the drawing of a linkage that the page cannot show, and a case that searches its kind and its gears alone."""
     pivot = solution.linkage.pivot
     assert isinstance(pivot, SecondCrank)
     case = wanted.tables(title, kinds=[solution.linkage.kind], gears=[pivot.ratio])
@@ -161,7 +161,7 @@ def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[
 
 
 def _picture(solution: Solution) -> Answer:
-    """Lines of a small picture in the plane of the path, where the task begins: links and guide, and what is traced."""
+    """Return the lines of a small picture in the plane of the path at the first station: links, guide and traced curve."""
     scene = LinkageScene(solution)
     pins = scene.pins(float(scene.rotation[0])) or {}
     links = [
@@ -184,7 +184,7 @@ def _joined(scene: LinkageScene) -> list[FloatArray]:
 
 
 def _turned(points: FloatArray, linkage: Linkage) -> FloatArray:
-    """Points of the plane in the frame of a linkage's ground link."""
+    """Return points of the plane in the frame of a linkage's ground link."""
     z = (points[:, 0] + 1j * points[:, 1] - complex(linkage.pivot_x, linkage.pivot_y)) * np.exp(
         -1j * linkage.ground_angle
     )
@@ -192,7 +192,7 @@ def _turned(points: FloatArray, linkage: Linkage) -> FloatArray:
 
 
 def moved(case: Case, wanted: Moved) -> Answer:
-    """The slider's motion with more and more harmonics, the links and the guide kept, and the force of the last."""
+    """Compute the slider's motion with more and more harmonics, links and guide kept, and the force of the last."""
     p = case.parameters
     require_five_bar(p, "a motion of the slider")
     if p.coupler_point_distance == 0.0:

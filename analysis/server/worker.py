@@ -96,7 +96,7 @@ class Worker:
             return self._job
 
     def look(self) -> dict[str, Any]:
-        """How the last job stands: its ``state`` is idle, running, done, failed or cancelled; ``answer`` is a text of JSON."""
+        """Return the last job's ``state``, idle, running, done, failed or cancelled, and its ``answer``, a text of JSON."""
         with self._lock:
             try:
                 while self._job["state"] == "running" and self._pipe.poll():
@@ -108,7 +108,7 @@ class Worker:
             return self._job
 
     def cancel(self) -> dict[str, Any]:
-        """End the job that is being done, in the middle of whatever it does."""
+        """End the running job at once."""
         with self._lock:
             if self.look()["state"] == "running":
                 self._end()
@@ -118,7 +118,7 @@ class Worker:
             return self._job
 
     def stop(self) -> None:
-        """End the process, with what it does."""
+        """End the process and its job."""
         with self._lock:
             self._end()
 
@@ -144,7 +144,7 @@ class Worker:
 
 
 def _work(pipe: Any, caller: int, folder: str) -> None:
-    """What the process does: job after job, until it is ended."""
+    """Run job after job in the process until it is ended."""
     end_with(caller)
     if os.name == "posix":
         os.setsid()
@@ -186,7 +186,7 @@ class _Terminal(io.TextIOBase):
 
 
 def _answer(do: Any, kind: str, request: Mapping[str, Any], teller: _Teller) -> dict[str, Any]:
-    """What came of a job."""
+    """Return the answer of a job."""
     try:
         with heard_by(teller), redirect_stderr(_Terminal(teller)):
             return {"state": "done", "answer": json.dumps(do(kind, request), allow_nan=False)}

@@ -43,7 +43,7 @@ _HASH = '<meta name="sources" content="{}">'
 
 
 def hash_of_sources() -> str:
-    """Hash of all files of the checkout that the page is made of."""
+    """Return the hash of all files of the checkout from which the page is made."""
     found = hashlib.sha256()
     for path in sorted({path for pattern in _MADE_OF for path in ROOT.glob(pattern) if path.is_file()}):
         found.update(f"{path.relative_to(ROOT).as_posix()}\n".encode())
@@ -57,7 +57,7 @@ def fresh() -> bool:
 
 
 def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | None = None) -> str:
-    """The page with mechanisms, which Zig compiles.
+    """Build the page with mechanisms, which Zig compiles.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | No
 
 
 def page_of(state: Mapping[str, Any]) -> str:
-    """The built page, which opens with a state; with the state's mechanism alone where it is not one of Linkwork's own.
+    """Return the built page with an opening state; only with its mechanism if this is not one of Linkwork's own.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def page_of(state: Mapping[str, Any]) -> str:
 
 
 def address_of(state: Mapping[str, Any], page: str) -> str:
-    """Address of the page with a state, as the page itself writes it; values that are as at the start are left out.
+    """Return the address of the page with a state, as the page itself writes it; start values are left out.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def main() -> None:
 
 
 def _with(page: str, script: str, data: Any) -> str:
-    """A page with other data in one of its scripts."""
+    """Return a page with other data in one of its scripts."""
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     pattern = rf'(<script type="application/json" id="{script}">).*?(</script>)'
     return re.sub(pattern, lambda found: found[1] + text + found[2], page, count=1, flags=re.DOTALL)

@@ -23,7 +23,7 @@ OPENING = {"coupler.point_distance": 0.105, "coupler.point_angle": 0.55}
 
 
 def opening_state() -> dict[str, Any]:
-    """The state that the page has where none is given."""
+    """Return the state with which the page opens by default."""
     name, known = next(iter(FIVE_BAR.published.items()))
     return {
         "mechanism": FIVE_BAR.name,
@@ -33,7 +33,7 @@ def opening_state() -> dict[str, Any]:
 
 
 def state_of(case: Case) -> dict[str, Any]:
-    """The state of the page that a case is.
+    """Return the state of the page for a case.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def state_of(case: Case) -> dict[str, Any]:
 
 
 def case_of(state: Mapping[str, Any]) -> Case:
-    """The case that a state of the page is; of numbers and names alone, so that a page can name no file.
+    """Return the case for a state of the page; a state has numbers and names alone, so that a page can name no file.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def case_of(state: Mapping[str, Any]) -> Case:
 
 
 def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
-    """All that the page gives a mechanism, by FMI name, with the start values of what it leaves out.
+    """Return the values that the page gives a mechanism by FMI name, with start values for the others.
 
     Raises
     ------

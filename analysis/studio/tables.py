@@ -31,7 +31,7 @@ TOLERANCE = 1e-12
 
 
 def tables_of(mechanism: Mechanism) -> dict[str, Any]:
-    """All that the page needs of a mechanism, with its module."""
+    """Return the tables of a mechanism that the page needs, with its module."""
     entries = interface(mechanism)
     reference = {entry.variable.name: entry.reference for entry in entries}
     outputs = {v.name: v for v in mechanism.variables if v.name in mechanism.output_names}
@@ -73,21 +73,21 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def published_values(mechanism: Mechanism, known: PublishedSet) -> dict[str, float]:
-    """What is given in a published set that is run at its speed, by FMI name."""
+    """Return the values of a published set run at its speed, by FMI name."""
     return values_of(mechanism, known.parameters, known.initial) | {
         channel.name: known.drive[channel.argument] for channel in mechanism.channels if channel.argument in known.drive
     }
 
 
 def values_of(mechanism: Mechanism, parameters: Any, initial: Any) -> dict[str, float]:
-    """Parameters and state at the start by FMI name."""
+    """Return parameters and initial state by FMI name."""
     own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
     start = {variable.name: getattr(initial, name) for name, variable in mechanism.initial_variables.items()}
     return {name: float(value) for name, value in (own | start).items()}
 
 
 def shown_in(variable: Variable) -> tuple[str, float]:
-    """The unit that people think in, and the factor to it."""
+    """Return the unit in which a quantity is shown, and the factor to it."""
     displays = dict(UNITS[variable.unit].displays) if variable.kind == "Real" else {}
     shown = variable.display or ("" if variable.unit == "rad/s" else next(iter(displays), ""))
     unit = shown or variable.unit
@@ -99,7 +99,7 @@ def _unit(variable: Variable) -> dict[str, Any]:
 
 
 def given_entries(mechanism: Mechanism) -> list[Entry]:
-    """What the page gives, but for a motor; the rates of inputs that are constant are none."""
+    """Return the interface entries that the page sets, without a motor's and without rates of inputs."""
     rates = [channel.name for channel in mechanism.channels if channel.kind == "rate"]
     roles = ("parameter", "mode", "initial", "input")
     return [one for one in interface(mechanism) if one.role in roles and one.variable.name not in rates]
@@ -135,7 +135,7 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
 
 
 def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
-    """What is given of a motor on the crank: the page's module has it beside what has a value reference, which are below 0."""
+    """Return the rows of a motor on the crank, which the page's module keeps under references below 0."""
     torque = crank_of(mechanism, mechanism.freedoms[crank].coordinate).torque if crank >= 0 else None
     if torque is None:
         return []
@@ -160,7 +160,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 
 def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
-    """The value reference of the stiffness that a natural frequency is of; -1: it is in the energy, None: there is no such."""
+    """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None if there is none."""
     if crank < 0 or len(mechanism.freedoms) < 2:
         return None
     return reference.get(stiffness_name(mechanism), -1)
@@ -199,14 +199,14 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
 
 
 def _moving(mechanism: Mechanism) -> list[str]:
-    """Outputs with a rate and an acceleration, but for the crank's angle."""
+    """Return outputs with a rate and an acceleration, the crank's angle left out."""
     rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
     crank = [freedom.coordinate for freedom in mechanism.freedoms if freedom.period > 0.0]
     return [n for n in mechanism.output_names if n in rate_of and rate_of[n] in rate_of and n not in crank]
 
 
 def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Charts: each curve the places beyond the state whose root of squares it is; of one place, that itself.
+    """Return the charts; a curve has the places beyond the state whose root of squares it shows, or one place for itself.
 
     The powers stand after the outputs and the joints: see studio.c.
     """

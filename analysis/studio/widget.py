@@ -62,7 +62,7 @@ class Widget(anywidget.AnyWidget):
 
     @property
     def case(self) -> Case:
-        """What the page shows, as a case: its parameters, state at the start and inputs."""
+        """Return the case that the page shows: parameters, initial state and inputs."""
         return case_of(self.state)
 
     def change(self, values: Mapping[str, float]) -> None:

@@ -26,7 +26,7 @@ from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 )
 @out_option
 def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
-    """Hold the thesis's dual-number method against vector mechanics, quantity by quantity.
+    """Compare the thesis's dual-number method with vector mechanics, quantity by quantity.
 
     The loop is closed by dual matrices with true ball joints, forces by dual momenta. Differences are relative to the largest
     quantity of the same unit. --two-rotations shows the thesis's own form, which gives each ball joint two rotations and

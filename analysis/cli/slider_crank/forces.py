@@ -68,7 +68,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
 
 
 def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:
-    """Least and greatest values with their angles, of what is clear of singularities and not masked."""
+    """Return least and greatest values with their angles, singular and masked places left out."""
     quantities: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),
         ("crank torque", "N.m", turn.torque),
@@ -103,7 +103,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
 
 
 def _special_places(turn: ForceTurn, units: Units) -> list[str]:
-    """Sentences on dead centres and limits of assembly, and on what could not be determined there."""
+    """Return sentences on dead centres, on limits of assembly, and on forces that are undetermined there."""
     without = f"grows without bound towards it; within {sc.CLEAR_DEG:g} deg it is not among the extremes"
     sentences = [
         f"dead centre at {angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"

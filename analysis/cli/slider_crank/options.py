@@ -41,18 +41,18 @@ class Units:
         self._table = {**sc.UNITS[system], "rad": sc.UNITS["inch"]["rad"]}
 
     def name(self, si: str) -> str:
-        """What the unit is called."""
+        """Return the name of the unit."""
         return self._table.get(si, (si, 1.0))[0]
 
     def per(self, si: str) -> float:
-        """How many of it one of SI is."""
+        """Return the number of these units in one SI unit."""
         return 1.0 / self._table.get(si, (si, 1.0))[1]
 
     def length(self, value: float) -> str:
         return f"{value * self.per('m'):.6g} {self.name('m')}"
 
     def in_error(self, text: str) -> str:
-        """What an error says, its lengths, forces and torques in these units; texts in quotes are the user's own words."""
+        """Return the message of an error in these units; quoted texts stay as the user wrote them."""
         variables = SLIDER_CRANK.mechanism_variables
 
         def parameter(found: re.Match[str]) -> str:
@@ -83,21 +83,21 @@ class Chosen:
 
     @property
     def law(self) -> PeriodicShift:
-        """The shift over the crank angle, for ranges and pictures."""
+        """Return the shift over the crank angle, for ranges and pictures."""
         if self.groove is None:
             return sc.constant_shift(self.shift)
         return sc.groove_shift(self.parameters)
 
     @property
     def force_law(self) -> ShiftLaw:
-        """The shift over the crank angle, for the force problems."""
+        """Return the shift over the crank angle, for the force problems."""
         p = self.parameters
         if self.groove is None:
             return sc.ConstantShift(self.shift)
         return sc.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
 
     def shift_at(self, crank_angle: Any) -> Any:
-        """Shift at crank angles (m)."""
+        """Return the shift at crank angles (m)."""
         return self.force_law.at(crank_angle, 0.0, 0.0).shift
 
 
@@ -116,7 +116,7 @@ class _MechanismOptions:
     speed: str | None = None
 
     def choose(self, *, paced: bool) -> Chosen:
-        """The mechanism; ``paced`` says whether the speed matters.
+        """Return the chosen mechanism; ``paced`` tells whether the speed matters.
 
         Raises LinkworkError if a file, a name or a value is wrong.
         """
@@ -192,7 +192,7 @@ class _MechanismOptions:
 
 
 def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
-    """A title of a mechanism that has none."""
+    """Return a title for a mechanism without one."""
     moved = f"S1 = {units.length(shift)}"
     if groove is not None:
         moved = f"SS1 = {units.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
@@ -207,7 +207,7 @@ class Problem:
     points: int
 
     def turn(self, chosen: Chosen, *, at: float | None = None) -> ForceTurn:
-        """The solution over the turn and ``at`` an angle of it, or over what of these can be assembled."""
+        """Solve over the turn and ``at`` one angle, as far as the mechanism can be assembled there."""
         angles = np.linspace(0.0, tau, self.points)
         if at is not None and np.abs(angles - at).min() > 1e-9:
             angles = np.sort(np.append(angles, at))

@@ -128,7 +128,7 @@ def _degrees(turn: ForceTurn, i: int) -> float:
 
 
 def _in_the_turn(angle: float, chosen: Chosen) -> float:
-    """The same crank angle from 0 to 360 deg.
+    """Return the same crank angle between 0 and 360 deg.
 
     Raises InputError if it is outside of them and the shift there is another than a turn before or after.
     """
@@ -143,7 +143,7 @@ def _in_the_turn(angle: float, chosen: Chosen) -> float:
 
 
 def _tolerance(text: str, distribution: str) -> Tolerance:
-    """A tolerance from NAME=HALF_WIDTH."""
+    """Read a tolerance given as NAME=HALF_WIDTH."""
     from ...files import unknown_name
 
     name, equals, value = (part.strip() for part in text.partition("="))
@@ -158,7 +158,7 @@ def _tolerance(text: str, distribution: str) -> Tolerance:
 def _slopes(
     exact: Sensitivities, allowed: Sequence[Tolerance], place: int, units: Units
 ) -> tuple[Sequence[Sequence[str]], dict[str, Any]]:
-    """Rows of the table of sensitivities, and columns of their file."""
+    """Return the rows of the table of sensitivities and the columns of its file."""
     turn, rows = exact.turn, []
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
     for name in exact.derivatives:
@@ -186,12 +186,12 @@ def _number(value: Any, digits: int = 6) -> str:
 
 
 def _ratio(above: str, below: str) -> str:
-    """A unit over another."""
+    """Return the text of a unit divided by another."""
     return f"{above}/({below})" if "." in below or "/" in below else f"{above}/{below}"
 
 
 def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
-    """Everything of a Monte Carlo over the turn."""
+    """Return all columns of a Monte Carlo analysis over the turn."""
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]
@@ -210,7 +210,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
 
 
 def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> None:
-    """The estimates and the samples at one crank angle."""
+    """Print the estimates and the samples at one crank angle."""
     rows = []
     for name, spread in found.spreads.items():
         si, linear = sc.QUANTITIES[name], found.estimates[name]
