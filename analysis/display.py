@@ -34,7 +34,7 @@ class Shown:
 
 
 def format_range(values: Iterable[float], unit: str) -> str:
-    """Write the range of the finite ones of some numbers with their unit: "-0.01 to 0.02 m"."""
+    """Format the range of numbers with their unit, ignoring those that are not finite: "-0.01 to 0.02 m"."""
     finite = [float(value) for value in values if isfinite(value)]
     if not finite:
         return "no finite value"
@@ -44,7 +44,7 @@ def format_range(values: Iterable[float], unit: str) -> str:
 
 
 def format_count(count: int, what: str) -> str:
-    """Write a number of things: "1 branch", "2 branches", "no branches"."""
+    """Format a count with its noun: "1 branch", "2 branches", "no branches"."""
     several = (
         f"{what}es" if what.endswith(("ch", "s", "x")) else f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
     )

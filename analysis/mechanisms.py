@@ -1,4 +1,4 @@
-"""The mechanisms there are, one line each, and the check that the parts of one fit together."""
+"""The table of known mechanisms, and the check that the parts of a mechanism fit together."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
 
 
 def mechanism_of(parameters: Parameters) -> Mechanism:
-    """The mechanism that parameters belong to.
+    """Return the mechanism to which parameters belong.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def mechanism_of(parameters: Parameters) -> Mechanism:
 
 
 def output_units() -> dict[str, str]:
-    """Unit of every real output of every mechanism; outputs of one name have one unit (a test holds them to it)."""
+    """Return the unit of every real output of every mechanism; a test checks that outputs of one name share a unit."""
     return {
         v.name: v.unit
         for mechanism in MECHANISMS.values()
@@ -244,7 +244,7 @@ def wrapping_outputs() -> frozenset[str]:
 
 
 def variable_units() -> dict[str, str]:
-    """Unit of every real variable of every mechanism, by its FMI name."""
+    """Return the unit of every real variable of every mechanism, by its FMI name."""
     # every `Drive` that is made asks for them
     here = list(map(id, MECHANISMS.values()))
     if here != list(map(id, _units_of)):
@@ -254,7 +254,7 @@ def variable_units() -> dict[str, str]:
     return _units
 
 
-#: What `variable_units` has computed, and of which mechanisms.
+#: Result of `variable_units`, and the mechanisms for which it was computed.
 _units: dict[str, str] = {}
 _units_of: list[Mechanism] = []
 

@@ -1,4 +1,4 @@
-"""Angles of long runs: whole turns are taken off the state, counted, and put back into what is reported.
+"""Angles of long runs: whole turns are subtracted from the state, counted, and added back to the outputs.
 
 An angle of 1e9 turns is rounded to 1e-6 rad. An integrator that sees it takes the rounding for the motion, and its tolerance,
 which is relative to the state, for one of whole turns.
@@ -24,7 +24,7 @@ TURNS = 1024
 
 
 class WholeTurns:
-    """The turns taken off the angles of a run so far; none where an input or an event depends on the angle itself."""
+    """Whole turns subtracted from the angles of a run; none if an input or an event depends on the angle itself."""
 
     def __init__(
         self, mechanism: Mechanism, p: Any, modes: Sequence[float], encoded: Encoded, events: Sequence[Event]
@@ -34,13 +34,13 @@ class WholeTurns:
         self.taken = np.zeros(mechanism.size)
         functions = chain(chain.from_iterable(encoded.functions), (event.function for event in events))
         self._never = any(functions)
-        #: from which sample on how much is taken off
+        #: number of the first sample, and the turns subtracted from it on
         self._since: list[tuple[int, NDArray[np.float64]]] = []
 
     def take(
         self, x: NDArray[np.float64], u: NDArray[np.float64], laws: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
-        """Take turns off the state x, if they are many; ``first`` is the number of the next sample."""
+        """Subtract whole turns from the state x if there are many; ``first`` is the number of the next sample."""
         if not self.too_many(x) or laws[:, 2].any():
             return
         period = np.zeros(len(x))
@@ -62,22 +62,22 @@ class WholeTurns:
                 watch.table[(watch.table[:, 0] == column), 1] -= angle
 
     def put_back(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The outputs at the samples, with all turns."""
+        """Return the outputs at the samples with the subtracted turns added back."""
         for first, off in self._since:
             values[first:, self._columns] += off[: len(self._columns)]
         return values
 
     def too_many(self, x: NDArray[np.float64]) -> bool:
-        """Whether turns are to be taken off the state x."""
+        """Return whether the angles of the state x are large enough to subtract turns."""
         return not self._never and any(0.0 < TURNS * way < abs(angle) for way, angle in zip(self._periods, x.tolist()))
 
     @property
     def _columns(self) -> list[int]:
-        """The outputs that are the coordinates."""
+        """Return the indices of the outputs that are coordinates."""
         return [self._mechanism.output_names.index(freedom.coordinate) for freedom in self._mechanism.freedoms]
 
     def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> bool:
-        """Whether the mechanism does the same after the way as at x."""
+        """Return whether the mechanism behaves the same at x and after the displacement ``way``."""
         equations, p = self._mechanism.equations, self._p
         acting = equations.applied(self._modes, tuple(u.tolist()), p)
 

@@ -1,4 +1,4 @@
-"""What the public functions take in the place of numbers and objects: published sets, starts by name, quantities as text."""
+"""Shorthand arguments of the public functions: published sets by name, initial states as mappings, quantities as text."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..units import Amount
 from .inputs import Inputs, parameter_readers, start_from
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-#: What an argument is under a published set: a function of the set and of the argument as it was given, None where it was not.
+#: Function of a published set and an argument (None if it was not given) that returns the value to use.
 Fill = Callable[[PublishedSet, Any], Any]
 
 
 def published_set(known: str | PublishedSet) -> PublishedSet:
-    """A published set, by its name or as it is.
+    """Return a published set, given itself or by name.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
 
 
 def takes_options(kind: type) -> Callable[[_Function], _Function]:
-    """Refuse what is neither an argument of a function nor among its ``**options``, the keys of a TypedDict.
+    """Reject keyword arguments that a function does not have, neither itself nor among its TypedDict of options.
 
     A class in the place of the argument ``method`` has options of its own.
     """
@@ -109,19 +109,19 @@ def driven(known: PublishedSet, inputs: Any) -> Any:
 
 
 def started(known: PublishedSet, initial: Any) -> Any:
-    """Return the state at the start that is given, completed by that of the published set."""
+    """Return the given initial state, completed from the published set."""
     if isinstance(initial, Mapping):
         return start_from(mechanism_of(known.parameters), initial, known.initial)
     return known.initial if initial is None else initial
 
 
 def at_its_speed(known: PublishedSet, speed: Any) -> Any:
-    """Return the crank speed that is given, or else that of the published set (rad/s)."""
+    """Return the given crank speed, or else the speed of the published set (rad/s)."""
     return known.crank_speed if speed is None else speed
 
 
 def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] | None:
-    """Return the durations (s) of a turn of the slowest and of the fastest freedom that turns at a constant speed.
+    """Return the durations (s) of one turn of the slowest and the fastest freedom with a constant speed.
 
     None where there is no such freedom.
     """
@@ -137,7 +137,7 @@ def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] 
 def usual_times(
     parameters: Parameters, inputs: Inputs | None, stop_time: float | None, step: float | None
 ) -> tuple[float, float]:
-    """Return the end of a run and the distance of its samples (s).
+    """Return the stop time and the sampling step of a run (s).
 
     By default it has three turns of the slowest crank in steps of a degree of the fastest, at constant speeds. With an end
     and no step it is 1 ms.
@@ -158,7 +158,7 @@ def usual_times(
 
 
 def variant(of: Any, /, **changes: Amount) -> Any:
-    """A published set or parameters with some values changed, which may be texts with units.
+    """Return a published set or parameters with some values changed; values may be texts with units.
 
     Parameters
     ----------

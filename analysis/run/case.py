@@ -1,4 +1,4 @@
-"""A case: a mechanism, where it starts, what acts on it, and how long; what a case file holds."""
+"""A case, as a case file describes it: a mechanism, its initial state, its inputs, and the duration."""
 
 from __future__ import annotations
 

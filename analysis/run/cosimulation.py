@@ -146,7 +146,7 @@ class _Stepwise:
         self.accelerations = [names.index(rate_of[f.rate]) for f in freedoms]
 
     def first(self) -> dict[str, float]:
-        """The inputs at the start."""
+        """Return the inputs at the start."""
         return self.inputs(0, self.start)
 
     def inputs(self, number: int, x: NDArray[np.float64]) -> dict[str, float]:
@@ -208,7 +208,7 @@ class _Continuous:
         self.status, self.message = 0, ""
 
     def first(self) -> dict[str, float]:
-        """The inputs at the start."""
+        """Return the inputs at the start."""
         prepared = self.prepared
         x, laws = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.source.laws.copy()
         release(prepared.encoded, x, laws)

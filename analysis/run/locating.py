@@ -39,7 +39,7 @@ RELEASE, NOTHING, ASSEMBLY = np.arange(-3, 0)
 
 @inner
 def _gap(e, t, x, u, motion):
-    """What is zero where something happens: the limit of assembly, the release, event e of the user."""
+    """Return the function whose zero is an event: the limit of assembly, a release, or event e of the user."""
     watch, source = motion.watch, motion.source
     if e == ASSEMBLY:
         return clearance_at(x, u, motion) - LIMIT_SINE
@@ -53,7 +53,7 @@ def _gap(e, t, x, u, motion):
 
 @inner
 def _crosses(before, after, direction):
-    """Whether an event happens between two values; one that starts at zero does not."""
+    """Return whether an event happens between two values; one that starts at zero does not."""
     return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
 
 
@@ -69,7 +69,7 @@ def _record(e, t, x, motion):
 
 @inner
 def notice_jumps(motion):
-    """Record what the beginning of an interval makes happen; the status."""
+    """Record the events caused by jumps of the inputs at the beginning of an interval; return the status."""
     carry, watch, x = motion.carry, motion.watch, motion.x
     status = RUNNING
     for e in range(watch.table.shape[0]):
@@ -87,7 +87,7 @@ def notice_jumps(motion):
 
 @inner
 def _locate(e, low, high, h, motion):
-    """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
+    """Return the fraction of the step at which event e happens, by bisection of the interpolant."""
     room = motion.room
     positive = False
     for n in range(55):
@@ -107,7 +107,7 @@ def _locate(e, low, high, h, motion):
 
 @inner
 def _events_of_step(what, cut, h, motion):
-    """Record the user's events inside a step, by fractions of it; what stops it first, and where.
+    """Record the user's events inside a step, and return the first that stops the run, with its fraction.
 
     It is cut short by ``what`` at ``cut`` already.
     """
@@ -146,7 +146,7 @@ def _make_interpolant(h, motion):
 
 @inner
 def locate_events(clearance, h, motion):
-    """Make the interpolant of a good step and record its events; what cuts the step short, and at which fraction of it."""
+    """Make the interpolant of an accepted step, record its events, and return the one that ends it, with its fraction."""
     carry, watch = motion.carry, motion.watch
     _make_interpolant(h, motion)
     what, cut = NOTHING, 2.0
@@ -174,7 +174,7 @@ def locate_events(clearance, h, motion):
 
 @inner
 def end_at(what, cut, h, motion):
-    """End a step at the fraction where something cuts it short; the status."""
+    """End a step at the fraction of an event, and return the status."""
     carry, watch, source = motion.carry, motion.watch, motion.source
     x, u = motion.x, motion.u
     t = time_at(cut, h, motion)

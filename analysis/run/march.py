@@ -28,7 +28,7 @@ What = Event | int | None
 
 
 def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], progress: bool) -> Trajectory:
-    """The same run by `solve_ivp`, interval by interval of smooth inputs."""
+    """Solve a run by `solve_ivp`, one interval of smooth inputs after the other."""
     begun = clock.perf_counter()
     march = March(run)
     interrupted = False
@@ -107,7 +107,7 @@ class March:
         return u
 
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
-        """March to the end, a stopping event, or where it goes no further."""
+        """Integrate to the end, to a stopping event, or until the integrator fails."""
         times, end = self.settings.times, self.settings.times[-1]
         interval = 0
         while True:
@@ -129,7 +129,7 @@ class March:
             interval += reached
 
     def _notice_jumps(self) -> None:
-        """Events that happen because the inputs jump."""
+        """Record events caused by jumps of the inputs."""
         gaps = [self._gap(event, self.t, self.x, self.held) for event in self.of.events]
         if self._gaps is not None:
             # a zero marks an event that was just reported: wait until the value leaves zero
@@ -178,7 +178,7 @@ class March:
     def _interval(
         self, stop: float, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None
     ) -> bool:
-        """Integrate up to ``stop``; whether it was reached."""
+        """Integrate up to ``stop`` and return whether it was reached."""
         t0, x0 = self.t, self.x
         times = self.settings.times
         watched = self._watched(stop)

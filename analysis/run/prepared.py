@@ -1,4 +1,4 @@
-"""A run, prepared: what all ways of solving it share, and its solution by the compiled solver."""
+"""A prepared run: the data shared by all solvers, and its solution by the compiled solver."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ EVENTS_PER_CALL = 1_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """How a run is solved: times of its samples (s), hold (s, 0 for none), tolerance, steps at most."""
+    """Solver settings of a run: times of its samples (s), hold (s, 0 for none), tolerance, largest number of steps."""
 
     times: NDArray[np.float64]
     hold: float
@@ -41,7 +41,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where a run starts: state, mechanical energy (J), error scale."""
+    """The start of a run: state, mechanical energy (J), error scale."""
 
     x: NDArray[np.float64]
     energy: float
@@ -50,7 +50,7 @@ class Start:
 
 @dataclass(slots=True)
 class Run:
-    """One run, prepared.
+    """One run, checked and ready to be solved.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class Run:
         self.modes = tuple(float(value) for value in self.encoded.modes.values())
 
     def start(self) -> Start:
-        """State, energy and scale at the start.
+        """Compute the state, energy and error scale at the start.
 
         Raises
         ------
@@ -95,20 +95,20 @@ class Run:
         return Start(np.array(state), self.mechanism.equations.energy(state, self.p), scale)
 
     def applied(self, u: NDArray[np.float64]) -> Any:
-        """What acts on the plant, as the equations take it."""
+        """Return the inputs in the form that the equations take."""
         return self.mechanism.equations.applied(self.modes, tuple(u.tolist()), self.p)
 
     def limit(self, x: NDArray[np.float64]) -> str:
-        """What a motion has come to that ended at its limit, in words."""
+        """Return the message of a motion that ended at its limit."""
         idle = np.zeros(len(self.mechanism.channels))
         return self.mechanism.limit(x.tolist(), self.applied(idle), self.p)
 
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
-        """The error of an input that is not finite, by the number of its channel."""
+        """Return the error for an input that is not finite, by the number of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
 
     def compiled(self, progress: bool, balanced: bool = False) -> Trajectory:
-        """Solve it with the compiled solver; ``balanced`` brings each step back to the balance of energy.
+        """Solve the run with the compiled solver; ``balanced`` restores the energy balance after each step.
 
         Raises
         ------
@@ -191,7 +191,7 @@ class Run:
         return trajectory
 
     def _balance(self) -> tuple[int, int]:
-        """Numbers of the outputs that are the residual of the energy balance and the kinetic energy."""
+        """Return the indices of the outputs for the energy balance residual and the kinetic energy."""
         names, inputs = self.mechanism.output_names, self.inputs or Inputs()
         commanded = [self.encoded.value_name(channel) for channel in self.encoded.commands[:, 0].tolist()]
         moved = [name for name in commanded if inputs.parts(name)]
@@ -207,7 +207,7 @@ class Run:
         return names.index(wanted[0]), names.index(wanted[1])
 
     def _watch(self, balance: tuple[int, ...]) -> tuple[Any, list[Any]]:
-        """Events and balance as the compiled code reads them, and what has to stay alive meanwhile."""
+        """Return events and energy balance for the compiled code, and the objects to keep alive."""
         from .records import Watch
 
         n = len(self.events)
@@ -224,7 +224,7 @@ class Run:
 
 
 def problem_of(encoded: Encoded, settings: Settings, switched: bool) -> Any:
-    """What runs with the same kind of inputs have in common, as the compiled code reads it."""
+    """Return the data that runs with the same kind of inputs share, for the compiled code."""
     from .records import Problem
 
     return Problem(
@@ -246,7 +246,7 @@ def verdict(
     x: NDArray[np.float64],
     limit: Callable[[NDArray[np.float64]], str] | None = None,
 ) -> tuple[int, str]:
-    """solver.status and solver.message of a run that ended with a status of the compiled code.
+    """Return the solver.status and solver.message for a status of the compiled code.
 
     ``limit`` says what a limit is; without it, it is that of assembly.
     """
@@ -270,7 +270,7 @@ def outputs_of(
     states: NDArray[np.float64],
     inputs: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """All real outputs of a mechanism, shape (n, outputs), at rows of states and inputs.
+    """Compute all real outputs of a mechanism, shape (n, outputs), from rows of states and inputs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A run in progress as compiled code sees it: what it is given, its state, its room to work in, and what it records."""
+"""Records of a run in progress for compiled code: problem, state, work arrays, samples and events."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EVENT = 10
 
 
 class Problem(NamedTuple):
-    """What runs of a batch have in common.
+    """Data shared by the runs of a batch.
 
     ``equations`` are addresses, by `equations.DERIVATIVE` and its kin; ``commands``, shape (c, 3), for each commanded rate in
     force the numbers of its channel, of the state that it is, and of the channel of its own rate; ``outputs`` their number;
@@ -56,7 +56,7 @@ OUTPUT, LEVEL, DIRECTION, STOPS = range(4)
 
 
 def watch_nothing(size: int) -> Watch:
-    """No events, for states of a size."""
+    """Return an empty table of events for states of a given size."""
     none = np.empty(0, dtype=np.int64)
     return Watch(np.empty((0, 4)), none, np.empty(0), np.empty((0, 2 + size)), none)
 
@@ -95,7 +95,7 @@ CARRY = np.dtype(
 
 
 class State(NamedTuple):
-    """Where runs are, a row each: `CARRY`, state, inputs in force."""
+    """The progress of runs, a row each: `CARRY`, state, inputs in force."""
 
     carries: NDArray[np.void]
     x: NDArray[np.float64]
@@ -103,7 +103,7 @@ class State(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room to work in: stages, state at a step's end and one inside it, coefficients of the interpolant, inputs inside a step
+    """Work arrays: stages, state at a step's end and one inside it, coefficients of the interpolant, inputs inside a step
     or at an interval's end, outputs."""
 
     k: NDArray[np.float64]
@@ -150,14 +150,14 @@ def equation(which, t, x, u, out, motion):
 
 @inner
 def clearance_at(x, u, motion):
-    """How far a state is from the limit of assembly; NaN beyond it."""
+    """Compute the clearance of a state from the limit of assembly; NaN beyond it."""
     equation(CLEARANCE, 0.0, x, u, motion.room.outputs, motion)
     return motion.room.outputs[0]
 
 
 @inner
 def time_at(s, h, motion):
-    """Time at the fraction s of a step."""
+    """Return the time at the fraction s of a step."""
     return motion.carry.begin + (motion.carry.elapsed + s * h)
 
 
@@ -179,7 +179,7 @@ def look_inside(s, h, motion):
 
 @inner
 def released(y, motion):
-    """Whether a torsion bar is released in a step that ends at y."""
+    """Return whether a torsion bar is released in a step that ends at y."""
     if motion.problem.hold == 0.0:
         for n in range(motion.source.laws.shape[0]):
             if unwound(n, y, motion.source):

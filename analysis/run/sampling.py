@@ -1,4 +1,4 @@
-"""Inputs at a time, sampled in Python: what co-simulation, methods of SciPy and messages read."""
+"""Sample inputs in Python for co-simulation, SciPy's methods and messages."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def sample(
     left: bool = False,
     ahead: float = -np.inf,
 ) -> NDArray[np.float64]:
-    """The channels at time t and state x, sampled in Python; the user's functions are called as the Python they are.
+    """Sample the channels at time t and state x in Python, calling the user's functions uncompiled.
 
     Parameters
     ----------
@@ -73,17 +73,17 @@ def sample(
 
 
 def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
-    """The channels by their names in the FMI contract."""
+    """Return the channels by their names in the FMI contract."""
     return dict(zip(encoded.mechanism.input_names, u.tolist()))
 
 
 def release(encoded: Encoded, x: NDArray[np.float64], laws: NDArray[np.float64]) -> None:
-    """Release the torsion bars, in ``laws``, that at state x have turned as far as they were wound."""
+    """Mark in ``laws`` the torsion bars that have unwound at state x as released."""
     laws[x[encoded.source.law_places[:, 1]] >= laws[:, 1], 2] = 0.0
 
 
 def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the user's functions add to the channels."""
+    """Return the contributions of the user's functions to the channels."""
     added = np.zeros(len(encoded.mechanism.channels))
     state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
     for functions, places in zip(encoded.functions, encoded.source.places):

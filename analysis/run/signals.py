@@ -1,4 +1,4 @@
-"""Signals: what an input of a run can be as a function of time, and torques that depend on the crank."""
+"""Signals: inputs of a run as functions of time, and torques that depend on the crank's motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ StateFunction = Callable[..., float]
 
 
 def _in_si(values: Any, what: str) -> tuple[Any, str]:
-    """Values of a signal in SI and, where there are texts among them, the unit of the inputs that they fit."""
+    """Return the values of a signal in SI, and the unit of the inputs that they fit if they were texts."""
     if not any(isinstance(value, str) for value in (values if isinstance(values, (list, tuple)) else (values,))):
         return values, ""
     known = variable_units()
@@ -149,19 +149,19 @@ class InductionMotor:
             raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
 
 
-#: What an induction motor has, in the order of `kloss`.
+#: Fields of an induction motor, in the order of `kloss`.
 MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
 
 
 def kloss(motor: Any, speed: Any) -> Any:
-    """Torque of an `InductionMotor`, its `MOTOR`, at a crank speed, so that it holds at synchronous speed; also of symbols."""
+    """Compute the torque of an `InductionMotor` at a crank speed, also with symbols; it is zero at synchronous speed."""
     slip = 1.0 - speed / motor[2]
     return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
 
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """Any channel as a Python function of time, of all coordinates of the mechanism and of all their rates, all floats.
+    """A channel given by a Python function of time, all coordinates of the mechanism and all their rates, all floats.
 
     Of a five-bar they are t, crank angle, slider position u, and their rates; of a slider-crank the second coordinate is the
     axial shift S1. It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must
@@ -188,7 +188,7 @@ Torque = Signal | TorsionBar | InductionMotor
 
 @in_si(from_time="s", to_time="s")
 def ramp(start: Amount, end: Amount, from_time: Amount, to_time: Amount) -> Piecewise:
-    """A signal that goes along a straight line between two times (s), such as ``ramp(0.0, "420 rpm", 0.0, "1 s")``."""
+    """Return a signal that changes linearly between two times (s), such as ``ramp(0.0, "420 rpm", 0.0, "1 s")``."""
     if not to_time > from_time:
         raise InputError(f"a ramp from {from_time} s to {to_time} s: it must end after it begins")
     return table([from_time - 1.0, from_time, to_time, to_time + 1.0], [start, start, end, end])
@@ -196,7 +196,7 @@ def ramp(start: Amount, end: Amount, from_time: Amount, to_time: Amount) -> Piec
 
 @in_si(times="s")
 def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
-    """A signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
+    """Return a signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
     t, y, unit = _points(times, values, least=1)
     breaks = np.append(t, t[-1] + 1.0)
     coefficients = np.zeros((len(t), 4))
@@ -206,7 +206,7 @@ def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
 
 @in_si(times="s")
 def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
-    """A signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
+    """Return a signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
 
     Outside the table the first and the last value hold.
     """
@@ -243,7 +243,7 @@ def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np
 
 
 class Source(NamedTuple):
-    """All of `Inputs` as the arrays that the compiled code reads; a signal is a channel that is not the rate of another.
+    """The `Inputs` as arrays for the compiled code; a signal is a channel that is not the rate of another.
 
     Attributes
     ----------

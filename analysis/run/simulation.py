@@ -24,16 +24,16 @@ from .trajectory import Trajectory
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolver
 
-#: Steps of a run at most, by default.
+#: Default of the largest number of steps of a run.
 MOST_STEPS = 100_000_000
-#: Samples of a run at most, by default: more are a slip of the unit, and would not fit into memory.
+#: Default of the largest number of samples of a run: more are probably a mistaken unit and would not fit into memory.
 _SAMPLES = 20_000_000
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
 @in_si(stop_time="s", step="s", start_time="s")
 def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> NDArray[np.float64]:
-    """Times start, start + step, ... up to and including the stop time, each computed as start + k step.
+    """Return the times start, start + step, ... up to and including the stop time, each computed as start + k step.
 
     The last step is shorter where the run is not a whole number of steps long.
 
@@ -67,7 +67,7 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
 
 
 class RunOptions(TypedDict, total=False):
-    """What is seldom asked for of runs."""
+    """Less common options of runs."""
 
     start_time: Amount
     max_steps: int
@@ -75,7 +75,7 @@ class RunOptions(TypedDict, total=False):
 
 
 class SolverOptions(RunOptions, total=False):
-    """The same, with what SciPy's methods take besides."""
+    """Options of runs, and further options of SciPy's methods."""
 
     first_step: float | None
     max_step: float
@@ -185,7 +185,7 @@ def simulate(
 
 
 def settings_of(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: int) -> Settings:
-    """Settings of a run, checked.
+    """Check the settings of a run and return them.
 
     Raises
     ------

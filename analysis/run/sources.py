@@ -1,4 +1,4 @@
-"""The inputs of a run inside compiled code: what each channel is worth at a time and a state, and held over a step."""
+"""Evaluate the inputs of a run in compiled code: each channel at a time and a state, or held over a step."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, MATRIX, PLACES, PLACES)
 
 @inner
 def find(t, breaks):
-    """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
+    """Return the number of the polynomial piece in force from t on; the outer ones extend beyond the ends."""
     piece, above = 0, breaks.shape[0] - 1
     while above - piece > 1:
         middle = (piece + above) // 2
@@ -32,7 +32,7 @@ def find(t, breaks):
 
 @inner
 def _find_before(t, breaks):
-    """Piece of the polynomials in force up to t."""
+    """Return the number of the polynomial piece in force up to t."""
     piece = find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
@@ -77,7 +77,7 @@ def channels_at(begin, elapsed, piece, x, source, u):
 
 @inner
 def wound(laws):
-    """Whether a torsion bar acts."""
+    """Return whether a torsion bar acts."""
     for n in range(laws.shape[0]):  # noqa: SIM110 - Numba compiles no generators  # noqa: SIM110 - Numba compiles no generators
         if laws[n, 2] != 0.0:
             return True
@@ -86,13 +86,13 @@ def wound(laws):
 
 @inner
 def unwound(n, x, source):
-    """Whether a torsion bar acts and has turned, at state x, as far as it was wound."""
+    """Return whether a torsion bar acts and has fully unwound at state x."""
     return source.laws[n, 2] != 0.0 and x[source.law_places[n, 1]] >= source.laws[n, 1]
 
 
 @inner
 def _held_bar(law, angle, speed, step):
-    """What to add to the torsion bar's torque at an angle where it is held over a step, at a speed.
+    """Return the correction to the torque of a torsion bar that is held over a step at an angle and a speed.
 
     The torque at the angle predicted for the middle of the step makes the impulse right to second order; that at the
     beginning would act half a step late. The bar does not pull back.
@@ -114,7 +114,7 @@ def channels(t, ahead, left, x, source, commands, u, there):
 
 @inner
 def hold(t, ahead, x, source, commands, u, there):
-    """Turn the channels at time t into those of a master that holds them until ``ahead``.
+    """Replace the channels at time t by the values that a master holds until ``ahead``.
 
     A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets
     the command again at the next point of the grid.

@@ -28,7 +28,7 @@ EXPONENT = -1.0 / tableau.ORDER
 
 @inner
 def stage(s, x, k, h, y):
-    """State at stage s of a step of size h from x; stage 12 is its end."""
+    """Compute the state at stage s of a step of size h from x; stage 12 is the end of the step."""
     n = x.shape[0]
     for i in range(n):
         y[i] = 0.0
@@ -42,7 +42,7 @@ def stage(s, x, k, h, y):
 
 
 class Flow(NamedTuple):
-    """What moves a state: address of the right-hand side, modes, constants, magnitudes to which errors are relative."""
+    """A flow: address of the right-hand side, modes, constants, magnitudes to which errors are relative."""
 
     equation: int
     modes: NDArray[np.float64]
@@ -52,8 +52,9 @@ class Flow(NamedTuple):
 
 @inner
 def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
-    """A step of size h from x at ``begin + elapsed``, into room.y, its rates at the start room.k[0]; its error relative to
-    ``flow.scale``.
+    """Take a step of size h from x at ``begin + elapsed`` into room.y; return its error relative to ``flow.scale``.
+
+    The rates at the start of the step are room.k[0].
 
     ``u`` is what acts; where ``piece`` is not negative it is sampled from ``source`` at each stage.
     """
@@ -71,7 +72,7 @@ def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
 
 @inner
 def _local_error(x, y, k, h, scale):
-    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h; NaN if y is not finite."""
+    """Estimate the relative error of a step from x to y, of order 8 in h (Hairer); NaN if y is not finite."""
     sum3 = sum5 = 0.0
     for i in range(x.shape[0]):
         e3 = e5 = 0.0
@@ -89,20 +90,20 @@ def _local_error(x, y, k, h, scale):
 
 @inner
 def shorter(h, error):
-    """The step to try after one of size h was refused for its error, relative to the tolerance."""
+    """Return the step size to try after a step of size h was rejected for its error, relative to the tolerance."""
     return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
 
 
 @inner
 def following(h, proposed, error):
-    """The step to try after one of size h, where ``proposed`` was, went well; one cut short does not shorten it."""
+    """Return the next step size after an accepted step h; a step cut shorter than ``proposed`` does not reduce it."""
     factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error**EXPONENT)
     return max(proposed, factor * h) if h < proposed else max(LEAST_FACTOR, factor) * h
 
 
 @inner
 def interpolant(x, y, k, h, f):
-    """Coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
+    """Compute the coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
     for i in range(x.shape[0]):
         delta = y[i] - x[i]
         f[0, i] = delta
@@ -117,7 +118,7 @@ def interpolant(x, y, k, h, f):
 
 @inner
 def interpolate(s, x, f, out):
-    """State at the fraction s of the step."""
+    """Interpolate the state at the fraction s of the step."""
     for i in range(x.shape[0]):
         y = 0.0
         for r in range(7):

@@ -97,12 +97,12 @@ class Trajectory(Shown):
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Unit of each output."""
+        """Return the unit of each output."""
         known = output_units()
         return MappingProxyType({name: known[name] for name in self.names})
 
     def column(self, name: str) -> int:
-        """Number of the column of an output.
+        """Return the column number of an output.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class Trajectory(Shown):
         return write_csv(path, columns)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The run as a DataFrame indexed by time; needs pandas, of Linkwork's extra ``dataframe``."""
+        """Return the run as a DataFrame indexed by time; needs pandas, of Linkwork's extra ``dataframe``."""
         require("pandas")
         import pandas
 

@@ -8,7 +8,7 @@ class LinkworkError(Exception):
 
 
 def _shown(value: object) -> str:
-    """A value as an error names it: of bounded length, whatever it is."""
+    """Return the text of a value for an error message, cut to a bounded length."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # a whole number of thousands of digits; lists inside each other without end
@@ -41,7 +41,7 @@ class InputError(LinkworkError, ValueError):
 
 
 class UnknownNameError(ParameterError, InputError):
-    """A name that nothing has; ``known`` are the names there are, ``near`` the one that was probably meant."""
+    """An unknown name; ``known`` are the valid names, ``near`` the one that was probably meant."""
 
     def __init__(self, name: str, known: tuple[str, ...], near: str | None) -> None:
         self.known = known

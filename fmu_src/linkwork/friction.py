@@ -1,4 +1,4 @@
-"""Friction, smooth about rest: of a guide, viscous and of a given level; of contacts, proportional to their forces."""
+"""Friction, smoothed at rest: viscous and Coulomb friction of a guide, and friction proportional to contact forces."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ Vector = tuple[float, float]
 
 
 def lesser(a: float, b: float) -> float:
-    """The lesser of two numbers."""
+    """Return the lesser of two numbers."""
     return 0.5 * (a + b - fabs(a - b))
 
 
 def resistance(v: float, mu: float, fc: float) -> float:
-    """Force against a motion at speed v (N): damper mu v and Coulomb friction of the level fc; odd in v."""
+    """Return the force against a motion at speed v (N): damper mu v and Coulomb friction of level fc; odd in v."""
     return mu * v + fc * tanh(v / FRICTION_SPEED)
 
 
 def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...]) -> tuple[float, ...]:
-    """Magnitudes s of the forces in contacts (N) whose friction grows with them: s_j = sqrt(|F_j|^2 + F0^2).
+    """Solve for the magnitudes s of contact forces (N) with friction proportional to them: s_j = sqrt(|F_j|^2 + F0^2).
 
     ``smooth`` are the forces without friction; ``response[k]`` is by how much all of them change with the magnitude of the
     k-th, so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method from the forces without friction.
@@ -40,7 +40,7 @@ def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...
 
 
 def settled(s: tuple[float, ...]) -> tuple[float, ...]:
-    """The same: a solution to rounding.
+    """Return ``s`` unchanged, a solution to within rounding; derivatives are taken from here on.
 
     A sweep of Newton's method from there has the derivatives of the solution whatever those of ``s``, so that what
     differentiates these equations need not differentiate the sweeps before.
@@ -51,7 +51,7 @@ def settled(s: tuple[float, ...]) -> tuple[float, ...]:
 def _swept(
     smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...]
 ) -> tuple[float, ...]:
-    """A sweep of Newton's method for the magnitudes."""
+    """Take one step of Newton's method for the magnitudes."""
     n = range(len(smooth))
     least = FRICTION_FORCE * FRICTION_FORCE
     forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
@@ -69,7 +69,7 @@ def _swept(
 
 
 def _solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
-    """Solution of linear equations by elimination without a search for pivots: the diagonal must prevail."""
+    """Solve linear equations by elimination without pivoting, for diagonally dominant matrices."""
     if not right:
         return ()
     first, *rows = matrix

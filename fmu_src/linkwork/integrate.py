@@ -38,7 +38,7 @@ class Result(NamedTuple):
 
 
 def rk_step(f: Callable[[Vector], Vector], x: Vector, k1: Vector, h: float, scale: Vector) -> tuple[Vector, float]:
-    """One step of size ``h`` from ``x`` with ``k1 = f(x)``: the new state and the error relative to ``scale``."""
+    """Take a step of size ``h`` from ``x`` with ``k1 = f(x)``; return the new state and its error relative to ``scale``."""
     (a1,) = _A[1]
     k2 = f(tuple([y + h * (a1 * p1) for y, p1 in zip(x, k1)]))
     a1, a2 = _A[2]
@@ -209,6 +209,6 @@ def integrate(
 
 
 def _first_step(x: Vector, k1: Vector, scale: Vector, duration: float, tolerance: float) -> float:
-    """A cautious first step: one hundredth of the time in which the state would change by its own size."""
+    """Return a cautious first step: one hundredth of the time in which the state would change by its own size."""
     ratio = max(abs(k) / (s + abs(y)) for k, s, y in zip(k1, scale, x))
     return duration if ratio == 0.0 else min(duration, tolerance ** (1.0 / tableau.ORDER) / ratio)

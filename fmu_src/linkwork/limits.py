@@ -1,4 +1,4 @@
-"""Where the motion of a linkage is no longer followed."""
+"""Limits at which the simulation of a linkage ends."""
 
 from __future__ import annotations
 

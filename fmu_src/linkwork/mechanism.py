@@ -1,4 +1,4 @@
-"""What a mechanism is to everything that uses it: one object, `Mechanism`, that each mechanism's folder exports."""
+"""The class `Mechanism`, of which each mechanism's folder exports one object, and the records that it consists of."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class Joint(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Something that is drawn through points.
+    """A part of the drawing, drawn through joints.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ PARTS = {"pivot": 1, "link": 2, "guide": 2, "slider": 3, "spring": 3, "damper": 
 
 
 class Drawing(NamedTuple):
-    """How a mechanism is drawn.
+    """The drawing of a mechanism.
 
     Attributes
     ----------

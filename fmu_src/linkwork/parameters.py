@@ -1,4 +1,4 @@
-"""What the parameters of every mechanism share: their checks, and their names in the FMI contract.
+"""Common parts of the parameters of all mechanisms: their checks, and their names in the FMI contract.
 
 A field ``coupler_point_distance`` is the FMI parameter ``coupler.point_distance``: the first underscore is the dot.
 """
@@ -19,17 +19,17 @@ NOT_NEGATIVE = "be a finite number, zero or greater"
 
 
 def fmi_name(field_name: str) -> str:
-    """Name in the FMI contract of a field of a mechanism's parameters: the first underscore becomes the dot."""
+    """Return the FMI name of a field of a mechanism's parameters: the first underscore becomes the dot."""
     return field_name.replace("_", ".", 1)
 
 
 def field_name(name: str) -> str:
-    """Field of a mechanism's parameters that carries the FMI parameter ``name``."""
+    """Return the field of a mechanism's parameters that holds the FMI parameter ``name``."""
     return name.replace(".", "_", 1)
 
 
 class Least(NamedTuple):
-    """A least value of one parameter that depends on others.
+    """A lower bound of one parameter that depends on others.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Least(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What the fields of a dataclass of parameters must be, beside finite; its attribute ``RULES``.
+    """Rules for the fields of a dataclass of parameters, which must also be finite; its attribute ``RULES``.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Rules(NamedTuple):
 
 
 def check_parameters(parameters: Any) -> None:
-    """Check a frozen dataclass of parameters by its ``RULES``, and make plain numbers of its fields.
+    """Check a frozen dataclass of parameters against its ``RULES`` and convert its fields to plain numbers.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def check_parameters(parameters: Any) -> None:
 
 
 def check_initial(initial: Any) -> None:
-    """Check that the fields of a state at the start are finite, and make floats of them.
+    """Check that the fields of an initial state are finite and convert them to floats.
 
     Raises
     ------

@@ -34,7 +34,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def mode_requirement(mode: Mode) -> str:
-    """What the value of a mode must be, as the end of the sentence "it must ..."."""
+    """Return the requirement on the value of a mode, as the end of the sentence "it must ..."."""
     words = [f"{number} ({word})" for number, word in enumerate(mode.values)]
     return f"be {', '.join(words[:-1])} or {words[-1]}"
 
@@ -126,13 +126,13 @@ class Plant:
         )
 
     def _derive(self) -> None:
-        """What follows from parameters and modes once and for all."""
+        """Compute the constants that follow from parameters and modes."""
         self._p: Any = self.parameters.constants()
         self._modes = tuple(float(self.modes[mode.name]) for mode in self.mechanism.modes)
         self._commands = self.mechanism.commands(self.modes)
 
     def _rate_names(self) -> set[str]:
-        """Inputs that are commanded rates, whatever the modes."""
+        """Return the inputs that are commanded rates, in any mode."""
         return {channel.name for channel in self.mechanism.channels if channel.kind == "command"}
 
     def _start(self, initial: Any) -> Vector:
@@ -142,11 +142,11 @@ class Plant:
         return self._settled(tuple(x))
 
     def _rate_of(self, number: int) -> int:
-        """Place in the state of the rate that a channel commands."""
+        """Return the index in the state of the rate that a channel commands."""
         return len(self.mechanism.freedoms) + self.mechanism.channels[number].freedom
 
     def _applied(self) -> Any:
-        """The inputs in force as the equations read them."""
+        """Return the inputs in force in the form that the equations take."""
         return self.mechanism.equations.applied(self._modes, tuple(self.inputs.values()), self._p)
 
     def _settled(self, x: Vector) -> Vector:
@@ -170,14 +170,14 @@ class Plant:
         return jumped
 
     def _near_limit(self, x: Vector) -> bool:
-        """Whether a failure at ``x`` is one of assembly."""
+        """Return whether a failure at ``x`` is due to the limit of assembly."""
         try:
             return abs(self.mechanism.equations.clearance(x, self._applied(), self._p)) < NEAR_LIMIT
         except UNDEFINED:
             return True
 
     def _started_from(self, x: Vector) -> str:
-        """The state at the start in words, by the names of what it was given by."""
+        """Describe the initial state by the names of the parameters that set it."""
         units = {v.name: v.unit for v in self.mechanism.variables}
         source = {self._rate_of(number): self.mechanism.channels[number].name for number in self._commands}
         fields = [freedom.initial[part] for part in (0, 1) for freedom in self.mechanism.freedoms]
@@ -221,7 +221,7 @@ class Plant:
     # Steps
 
     def step(self, time: float, step: float) -> None:
-        """Go forward from ``time`` by ``step`` seconds under the inputs in force.
+        """Advance from ``time`` by ``step`` seconds under the inputs in force.
 
         A step that fails leaves everything as it was.
 
@@ -279,7 +279,7 @@ class Plant:
         self._commanded = set()
 
     def _explain(self, error: LinkworkError, time: float, last: Vector) -> LinkworkError:
-        """The error with the time of the step and, where the cause is the limit of assembly, with that said."""
+        """Add the time of the step to an error and, where it is the cause, the limit of assembly."""
         if isinstance(error, IntegrationError):
             if self._near_limit(last):
                 limit = self.mechanism.limit(last, self._applied(), self._p)
@@ -290,7 +290,7 @@ class Plant:
     # Saved state
 
     def save(self) -> dict[str, Any]:
-        """Everything a run needs to go on exactly as it would have, as plain data that JSON carries without loss."""
+        """Return the complete state of a run as plain data for JSON, from which the run resumes exactly."""
         return {
             "parameters": asdict(self.parameters),
             "modes": dict(self.modes),
@@ -306,7 +306,7 @@ class Plant:
 
     @classmethod
     def restore(cls, mechanism: Mechanism, saved: dict[str, Any]) -> Plant:
-        """The plant that `save` described.
+        """Restore the plant from the data of `save`.
 
         Raises
         ------

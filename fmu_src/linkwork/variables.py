@@ -1,4 +1,4 @@
-"""What a variable of an FMI interface is, and the units that interfaces use."""
+"""The record of a variable of an FMI interface, constructors of common variables, and the units of interfaces."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Variable(NamedTuple):
 
     @property
     def wraps(self) -> bool:
-        """Whether it is an angle between -pi and pi, which jumps by a turn."""
+        """Return whether the variable is an angle between -pi and pi, which jumps by a turn."""
         return self.minimum == -pi and self.maximum == pi
 
 

@@ -1,4 +1,4 @@
-"""What drives a mechanism over a periodic motion, magnitudes of its state, and starts of the search for motions."""
+"""The drive of a mechanism in periodic motion, scales of its state, and starts of the search for motions."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
 @in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units, speeds=variable_units)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """What drives a mechanism over a periodic motion: speeds of its cranks or torques on them; all else is constant.
+    """The drive of a mechanism in periodic motion: speeds of its cranks or torques on them; all else is constant.
 
     Of a mechanism with one crank, ``speed``, ``torque`` and ``motor`` are of this crank. Of one with several, ``speeds`` gives
     all that are commanded; they keep their ratios where the speed varies. Where none is commanded, ``crank`` names the one
@@ -134,7 +134,7 @@ class Drive:
 
     @property
     def speed_drive(self) -> bool:
-        """Whether the speed is prescribed."""
+        """Return whether the speed is prescribed."""
         return self.speed is not None
 
     def reference(self, mechanism: Mechanism) -> Crank:
@@ -152,7 +152,7 @@ class Drive:
         return {crank_of(mechanism, name).freedom: ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
-        """Return what drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`.
+        """Return the way in which each freedom with a mode is driven: the mode's name, and one of its `Mode.arguments`.
 
         Raises
         ------
@@ -277,7 +277,7 @@ def _arguments(
     turning: tuple[int, ...],
     modes: tuple[tuple[str, int], ...],
 ) -> Mapping[str, str]:
-    """Return `Drive.arguments`, which is asked for again and again along a branch."""
+    """Compute `Drive.arguments`, cached because continuation needs it at every point of a branch."""
     found, own = {}, dict(modes)
     others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank}
     for name, value in modes:
@@ -311,7 +311,7 @@ def _forces(mechanism: Mechanism) -> str:
 
 
 def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
-    """Make sure that a channel acts under a drive; raises InputError if the freedom is driven otherwise."""
+    """Raise InputError if a channel has no effect under a drive, because its freedom is driven otherwise."""
     mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
     chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
     if mode is not None and chosen != channel.argument:
@@ -323,7 +323,7 @@ def _value(mode: Mode, argument: str) -> str:
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return the drive that is given, or else that of a published set, with what is held as it is at the start."""
+    """Return the given drive, or else that of a published set, with held freedoms at their initial values."""
     return drive or drive_of(known.parameters, driven(known, None), known.initial)
 
 
@@ -337,7 +337,7 @@ def drive_of(
     speed: Amount = None,
     torque: Amount = None,
 ) -> Drive:
-    """The drive of an orbit under the inputs of a run, which must not vary in time.
+    """Return the drive of an orbit from the inputs of a run, which must not vary in time.
 
     Parameters
     ----------
@@ -442,7 +442,7 @@ _SPEEDS = (0.25, 1.5)
 
 @takes_published()
 def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
-    """Magnitudes of y: of a five-bar the crank's length, its speed at the pin, and the crank speed."""
+    """Return the scales of y: for a five-bar the crank length, the speed of the crank pin, and the crank speed."""
     mechanism = mechanism_of(parameters)
     return scale_in(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
 
@@ -450,7 +450,7 @@ def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[
 def scale_in(
     flow: Flow, parameters: Parameters, vector: NDArray[np.float64], start: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The same, where the flow and the numbers of the drive are at hand."""
+    """Return the scales of y from a flow and the numbers of the drive."""
     scale = flow.mechanism.error_scale(parameters, flow.state(start, vector))
     return np.array([scale[place] for place in flow.places])
 
@@ -468,7 +468,7 @@ def is_smooth(parameters: Parameters) -> bool:
 def coordinate_ranges(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return how far below and above zero each free coordinate can go at the crank angle 0, two arrays of shape (free,)."""
+    """Return the lower and upper bound of each free coordinate at the crank angle 0, two arrays of shape (free,)."""
     mechanism = mechanism_of(parameters)
     flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), scale_of(parameters, drive, guess)
     sides = []
@@ -490,7 +490,7 @@ def coordinate_ranges(
 def starts_of(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
-    """Return starts of all amplitudes and phases within the ranges of the coordinates, by a scrambled Sobol sequence.
+    """Return initial states of many amplitudes and phases within the coordinate ranges, from a scrambled Sobol sequence.
 
     In the plane of a coordinate and its rate they fill the greatest ellipse about zero. Where a coordinate can go much further
     to one side, as many again fill the ellipse about the middle of the whole range; shape (count or 2 count, n).

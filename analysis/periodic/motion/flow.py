@@ -37,7 +37,7 @@ def cranks_of(mechanism: Mechanism) -> tuple[Crank, ...]:
 
 @cache
 def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
-    """Return the crank of a mechanism, of several the one of a name.
+    """Return the crank of a mechanism, by name if there are several.
 
     Parameters
     ----------
@@ -151,11 +151,11 @@ class Flow:
 
     @property
     def period(self) -> float:
-        """Angle of the crank (rad) over the common period of all cranks: of one crank, that of a turn."""
+        """Return the crank angle (rad) of the common period of all cranks: one turn if there is one crank."""
         return self.mechanism.freedoms[self.crank].period * self.base
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
-        """Addresses of the machine code, of the functions of those numbers at least, with the mechanism's switch on or off."""
+        """Return the addresses of the compiled functions ``which``, with the mechanism's switch on or off."""
         with MAKING:
             for n in which:
                 if (switched, n) not in self._code:
@@ -166,7 +166,7 @@ class Flow:
         return addresses
 
     def fingerprint(self, *which: int, switched: bool = False) -> str:
-        """Of the machine code of the functions of those numbers."""
+        """Return a hash of the machine code of the functions ``which``."""
         self.addresses(*which, switched=switched)
         return " ".join(self._code[switched, n].fingerprint for n in which)
 
@@ -197,7 +197,7 @@ class Flow:
 
     @cache  # noqa: B019 - flows are kept for good themselves
     def function(self, which: int, switched: bool = False) -> Any:
-        """A function as a ``casadi.Function`` of angle, z, modes, drive with its direction, constants with theirs.
+        """Return a ``casadi.Function`` of angle, z, modes, drive with its direction, and constants with theirs.
 
         ``plain``: dy/dangle. ``variational``: with the columns of dy/dy0. ``directional``: with that of dy/dlambda after
         them. ``gap``: how far the links are from the limit of assembly. ``state``: the state of a run and the channels.
@@ -243,7 +243,7 @@ class Flow:
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
     def jacobian_trace(self, switched: bool = False) -> Any:
-        """Trace of the rates' Jacobian as a ``casadi.Function`` of angle, y, modes, drive and constants."""
+        """Return the trace of the rates' Jacobian as a ``casadi.Function`` of angle, y, modes, drive and constants."""
         casadi = symbolic.library()
         plain = self.function(PLAIN, switched)
         shapes = [plain.size1_in(i) for i in range(plain.n_in())]
@@ -286,7 +286,7 @@ class Flow:
 
 
 def label(variable: Variable) -> str:
-    """What messages and tables call a variable: its symbol if that is a short one, else its name with spaces."""
+    """Return the label of a variable in messages and tables: its symbol if short, else its name with spaces."""
     symbol = variable.symbol
     return symbol if symbol and "\\" not in symbol else variable.name.replace(".", " ")
 

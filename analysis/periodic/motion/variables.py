@@ -1,4 +1,4 @@
-"""What can vary of a mechanism and its drive, by FMI name: one parameter, two of a chart, and exact derivatives by all."""
+"""Parameters of a mechanism and its drive that can vary, by FMI name, and the derivatives of the equations by them."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ Plane = Callable[[float, float], Operation]
 
 
 @cache
-def _of_cranks(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
-    """Return the FMI names of the speeds of the cranks and of the torques on them: which it is, and of which freedom."""
+def _crank_inputs(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
+    """Return the kind (speed or torque) and the freedom of each crank speed and crank torque, by FMI name."""
     found = {}
     for crank in cranks_of(mechanism):
         for what, n in (("torque", crank.torque), ("speed", crank.command)):
@@ -41,20 +41,20 @@ def _of_cranks(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
 
 @cache
 def of_the_motor(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Return the names of the numbers of motors on cranks, in the order of `Drive.vector`: field and unit of each."""
+    """Return the field and unit of each parameter of the motors on cranks by name, in the order of `Drive.vector`."""
     units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
     torques = [mechanism.channels[n].name for n in mechanism.torques]
     return {f"{name}.{field}": (field, unit) for name in torques for field, unit in units.items()}
 
 
 def driving_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the names of what can vary of a drive: speeds of cranks and torques on them, numbers of motors, and forces."""
-    return tuple(dict.fromkeys((*_of_cranks(mechanism), *of_the_motor(mechanism), *forces_of(mechanism))))
+    """Return the names of the parameters of a drive: speeds of cranks, torques on them, parameters of motors, and forces."""
+    return tuple(dict.fromkeys((*_crank_inputs(mechanism), *of_the_motor(mechanism), *forces_of(mechanism))))
 
 
 def speed_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the FMI names of the speeds of cranks that can be prescribed."""
-    return tuple(name for name, (what, _) in _of_cranks(mechanism).items() if what == "speed")
+    return tuple(name for name, (what, _) in _crank_inputs(mechanism).items() if what == "speed")
 
 
 def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
@@ -82,7 +82,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """
     mechanism = mechanism_of(parameters)
     unit_of(mechanism, name)
-    what, freedom = _of_cranks(mechanism).get(name, ("", -1))
+    what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed" or freedom == drive.reference(mechanism).freedom:
         if (what == "speed") != drive.speed_drive:
             raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
@@ -103,20 +103,20 @@ def _ratio_of(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
 
 
 def _motor_of(mechanism: Mechanism, drive: Drive, name: str) -> InductionMotor | None:
-    """Return the motor that a number of a motor, by its name, belongs to."""
+    """Return the motor to which a motor parameter, given by name, belongs."""
     torque = name.rpartition(".")[0]
     own = drive.reference(mechanism).torque
     return drive.motor if own is not None and mechanism.channels[own].name == torque else drive.motors.get(torque)
 
 
 def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of what can vary of a mechanism and its drive: see `driving_names`; and parameters."""
+    """Return the names of all parameters of a mechanism and its drive: see `driving_names`."""
     of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
     return (*driving_names(mechanism), *of_mechanism)
 
 
 def unit_of(mechanism: Mechanism, name: str) -> str:
-    """Unit of what can vary of a mechanism and its drive, by its FMI name.
+    """Return the unit of a parameter of a mechanism or its drive, by its FMI name.
 
     Raises
     ------
@@ -133,9 +133,9 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
 
 @takes_published()
 def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
-    """The value there is of what can vary; NaN of a speed under a torque, or of a motor that there is not."""
+    """Return the value of a parameter; NaN for a speed under a torque drive, or for a missing motor."""
     mechanism = mechanism_of(parameters)
-    what, freedom = _of_cranks(mechanism).get(name, ("", -1))
+    what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
     if what == "speed":
         return float("nan") if drive.speed is None else float(drive.speed) * _ratio_of(mechanism, drive, freedom)
     if what == "torque" and freedom == drive.reference(mechanism).freedom:
@@ -148,7 +148,7 @@ def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
 
 
 def format_value(name: str, value: float, unit: str) -> str:
-    """A value with its name and unit; speeds in rpm too."""
+    """Format a value with its name and unit, speeds also in rpm."""
     rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
 
@@ -161,9 +161,9 @@ def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
 
 @takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
-    """Mechanism and drive with other values of parameters by their FMI names."""
+    """Return the mechanism and drive with new values of parameters, by FMI name."""
     mechanism = mechanism_of(parameters)
-    of_cranks, of_motor, forces = _of_cranks(mechanism), of_the_motor(mechanism), forces_of(mechanism)
+    of_cranks, of_motor, forces = _crank_inputs(mechanism), of_the_motor(mechanism), forces_of(mechanism)
     own = drive.reference(mechanism).freedom
     of_drive: dict[str, Any] = {}
     acting: dict[str, float] = {}
@@ -200,7 +200,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
 
 @takes_published()
 def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
-    """The plane of two parameters; all else stays as it is.
+    """Return the plane of two parameters, with all others fixed.
 
     Parameters
     ----------
@@ -272,17 +272,17 @@ class Family:
         object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), self.vary))
 
     def at(self, value: float) -> Operation:
-        """Mechanism and drive at a value of the parameter."""
+        """Return the mechanism and drive at a value of the parameter."""
         if callable(self.vary):
             return self.vary(value)
         return with_values(self.parameters, self.drive, {self.vary: value})
 
     def format_value(self, value: float) -> str:
-        """A value of the parameter with its name and unit; speeds in rpm too."""
+        """Format a value of the parameter with its name and unit, speeds also in rpm."""
         return format_value(self.name, value, self.unit)
 
     def direction(self, value: float, low: float, high: float) -> Direction:
-        """By differences inside the parameter's range."""
+        """Compute the derivative of the operation by the parameter, by differences inside the parameter's range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = mechanism_of(self.parameters)
@@ -295,7 +295,7 @@ FloatArray = NDArray[np.float64]
 
 @takes_published()
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
-    """All parameters that motions have derivatives by: what acts of the drive, and those of the mechanism, by FMI name.
+    """Return the FMI names of all parameters by which motions are differentiated: of the drive and of the mechanism.
 
     A parameter that would switch on what is switched off, friction by contact forces, is left out: it can be named all the
     same.
@@ -321,7 +321,7 @@ class Along(NamedTuple):
 
 
 def along_parameters(parameters: Parameters, names: Sequence[str], along: str = "") -> Along:
-    """Derivatives of the constants by parameters of FMI names, zero by what is no parameter of the mechanism."""
+    """Compute the derivatives of the constants by parameters given by FMI name; zero for parameters of the drive."""
     mechanism = mechanism_of(parameters)
     own = [float(getattr(parameters, field.name)) for field in fields(parameters)]
     known = {fmi_name(field.name): number for number, field in enumerate(fields(parameters))}
@@ -338,13 +338,13 @@ def along_parameters(parameters: Parameters, names: Sequence[str], along: str = 
 
 
 def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
-    """Return derivatives of the numbers of the drive, and after them of the constants, ``p``; shape (c, m)."""
+    """Stack the derivatives of the numbers of the drive on those of the constants, ``p``; shape (c, m)."""
     mechanism = flow.mechanism
     found = np.zeros((flow.drive_size, p.shape[1]))
     # in the order of `Drive.vector`
     places = (*mechanism.input_names, *of_the_motor(mechanism))
     for column, name in enumerate(names):
-        what, freedom = _of_cranks(mechanism).get(name, ("", -1))
+        what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
         if what == "speed":
             own = _ratio_of(mechanism, drive, freedom)
             for number, channel in ({flow.crank: flow.command} | flow.commanded).items():
@@ -357,7 +357,7 @@ def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> Fl
 
 @cache
 def _constants(mechanism: Mechanism) -> Any:
-    """(parameters, direction) -> derivatives of the constants, and of these along the direction."""
+    """Return a function of parameters and a direction that gives the constants' derivatives, and theirs along it."""
     casadi = symbolic.library()
     traced = of_parameters(mechanism)
     k = casadi.vertcat(*traced.parameters.constants())

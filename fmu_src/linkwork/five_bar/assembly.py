@@ -1,4 +1,4 @@
-"""Where the five-bar slider can be assembled, and the size of its states."""
+"""Assembly limits of the five-bar slider, and error scales of its state."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
 
 
 def configuration(crank_angle: float, slider_position: float) -> str:
-    """A configuration in words."""
+    """Describe a configuration in words."""
     return f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and slider position {slider_position:.9g} m"
 
 
 def error_scale(parameters: FiveBarParameters, x: Sequence[float]) -> tuple[float, ...]:
-    """Magnitudes of the state's components below which the integrator's error counts as absolute, by the state at the start."""
+    """Return for each component of the state the magnitude below which its error counts as absolute, from the initial state."""
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
     return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

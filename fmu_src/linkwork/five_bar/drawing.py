@@ -1,4 +1,4 @@
-"""How the five-bar slider is drawn."""
+"""Drawing of the five-bar slider."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .parameters import Constants
 
 
 def positions(x: State, i: Inputs, p: Constants) -> tuple[float, ...]:
-    """Places of the joints, in the order of `DRAWING`, in the plane of the mechanism."""
+    """Compute the positions of the joints, in the order of `DRAWING`, in the plane of the mechanism."""
     u = x[1]
     g = position(x[0], u, p)
     px, py = coupler_point(g, p)

@@ -40,7 +40,7 @@ State = tuple[float, float, float, float, float, float]
 
 
 class Inputs(NamedTuple):
-    """What acts on the plant at one instant.
+    """Inputs of the plant at one instant.
 
     ``speed_drive`` is 1.0 where the crank acceleration is prescribed and 0.0 where the torque is. Torque in N.m,
     acceleration in rad/s2, slider force and load in N.
@@ -139,7 +139,7 @@ class Outputs(NamedTuple):
 
 
 def inertia(g: Position, k: Coefficients, p: Constants) -> Inertia:
-    """Inertia matrix; the crank's m lG2^2 is inside I_A, the coupler's and rocker's moments are taken about B and D."""
+    """Compute the inertia matrix; I_A includes the crank's m lG2^2, coupler and rocker inertias are about B and D."""
     # m3 l2 e2.r3 with r3 = G3 - B, and m4 e_alpha.(J r4) with r4 = G4 - D; J turns by +90 degrees
     q3 = p.l2 * (p.mx3 * (g.c2 * g.c3 + g.s2 * g.s3) + p.my3 * (g.s2 * g.c3 - g.c2 * g.s3))
     q4 = p.sa * (p.mx4 * g.c4 - p.my4 * g.s4) - p.ca * (p.mx4 * g.s4 + p.my4 * g.c4)
@@ -153,7 +153,7 @@ def inertia(g: Position, k: Coefficients, p: Constants) -> Inertia:
 def velocity_terms(
     g: Position, k: Coefficients, w2: float, w3: float, w4: float, g3: float, g4: float, p: Constants
 ) -> tuple[float, float]:
-    """Velocity terms b1 (N.m) and b2 (N) of the equations of motion; g3, g4 are those of `centripetal`."""
+    """Compute the velocity terms b1 (N.m) and b2 (N) of the equations of motion; g3, g4 come from `centripetal`."""
     cc = g.c2 * g.c3 + g.s2 * g.s3
     sc = g.s2 * g.c3 - g.c2 * g.s3
     q3 = p.l2 * (p.mx3 * cc + p.my3 * sc)
@@ -169,14 +169,14 @@ def velocity_terms(
 
 
 def friction(v: float, p: Constants) -> float:
-    """Force of damper and guide friction against the slider's motion (N); odd in v."""
+    """Compute the force of damper and guide friction against the slider's motion (N); odd in v."""
     return resistance(v, p.mu, p.fc)
 
 
 def applied_forces(
     g: Position, k: Coefficients, u: float, v: float, load_x: float, load_y: float, p: Constants
 ) -> tuple[float, float]:
-    """Generalised forces Q1 (N.m) and Q2 (N) of gravity, load, spring, damper and friction."""
+    """Compute the generalised forces Q1 (N.m) and Q2 (N) of gravity, load, spring, damper and friction."""
     # moments about B of what acts on the coupler, about D of what acts on the rocker
     t3 = (
         p.gy * (p.mx3 * g.c3 - p.my3 * g.s3)
@@ -195,14 +195,14 @@ def applied_forces(
 
 
 def accelerations(m: Inertia, r1: float, r2: float, speed_drive: float, acceleration: float) -> tuple[float, float]:
-    """Accelerations of crank and slider from the forces r1 (N.m) and r2 (N) on them, or with that of the crank given."""
+    """Compute the accelerations of crank and slider from generalised forces, or for a prescribed crank acceleration."""
     free = 1.0 - speed_drive
     e2 = speed_drive * acceleration + free * (m.m22 * r1 - m.m12 * r2) / (m.m11 * m.m22 - m.m12 * m.m12)
     return e2, (r2 - m.m12 * e2) / m.m22
 
 
 def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> Motion:
-    """Accelerations, crank torque and powers at state ``x`` under the inputs ``i``, from either drive."""
+    """Compute accelerations, crank torque and powers at state ``x`` under the inputs ``i``, for either drive."""
     _, u, w2, v, _, _ = x
     w3 = k.k32 * w2 + k.k3u * v
     w4 = k.k42 * w2 + k.k4u * v
@@ -242,7 +242,7 @@ class Rubbing(NamedTuple):
 def unit_friction(
     g: Position, k: Coefficients, m: Inertia, w2: float, v: float, speed_drive: float, p: Constants
 ) -> tuple[Rubbing, ...]:
-    """Friction in the pins A to D and in the guide."""
+    """Compute the friction in the pins A to D and in the guide for contact forces of 1 N."""
     w3 = k.k32 * w2 + k.k3u * v
     w4 = k.k42 * w2 + k.k4u * v
     ra = p.ra * tanh(w2 / FRICTION_RATE)
@@ -269,12 +269,12 @@ def unit_friction(
 
 
 def contacts(f: Reactions) -> tuple[tuple[float, float], ...]:
-    """The forces in the contacts, in the order of `unit_friction`."""
+    """Return the forces in the contacts, in the order of `unit_friction`."""
     return (f.ax, f.ay), (f.bx, f.by), (f.cx, f.cy), (f.dx, f.dy), (f.guide, 0.0)
 
 
 def contact_friction(g: Position, k: Coefficients, m: Inertia, x: State, i: Inputs, p: Constants) -> Friction:
-    """Friction in pins and guide, consistent with the forces there, which are linear in it."""
+    """Compute the friction in pins and guide, consistent with the contact forces, which depend on it linearly."""
     smooth = p._replace(rough=0.0)
     without = contacts(reactions(g, x, motion(g, k, x, i, smooth), i, smooth))
     units = unit_friction(g, k, m, x[2], x[3], i.speed_drive, p)
@@ -283,13 +283,13 @@ def contact_friction(g: Position, k: Coefficients, m: Inertia, x: State, i: Inpu
 
 
 def response_norm(units: tuple[Rubbing, ...]) -> float:
-    """Norm of the change of the contacts' forces with their magnitudes; below 1 these have one solution."""
+    """Compute the norm of the change of the contact forces with their magnitudes; below 1 the solution is unique."""
     # what is added, lost in any other sum, gives the root a derivative at rest
     return sqrt(1e-24 + sum(x * x + y * y for unit in units for x, y in contacts(unit.response)))
 
 
 def derivative(x: State, i: Inputs, p: Constants) -> State:
-    """Time derivative of the state under inputs held fixed."""
+    """Compute the time derivative of the state under constant inputs."""
     g = position(x[0], x[1], p)
     k = coefficients(g, p)
     m = motion(g, k, x, i, p)
@@ -297,7 +297,7 @@ def derivative(x: State, i: Inputs, p: Constants) -> State:
 
 
 def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reactions:
-    """Forces in the pins and the guide, by Newton and Euler from the outermost link inwards.
+    """Compute the forces in the pins and the guide by Newton and Euler from the outermost link inwards.
 
     The force at C is the pair of loop multipliers of the thesis (2.3).
     """
@@ -349,12 +349,12 @@ def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
 
 
 def kinetic_energy(m: Inertia, w2: float, v: float) -> float:
-    """Kinetic energy of all links (J)."""
+    """Compute the kinetic energy of all links (J)."""
     return 0.5 * (m.m11 * w2 * w2 + 2.0 * m.m12 * w2 * v + m.m22 * v * v)
 
 
 def potential_energy(g: Position, u: float, p: Constants) -> float:
-    """Energy of the spring and of gravity, the latter zero with every centre of mass at A (J)."""
+    """Compute the energy of the spring and of gravity (J), the latter zero with every centre of mass at A."""
     x = (
         p.mx2 * g.c2
         - p.my2 * g.s2
@@ -380,13 +380,13 @@ def potential_energy(g: Position, u: float, p: Constants) -> float:
 
 
 def mechanical_energy(x: State, p: Constants) -> float:
-    """Kinetic plus potential energy (J)."""
+    """Compute the kinetic plus potential energy (J)."""
     g = position(x[0], x[1], p)
     return kinetic_energy(inertia(g, coefficients(g, p), p), x[2], x[3]) + potential_energy(g, x[1], p)
 
 
 def jump_speed(x: State, speed: float, p: Constants) -> State:
-    """State after the commanded crank speed has jumped to ``speed``.
+    """Return the state after a jump of the commanded crank speed to ``speed``.
 
     The jump is an impulse on the crank. The slider's generalised momentum m12 w2 + m22 v has no impulse of its own and is
     conserved; the work of the crank's impulse is the change of kinetic energy.
@@ -399,24 +399,24 @@ def jump_speed(x: State, speed: float, p: Constants) -> State:
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """State after the commanded speed, where it is in force, has jumped to that among the channels ``u``."""
+    """Return the state after a jump of the commanded speed, if it is in force, to its value in the channels ``u``."""
     return jump_speed(x, (1.0 - i.speed_drive) * x[2] + i.speed_drive * u[1], p)
 
 
 def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
-    """What acts on the plant, from drive.mode and the channels in the order of the FMI inputs."""
+    """Return the inputs of the plant from drive.mode and the channels in the order of the FMI inputs."""
     (drive,) = modes
     torque, _, acceleration, force, load_x, load_y = u
     return Inputs(drive, (1.0 - drive) * torque, drive * acceleration, force, load_x, load_y)
 
 
 def started(x: State, i: Inputs, p: Constants) -> State:
-    """A state at the start of a run as it is: nothing determines one of its parts by another."""
+    """Return the initial state unchanged, because all its components are independent."""
     return x
 
 
 def clearance(x: State, i: Inputs, p: Constants) -> float:
-    """Sine of the transmission angle, negative beyond the limit of assembly; if less, what is left until friction jams."""
+    """Compute the sine of the transmission angle, negative beyond assembly, or the smaller margin to jamming."""
     g = position(x[0], x[1], p)
     sine = p.branch * g.s43
     if not p.rough:
@@ -427,7 +427,7 @@ def clearance(x: State, i: Inputs, p: Constants) -> float:
 
 
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
-    """All real outputs of the FMI contract at state ``x`` under the inputs ``i``.
+    """Compute all real outputs of the FMI contract at state ``x`` under the inputs ``i``.
 
     ``start_energy`` is the mechanical energy at the start of the run, against which the balance is kept.
     """

@@ -39,7 +39,7 @@ class Coefficients(NamedTuple):
 
 
 def assembly_square(th2: float, u: float, p: Constants) -> float:
-    """Square of l3 times the distance of C from the line BD, times BD squared over l3 squared (m4).
+    """Compute the square of the distance of C from the line BD, times BD squared (m4).
 
     It is (l3 l4 sin(th4 - th3))^2, positive where the links can be joined and negative where they cannot.
     """
@@ -69,7 +69,7 @@ def position(th2: float, u: float, p: Constants) -> Position:
 
 
 def joined(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, branch: float) -> Position:
-    """The intersection of the circles of coupler and rocker about B and D, for the vector (dx, dy) from B to D.
+    """Intersect the circles of coupler and rocker about B and D, for the vector (dx, dy) from B to D.
 
     ``c2, s2`` are passed through. What moves D and what measures the crank's direction is left to the caller: the slider
     in `position`, anything in the synthesis of linkages.
@@ -88,7 +88,7 @@ def joined(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, bra
 
 
 def coefficients(g: Position, p: Constants) -> Coefficients:
-    """Velocity coefficients: loop closure differentiated once, projected on the rocker and on the coupler."""
+    """Compute the velocity coefficients: loop closure differentiated once, projected on rocker and coupler."""
     r3 = 1.0 / (p.l3 * g.s43)
     r4 = 1.0 / (p.l4 * g.s43)
     return Coefficients(
@@ -111,22 +111,22 @@ def centripetal(g: Position, w2: float, w3: float, w4: float, p: Constants) -> t
 
 
 def coupler_angle(g: Position) -> float:
-    """Absolute angle of the coupler B -> C, in (-pi, pi]."""
+    """Return the absolute angle of the coupler B -> C, in (-pi, pi]."""
     return atan2(g.s3, g.c3)
 
 
 def rocker_angle(g: Position) -> float:
-    """Absolute angle of the rocker D -> C, in (-pi, pi] (the thesis's theta4 + alpha)."""
+    """Return the absolute angle of the rocker D -> C, in (-pi, pi] (the thesis's theta4 + alpha)."""
     return atan2(g.s4, g.c4)
 
 
 def transmission_angle(g: Position, p: Constants) -> float:
-    """Angle between coupler and rocker at C, in [0, pi]: 0 and pi are the limits of assembly."""
+    """Return the angle between coupler and rocker at C, in [0, pi]: 0 and pi are the limits of assembly."""
     return atan2(p.branch * g.s43, g.c43)
 
 
 def coupler_point(g: Position, p: Constants) -> tuple[float, float]:
-    """Position of the coupler point P (m)."""
+    """Compute the position of the coupler point P (m)."""
     return (
         p.l2 * g.c2 + p.xp * g.c3 - p.yp * g.s3,
         p.l2 * g.s2 + p.xp * g.s3 + p.yp * g.c3,
@@ -134,7 +134,7 @@ def coupler_point(g: Position, p: Constants) -> tuple[float, float]:
 
 
 def coupler_point_velocity(g: Position, w2: float, w3: float, p: Constants) -> tuple[float, float]:
-    """Velocity of the coupler point P (m/s)."""
+    """Compute the velocity of the coupler point P (m/s)."""
     return (
         -p.l2 * g.s2 * w2 - (p.xp * g.s3 + p.yp * g.c3) * w3,
         p.l2 * g.c2 * w2 + (p.xp * g.c3 - p.yp * g.s3) * w3,
@@ -142,7 +142,7 @@ def coupler_point_velocity(g: Position, w2: float, w3: float, p: Constants) -> t
 
 
 def assembly_margin(th2: float, u: float, p: Constants) -> tuple[float, float]:
-    """Distances of BD to the limits of assembly (m): l3 + l4 - BD, and BD - |l3 - l4|. Both are positive inside."""
+    """Compute the margins of BD to the limits of assembly (m), l3 + l4 - BD and BD - |l3 - l4|, both positive inside."""
     dx = p.l1 + u * p.ca - p.l2 * cos(th2)
     dy = u * p.sa - p.l2 * sin(th2)
     distance = sqrt(dx * dx + dy * dy)

@@ -10,7 +10,7 @@ from ..parameters import Least, Rules, check_initial, check_parameters
 
 
 class Constants(NamedTuple):
-    """What the equations use, in thesis symbols, derived once from `FiveBarParameters`.
+    """Constants of the equations, in thesis symbols, derived once from `FiveBarParameters`.
 
     ``mx3, my3`` are m3 times the components of the centre of mass along and across the coupler, and so on; ``i2b`` is
     I_A + m3 l2^2, ``i3b`` the coupler's moment of inertia about B, ``i4d`` the rocker's about D; ``gx, gy`` gravity;
@@ -95,8 +95,8 @@ class FiveBarParameters:
     """A five-bar slider: a four-bar whose rocker-to-ground pivot slides on a sprung and damped guide.
 
     Lengths in m, masses in kg, moments of inertia in kg.m2, angles in rad, stiffness in N/m, damping in N.s/m. The
-    moment of inertia of the crank is about its shaft A and includes m lG2^2; those of coupler and rocker are about the
-    own centre of mass. Centres of mass are measured from A, from the crank pin B and from the slider pin D, and turned by
+    moment of inertia of the crank is about its shaft A and includes m lG2^2; those of coupler and rocker are about their
+    own centres of mass. Centres of mass are measured from A, from the crank pin B and from the slider pin D, and turned by
     the ``*_cog_angle`` from the link's own direction (A to B, B to C, D to C).
 
     Raises
@@ -145,7 +145,7 @@ class FiveBarParameters:
         check_parameters(self)
 
     def constants(self) -> Constants:
-        """The constants of the equations."""
+        """Compute the constants of the equations."""
 
         def components(factor: float, distance: float, angle: float) -> tuple[float, float]:
             return factor * distance * cos(angle), factor * distance * sin(angle)
@@ -199,7 +199,7 @@ class FiveBarParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InitialState:
-    """Where a run starts: rad, rad/s, m, m/s.
+    """Initial state of a run: rad, rad/s, m, m/s.
 
     With the speed prescribed the commanded speed at the start takes the place of ``crank_speed``.
 
@@ -219,7 +219,7 @@ class InitialState:
 
 
 def without_friction(parameters: FiveBarParameters) -> FiveBarParameters:
-    """The same with neither Coulomb friction nor friction by contact forces."""
+    """Return the parameters without Coulomb friction and friction by contact forces."""
     return replace(
         parameters,
         slider_coulomb_friction=0.0,
@@ -232,7 +232,7 @@ def without_friction(parameters: FiveBarParameters) -> FiveBarParameters:
 
 
 def reach(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> float:
-    """Distance from the crank pin B to the slider pin D (m)."""
+    """Compute the distance from the crank pin B to the slider pin D (m)."""
     p = parameters.constants()
     return hypot(
         p.l1 + slider_position * p.ca - p.l2 * cos(crank_angle), slider_position * p.sa - p.l2 * sin(crank_angle)

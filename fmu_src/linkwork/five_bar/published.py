@@ -22,7 +22,7 @@ DYN_PER_CM_PER_NEWTON_PER_METRE = 1e3
 
 
 def _at(crank_speed_rpm: float, parameters: FiveBarParameters, source: str) -> PublishedSet:
-    """A set with the thesis's start: th2 = u = u' = 0 at the running speed."""
+    """Return a published set that starts as in the thesis: th2 = u = u' = 0 at the running speed."""
     speed = crank_speed_rpm * RAD_S_PER_RPM
     return PublishedSet(parameters, InitialState(crank_speed=speed), {"speed": speed}, source, at_rest=True)
 
@@ -99,7 +99,7 @@ SIGMA2, P45, SQUARE_OF_OMEGA_K = 0.05, 0.2, 1000.0
 
 
 def chapter_4(inertia_ratio: float, omega_c: float = 0.0) -> FiveBarParameters:
-    """The mechanism of chapters IV and V, horizontal.
+    """Return the horizontal mechanism of chapters IV and V.
 
     The coupler has no mass, the rocker's centre of mass is on the slider pin D, l3 = l4 = l1, sigma2 = l2/l4 = 0.05,
     p45 = m4/(m4 + m5) = 0.2, k/(m4 + m5) = 1000 1/s2. Lengths and masses are free: 0.3 m and m4 + m5 = 1 kg are chosen, and

@@ -1,4 +1,4 @@
-"""Where the slider-crank can be assembled, and the size of its states."""
+"""Assembly limits of the slider-crank, and error scales of its state."""
 
 from __future__ import annotations
 
@@ -47,6 +47,6 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
-    """Magnitudes of the state's components below which the integrator's error counts as absolute, by the state at the start."""
+    """Return for each component of the state the magnitude below which its error counts as absolute, from the initial state."""
     mass = parameters.crank_mass + parameters.rod_mass + parameters.slider_mass
     return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

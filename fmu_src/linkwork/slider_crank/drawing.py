@@ -1,4 +1,4 @@
-"""How the generalised slider-crank is drawn."""
+"""Drawing of the generalised slider-crank."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .parameters import Constants
 
 
 def positions(x: State, i: Inputs, p: Constants) -> tuple[float, ...]:
-    """Places of the joints, in the order of `DRAWING`, in the ground frame."""
+    """Compute the positions of the joints, in the order of `DRAWING`, in the ground frame."""
     settled = grooved(x, i.groove, p)
     shift = settled[1]
     q = position(settled[0], shift, p)

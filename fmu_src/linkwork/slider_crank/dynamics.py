@@ -47,7 +47,7 @@ State = tuple[float, float, float, float, float, float]
 
 
 class Inputs(NamedTuple):
-    """What acts on the plant at one instant.
+    """Inputs of the plant at one instant.
 
     ``speed_drive`` is 1.0 where the crank acceleration is prescribed and 0.0 where the torque is; ``shift_drive`` is 1.0
     where the axial acceleration is prescribed and 0.0 where the axial force is; ``groove`` is 1.0 where a groove in the
@@ -161,7 +161,7 @@ class Outputs(NamedTuple):
 
 
 def grooved(x: State, in_groove: float, p: Constants) -> State:
-    """The state with shift and axial velocity as a groove makes them, where there is one."""
+    """Return the state with the shift and axial velocity that a groove imposes, if there is one."""
     th, s1, w, v, dissipated, supplied = x
     law = groove(th, p)
     free = 1.0 - in_groove
@@ -169,7 +169,7 @@ def grooved(x: State, in_groove: float, p: Constants) -> State:
 
 
 def inertia(q: Position, k: Coefficients, p: Constants) -> Inertia:
-    """Inertia matrix; the rod by its masses at the ends, of which m23 couples the pins' velocities."""
+    """Compute the inertia matrix, with the rod as masses at its ends; m23 couples the pins' velocities."""
     # direction of the guide times the velocities of the crank pin for w = 1 and for v = 1
     along = -p.a1 * q.c * p.sa
     m4 = p.m33 + p.m3
@@ -181,26 +181,26 @@ def inertia(q: Position, k: Coefficients, p: Constants) -> Inertia:
 
 
 def velocity_terms(q: Position, k: Coefficients, w: float, slide: float, p: Constants) -> tuple[float, float]:
-    """Velocity terms b1 (N.m) and b2 (N) of the equations of motion; ``slide`` is that of `centripetal`."""
+    """Compute the velocity terms b1 (N.m) and b2 (N) of the equations of motion; ``slide`` comes from `centripetal`."""
     along = -p.a1 * q.c * p.sa
     pull = p.m23 * p.a1 * q.s * p.sa * w * w + (p.m33 + p.m3) * slide
     return (p.m23 * slide * along + pull * k.kth, -p.m23 * slide * p.ca + pull * k.ks)
 
 
 def slider_resistance(s4: float, v4: float, load: float, p: Constants) -> float:
-    """Force on the slider along its guide (N): load, spring, damper and friction."""
+    """Compute the force on the slider along its guide (N): load, spring, damper and friction."""
     return load - p.k * (s4 - p.s0) - resistance(v4, p.mu, p.fc)
 
 
 def shift_resistance(s1: float, v: float, p: Constants) -> float:
-    """Force on the crank along its axis of the spring and the damper there (N)."""
+    """Compute the force of spring and damper on the crank along its axis (N)."""
     return -p.kx * (s1 - p.x0) - p.mux * v
 
 
 def applied_forces(
     q: Position, k: Coefficients, s1: float, v: float, v4: float, load: float, p: Constants
 ) -> tuple[float, float]:
-    """Generalised forces Q1 (N.m) and Q2 (N) of gravity, load, springs, dampers and friction."""
+    """Compute the generalised forces Q1 (N.m) and Q2 (N) of gravity, load, springs, dampers and friction."""
     front = p.m2 * p.share
     rear = p.m2 - front
     push = slider_resistance(q.s4, v4, load, p) - (front + p.m3) * (p.gy * p.sa + p.gz * p.ca)
@@ -212,7 +212,7 @@ def applied_forces(
 
 
 def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> Motion:
-    """Accelerations, torque, axial force and powers at state ``x`` under the inputs ``i``, from any drives."""
+    """Compute accelerations, torque, axial force and powers at state ``x`` under the inputs ``i``, for any drives."""
     th, s1, w, v, _, _ = x
     v4 = k.kth * w + k.ks * v
     m = inertia(q, k, p)
@@ -256,7 +256,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
 
 
 def derivative(x: State, i: Inputs, p: Constants) -> State:
-    """Time derivative of the state under inputs held fixed."""
+    """Compute the time derivative of the state under constant inputs."""
     x = grooved(x, i.groove, p)
     q = position(x[0], x[1], p)
     k = coefficients(q, p)
@@ -265,7 +265,7 @@ def derivative(x: State, i: Inputs, p: Constants) -> State:
 
 
 def reactions(q: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reactions:
-    """Forces and moments in all joints, by Newton and Euler from the slider inwards."""
+    """Compute the forces and moments in all joints by Newton and Euler from the slider inwards."""
     w = x[2]
     e = m.crank_acceleration
     g = Vector(p.gx, p.gy, p.gz)
@@ -307,12 +307,12 @@ def reactions(q: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
 
 
 def kinetic_energy(m: Inertia, w: float, v: float) -> float:
-    """Kinetic energy of all links (J)."""
+    """Compute the kinetic energy of all links (J)."""
     return 0.5 * (m.m11 * w * w + 2.0 * m.m12 * w * v + m.m22 * v * v)
 
 
 def potential_energy(q: Position, s1: float, p: Constants) -> float:
-    """Energy of the springs and of gravity, the latter zero with every centre of mass at O (J)."""
+    """Compute the energy of the springs and of gravity (J), the latter zero with every centre of mass at O."""
     front = p.m2 * p.share
     rear = p.m2 - front
     slider = from_guide_frame(Vector(p.mx4, p.my4, p.mz4), p)
@@ -326,13 +326,13 @@ def potential_energy(q: Position, s1: float, p: Constants) -> float:
 
 
 def mechanical_energy(x: State, p: Constants) -> float:
-    """Kinetic plus potential energy (J)."""
+    """Compute the kinetic plus potential energy (J)."""
     q = position(x[0], x[1], p)
     return kinetic_energy(inertia(q, coefficients(q, p), p), x[2], x[3]) + potential_energy(q, x[1], p)
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """State after the commanded speeds have jumped, of whichever freedoms are driven by them.
+    """Return the state after a jump of the commanded speeds, for the freedoms that they drive.
 
     A jump is an impulse on the freedom that is driven. The other's generalised momentum has no impulse of its own and is
     conserved; a groove takes the shift along. The work of the impulses is the change of kinetic energy.
@@ -353,7 +353,7 @@ def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
 
 
 def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
-    """What acts on the plant, from drive.mode and axial.mode and the channels in the order of the FMI inputs.
+    """Return the inputs of the plant from drive.mode, axial.mode and the channels in the order of the FMI inputs.
 
     ``axial.mode`` is 0 where the axial force is given, 1 where the axial speed is, 2 where a groove makes the shift.
     """
@@ -376,18 +376,18 @@ def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inp
 
 
 def started(x: State, i: Inputs, p: Constants) -> State:
-    """A state at the start of a run, with the shift that a groove makes where there is one."""
+    """Return the initial state of a run, with the shift that a groove imposes, if there is one."""
     return grooved(x, i.groove, p)
 
 
 def clearance(x: State, i: Inputs, p: Constants) -> float:
-    """Sine of the transmission angle, which is the cosine of the angle between rod and guide."""
+    """Compute the sine of the transmission angle, which is the cosine of the angle between rod and guide."""
     s = grooved(x, i.groove, p)
     return p.branch * position(s[0], s[1], p).h / p.a2
 
 
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
-    """All real outputs of the FMI interface at state ``x`` under the inputs ``i``.
+    """Compute all real outputs of the FMI interface at state ``x`` under the inputs ``i``.
 
     ``start_energy`` is the mechanical energy at the start of the run, against which the balance is kept.
     """

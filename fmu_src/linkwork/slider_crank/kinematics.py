@@ -33,7 +33,7 @@ class Position(NamedTuple):
 
 
 class Groove(NamedTuple):
-    """Shift that a groove makes (m), and its first and second derivatives by the crank angle (m/rad, m/rad2)."""
+    """Shift imposed by a groove (m), and its first and second derivatives by the crank angle (m/rad, m/rad2)."""
 
     shift: float
     pitch: float
@@ -48,7 +48,7 @@ class Coefficients(NamedTuple):
 
 
 def assembly_square(th: float, s1: float, p: Constants) -> float:
-    """Square of the rod's length less that of the crank pin's distance from the guide (m2).
+    """Compute the squared rod length minus the squared distance of the crank pin from the guide (m2).
 
     It is h^2, positive where the rod reaches the guide and negative where it does not.
     """
@@ -74,27 +74,27 @@ def position(th: float, s1: float, p: Constants) -> Position:
 
 
 def guide(p: Constants) -> Vector:
-    """Direction in which the slider position increases: -k4."""
+    """Return the direction in which the slider position increases: -k4."""
     return Vector(0.0, -p.sa, -p.ca)
 
 
 def crank_pin(q: Position, s1: float, p: Constants) -> Vector:
-    """Position of the crank pin P2 (m)."""
+    """Compute the position of the crank pin P2 (m)."""
     return Vector(p.a1 * q.c, p.a1 * q.s, s1)
 
 
 def slider_pin(q: Position, p: Constants) -> Vector:
-    """Position of the slider pin P3 (m)."""
+    """Compute the position of the slider pin P3 (m)."""
     return Vector(-p.a4, -q.s4 * p.sa, -q.s4 * p.ca)
 
 
 def rod(q: Position, p: Constants) -> Vector:
-    """Vector of the rod, from crank pin to slider pin (m): -f i4 - g j4 - h k4."""
+    """Compute the vector of the rod, from crank pin to slider pin (m): -f i4 - g j4 - h k4."""
     return Vector(-q.f, -q.g * p.ca - q.h * p.sa, q.g * p.sa - q.h * p.ca)
 
 
 def coefficients(q: Position, p: Constants) -> Coefficients:
-    """Velocity coefficients: loop closure differentiated once."""
+    """Compute the velocity coefficients: loop closure differentiated once."""
     return Coefficients(
         (q.f * p.a1 * q.s - q.g * p.a1 * q.c * p.ca) / q.h - p.a1 * q.c * p.sa,
         q.g * p.sa / q.h - p.ca,
@@ -102,17 +102,17 @@ def coefficients(q: Position, p: Constants) -> Coefficients:
 
 
 def crank_pin_velocity(q: Position, w: float, v: float, p: Constants) -> Vector:
-    """Velocity of the crank pin (m/s) at crank speed w and axial velocity v."""
+    """Compute the velocity of the crank pin (m/s) at crank speed w and axial velocity v."""
     return Vector(-p.a1 * q.s * w, p.a1 * q.c * w, v)
 
 
 def crank_pin_acceleration(q: Position, w: float, e: float, a: float, p: Constants) -> Vector:
-    """Acceleration of the crank pin (m/s2) at crank speed w, crank acceleration e and axial acceleration a."""
+    """Compute the acceleration of the crank pin (m/s2) at crank speed w, crank and axial acceleration e and a."""
     return Vector(-p.a1 * (q.s * e + q.c * w * w), p.a1 * (q.c * e - q.s * w * w), a)
 
 
 def centripetal(q: Position, k: Coefficients, w: float, v: float, p: Constants) -> float:
-    """Acceleration of the slider left when theta1'' = S1'' = 0 (m/s2): loop closure differentiated twice."""
+    """Compute the slider acceleration for theta1'' = S1'' = 0 (m/s2): loop closure differentiated twice."""
     # r.r'' + r'.r' = 0 with the rod's vector r and its rate r' = -S4' k4 - v2; component by component, since every step of
     # a run asks for it many times
     slide = k.kth * w + k.ks * v
@@ -124,7 +124,7 @@ def centripetal(q: Position, k: Coefficients, w: float, v: float, p: Constants) 
 
 
 def groove(th: float, p: Constants) -> Groove:
-    """Shift that the groove makes and its first two derivatives by the crank angle: S1 = SS1 sin(alpha theta1), eq 28.
+    """Compute the shift imposed by the groove and its first two derivatives by crank angle: S1 = SS1 sin(alpha theta1), eq 28.
 
     Eq 28a prints S1 for SS1.
     """
@@ -134,22 +134,22 @@ def groove(th: float, p: Constants) -> Groove:
 
 
 def rod_angular_velocity(r: Vector, rate: Vector, p: Constants) -> Vector:
-    """Angular velocity of the rod (rad/s) for its vector and that one's rate; none about the rod itself."""
+    """Compute the angular velocity of the rod (rad/s) from its vector and the vector's rate, with no spin about the rod."""
     return scale(1.0 / (p.a2 * p.a2), cross(r, rate))
 
 
 def transmission_angle(q: Position, p: Constants) -> float:
-    """Angle between the rod and the plane normal to the guide, in [0, pi/2]: 0 is the limit of assembly."""
+    """Return the angle between the rod and the plane normal to the guide, in [0, pi/2]: 0 is the limit of assembly."""
     return atan2(p.branch * q.h, sqrt(q.f * q.f + q.g * q.g))
 
 
 def assembly_margin(q: Position, p: Constants) -> float:
-    """Rod length less the crank pin's distance from the guide (m), positive inside the range of assembly."""
+    """Compute the rod length minus the crank pin's distance from the guide (m), positive where it can be assembled."""
     return p.a2 - sqrt(q.f * q.f + q.g * q.g)
 
 
 def closure_residual(th: float, s1: float, s4: float, p: Constants) -> float:
-    """Length by which the loop fails to close at the given crank angle, shift and slider position (m)."""
+    """Compute the closure error of the loop at the given crank angle, shift and slider position (m)."""
     x = p.a1 * cos(th) + p.a4
     y = p.a1 * sin(th) + s4 * p.sa
     z = s1 + s4 * p.ca
@@ -157,7 +157,7 @@ def closure_residual(th: float, s1: float, s4: float, p: Constants) -> float:
 
 
 def to_crank_frame(a: Vector, q: Position) -> Vector:
-    """Components in frame 2, which turns with the crank, of a vector given in the ground frame."""
+    """Return the components in frame 2, which turns with the crank, of a vector in the ground frame."""
     return Vector(q.c * a.x + q.s * a.y, q.c * a.y - q.s * a.x, a.z)
 
 
@@ -177,10 +177,10 @@ def to_rod_frame(a: Vector, q: Position, p: Constants) -> Vector:
 
 
 def to_guide_frame(a: Vector, p: Constants) -> Vector:
-    """Components in frame 4 of a vector given in the ground frame; the slider position increases along -k of it."""
+    """Return the components in frame 4 of a vector in the ground frame; the slider position increases along -k4."""
     return Vector(a.x, p.ca * a.y - p.sa * a.z, p.sa * a.y + p.ca * a.z)
 
 
 def from_guide_frame(a: Vector, p: Constants) -> Vector:
-    """Components in the ground frame of a vector given in frame 4."""
+    """Return the components in the ground frame of a vector in frame 4."""
     return Vector(a.x, p.ca * a.y + p.sa * a.z, p.ca * a.z - p.sa * a.y)

@@ -15,7 +15,7 @@ from ..parameters import Least, Rules, check_initial, check_parameters
 
 
 class Constants(NamedTuple):
-    """What the equations use, in thesis symbols, derived once from `SliderCrankParameters`.
+    """Constants of the equations, in thesis symbols, derived once from `SliderCrankParameters`.
 
     ``ca, sa`` are cosine and sine of the twist alpha4. ``m22, m23, m33`` are the rod's masses at its ends: its kinetic
     energy is half of m22 v2.v2 + 2 m23 v2.v3 + m33 v3.v3, with v2, v3 the velocities of crank pin and slider pin;
@@ -160,7 +160,7 @@ class SliderCrankParameters:
         check_parameters(self)
 
     def constants(self) -> Constants:
-        """The constants of the equations."""
+        """Compute the constants of the equations."""
         share = self.rod_cog_distance / self.rod_length
         end = self.rod_mass * share * share + self.rod_inertia / (self.rod_length * self.rod_length)
         return Constants(
@@ -203,7 +203,7 @@ class SliderCrankParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InitialState:
-    """Where a run starts: rad, rad/s, m, m/s.
+    """Initial state of a run: rad, rad/s, m, m/s.
 
     A commanded speed at the start takes the place of ``crank_speed``, a commanded axial speed that of ``shift_velocity``;
     a groove determines shift and velocity.
