@@ -85,6 +85,7 @@ from .response.advice import fold_jumps as fold_jumps
 from .response.advice import ranges_to_avoid as ranges_to_avoid
 from .response.advice import special_gradient as special_gradient
 from .response.branch import FORCE as FORCE
+from .response.branch import GREATEST as GREATEST
 from .response.branch import Branch as Branch
 from .response.branch import follow as follow
 from .response.branch import follow_both as follow_both

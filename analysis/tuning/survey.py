@@ -14,6 +14,7 @@ from linkwork.errors import LinkworkError
 
 from ..numerics.continuation import ContinuationError
 from ..periodic import (
+    GREATEST,
     Branch,
     Crossing,
     Drive,
@@ -465,7 +466,8 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
         start, stable = _nearest_start(wish, found.response, level), 0
         for turns in range(1, wish.turns + 1):
             there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
-            new += [o for o in there.orbits if not _meets(wish, found.response, o)]
+            # a motion from which deviations grow more than that is none that a machine comes near
+            new += [o for o in there.orbits if o.largest < GREATEST and not _meets(wish, found.response, o)]
             stable += len(there.stable)
         if stable > 1:
             several.append(level)

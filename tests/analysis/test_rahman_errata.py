@@ -24,8 +24,8 @@ SHOWN = (
     ("1", "rahman-closure", "error of S4 where the iteration ends; a4 = 10", 5.88),
     # of an axis that is turned by 0.8 rad
     ("2", "rahman-rates", "angular velocity", 2.0 * sin(0.4) * 2.1),
-    ("3", "rahman-rates", "row 37f with the rates of eqs 39 to 43, where |sin theta2| > 0.15; a4 = 30", 83.74),
-    ("3", "rahman-rates", "row 37f with the rates of eqs 39 to 43, where |sin theta2| > 0.15; alpha4 = 310", 215.17),
+    ("3", "rahman-rates", "row 37f with the rates of eqs 39 to 43, where abs(sin theta2) > 0.15; a4 = 30", 83.74),
+    ("3", "rahman-rates", "row 37f with the rates of eqs 39 to 43, where abs(sin theta2) > 0.15; alpha4 = 310", 215.17),
     ("3", "rahman-rates", "rank of the coefficients of eq 38 with its right side", 6.0),
     # the term that is too large, by 1 - cos^2 eta2
     (

@@ -375,7 +375,7 @@ class Linkage:
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return the left sides of g <= 0 that keep |cos mu| at C below a cosine, without division.
+        """Return the left sides of g <= 0 that keep the magnitude of cos mu at C below a cosine, without division.
 
         Of numbers, arrays and symbols; ``nearest`` and ``farthest`` are the squares of the least and the greatest `reach`.
         """
