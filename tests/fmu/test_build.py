@@ -96,7 +96,7 @@ CHANGES = {
     "FiveBarSlider": {
         **{name: (changes, True) for name, changes in SAME_GUID.items()},
         "docstring": (
-            {"linkwork/five_bar/dynamics.py": ('"""Inertia matrix; the crank', '"""The inertia matrix; the crank')},
+            {"linkwork/five_bar/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')},
             True,
         ),
         "description": (
@@ -109,7 +109,7 @@ CHANGES = {
     "SliderCrank": {
         **{name: (changes, True) for name, changes in SAME_GUID.items()},
         "docstring": (
-            {"linkwork/slider_crank/dynamics.py": ('"""Inertia matrix; the rod', '"""The inertia matrix; the rod')},
+            {"linkwork/slider_crank/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')},
             True,
         ),
         "description": (
