@@ -58,7 +58,7 @@ _WISH: Mapping[str, Any] = {
 _SECTION = {"kind": "bar", "width": "30 mm", "thickness": "8 mm", "material": "steel"}
 _OF_SECTIONS = """\
 # Masses, centres of mass and moments of inertia of {links} follow from their lengths and sections: say
-# what yours are made of, or give the numbers behind a #, here those of the section, without it. A weighed mass may stand beside it.
+# what yours are made of, or give the numbers behind a # instead. A weighed mass may stand beside a section.
 {kinds}
 #   materials: {materials}, or a density such as "7.85 g/cm3"; overhang: material beyond each pin
 # All other numbers, such as {other}, are those of {source}: give your own."""
