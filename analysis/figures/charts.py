@@ -16,6 +16,7 @@ from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
 from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
+from ..units import display_of
 from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, pictured
 from .style import COLOURS, LIGHT, legend_above
 
@@ -229,7 +230,7 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
     """Plot the number of stable motions and the amplitudes of the smallest and the largest, with the boundaries."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
-    factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
+    shown, factor = display_of(unit)
     sizes = {
         f"amplitude of {what}, {word} stable motion [{shown}]": factor * amplitude
         for word, amplitude in (("smallest", beside.least), ("largest", beside.greatest))
@@ -264,7 +265,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
     x_label, y_label = found.labels
     half = len(found.motions[0].start) // 2
     what, unit = found.motions[0].swing
-    factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
+    shown, factor = display_of(unit)
     curves = []
     for stable, marker in ((True, "o"), (False, "x")):
         those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]

@@ -27,7 +27,7 @@ from ..periodic import (
     fold_jumps,
     ranges_to_avoid,
 )
-from ..units import CM_PER_METRE, RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
 from .style import COLOURS, LINE, THIN
@@ -76,7 +76,7 @@ class _Scale:
 
     def size(self, value: float) -> str:
         """Return an amplitude in drawn units as text, without the unit."""
-        return f"{self.scale * value:.3g}"
+        return f"{self.scale * value:.4g}"
 
 
 def plot_branches(
@@ -120,7 +120,7 @@ def describe_branches(
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     rpm &= family.unit == "rad/s"
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
-    scale, shown = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
+    shown, scale = display_of(si)
     look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what)
     others = [] if beside is None else _approximated(branches, beside)
     shades = [

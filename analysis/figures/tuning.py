@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..tuning import Survey, Tuned
-from ..units import CM_PER_METRE, RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 from .style import COLOURS
@@ -19,7 +19,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
     what, si = orbit.swing
-    factor, unit = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
+    unit, factor = display_of(si)
     family = tuned.after.response.family
     name, scale, of_x = (
         ("crank speed", RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (family.name, 1.0, family.unit)
