@@ -89,8 +89,8 @@ def _state(run: Run, known: Variable) -> float:
     """Return an input, or one of the continuous states, which may differ from the variable of its name between events."""
     names = run.model.state_names
     if known.is_state and run.model.interface == "me" and known.name in names:
-        return run.states("GetContinuousStates")[names.index(known.name)]
-    return run.get([known])[0]
+        return float(run.states("GetContinuousStates")[names.index(known.name)])
+    return float(run.get([known])[0])
 
 
 def _put(run: Run, known: Variable, value: float) -> None:
