@@ -269,8 +269,8 @@ def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> N
     over_speed = follow(family, orbit, SPEED, low=0.95 * SPEED, high=1.05 * SPEED)
     forces = [f"greatest force in pin {pin} [N]" for pin in "ABCD"]
     for branch, label, factor in (
-        (softened, "slider.stiffness [N/m]", 1.0),
-        (over_speed, "drive.speed [rpm]", 1.0 / RPM),
+        (softened, "slider stiffness [N/m]", 1.0),
+        (over_speed, "crank speed [rpm]", 1.0 / RPM),
     ):
         columns = branch.columns()
         figure = figures.plot(branch)
