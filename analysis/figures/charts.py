@@ -17,9 +17,9 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
-from ..units import RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, pictured
-from .style import COLOURS, LIGHT, legend_above, spoken_label
+from .style import COLOURS, LIGHT, legend_above, spoken, spoken_label
 
 #: Colour of points that have no value.
 EMPTY = "0.82"
@@ -244,7 +244,7 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
     """Plot the number of stable motions and the amplitudes of the smallest and the largest, with the boundaries."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
-    factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
+    shown, factor = display_of(unit)
     sizes = {
         f"amplitude of {what}, {word} stable motion [{shown}]": factor * amplitude
         for word, amplitude in (("smallest", beside.least), ("largest", beside.greatest))
@@ -276,17 +276,18 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
 @pictured
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
     """Plot each start in the colour of the motion in which it ends, and the motions at the crank angle 0."""
-    x_label, y_label = map(spoken_label, found.labels)
+    name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
+    drawn, scale = display_of(position_unit)
     half = len(found.motions[0].start) // 2
     what, unit = found.motions[0].swing
-    factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
+    shown, factor = display_of(unit)
     curves = []
     for stable, marker in ((True, "o"), (False, "x")):
         those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]
         if those:
             curves.append(
                 Curve(
-                    x=[orbit.start[0] for orbit in those],
+                    x=[scale * orbit.start[0] for orbit in those],
                     y=[orbit.start[half] for orbit in those],
                     line="",
                     marker=marker,
@@ -299,11 +300,11 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
                 )
             )
     panel = Panel(
-        x_label=x_label.replace(" [", " at crank angle 0 ["),
-        y_label=y_label,
+        x_label=f"{spoken(name)} at crank angle 0 [{drawn}]",
+        y_label=spoken_label(found.labels[1]),
         curves=curves,
         legend_at="above",
-        x_range=(float(found.position[0]), float(found.position[-1])),
+        x_range=(scale * float(found.position[0]), scale * float(found.position[-1])),
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
     names = [
@@ -322,7 +323,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
     title = f"{title}: basins at {speed:.4g} rpm".removeprefix(": ")
     map_ = HeatMap(
         panel=panel,
-        x=found.position,
+        x=scale * found.position,
         y=found.rate,
         values=np.ma.MaskedArray(numbers.astype(float)),
         label="where a start ends",

@@ -28,7 +28,7 @@ from ..periodic import (
     fold_jumps,
     ranges_to_avoid,
 )
-from ..units import CM_PER_METRE, RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
 from .style import COLOURS, LINE, THIN, spoken
@@ -80,7 +80,7 @@ class _Scale:
 
     def size(self, value: float) -> str:
         """Return an amplitude in drawn units as text, without the unit."""
-        return f"{self.scale * value:.3g}"
+        return f"{self.scale * value:.4g}"
 
 
 def plot_branches(
@@ -124,7 +124,7 @@ def describe_branches(
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     rpm &= family.unit == "rad/s"
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
-    scale, shown = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
+    shown, scale = display_of(si)
     look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what)
     others = [] if beside is None else _approximated(branches, beside)
     shades = [
@@ -210,7 +210,7 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
         near = x[n - 1 : n + 2] - x[n]
         bend, slope, height = np.polyfit(near, y[n - 1 : n + 2], 2)
         place, tall = (x[n] - 0.5 * slope / bend, height - 0.25 * slope**2 / bend) if bend < 0.0 else (x[n], y[n])
-        labels.append(Label(x=look.factor * place, y=tall, text=f"peak, {look.place(place)}: {tall:.3g} {look.shown}"))
+        labels.append(Label(x=look.factor * place, y=tall, text=f"peak, {look.place(place)}: {tall:.4g} {look.shown}"))
     return labels
 
 

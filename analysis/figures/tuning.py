@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..periodic import unit_of
 from ..tuning import Survey, Tuned
-from ..units import CM_PER_METRE, RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from .curves import Curve, Panel, Shade, plot_curves
 from .dispatch import plot
 from .style import COLOURS, LINE, spoken
@@ -23,7 +23,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
     what, si = orbit.swing
-    factor, unit = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
+    unit, factor = display_of(si)
     family = tuned.after.response.family
     scale, of_x = (RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (1.0, family.unit)
     low, high = (level / scale for level in tuned.wish.span)

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
+from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
@@ -195,7 +195,13 @@ def case_from(
     data = files.overridden(_without_rivals(data, overrides or {}, mechanism, acting), overrides or {})
     own, found = _divided(data, mechanism, acting, folder)
     printed = None if published is None else published.parameters
-    parameters = parameters_from(own, printed, mechanism)
+    try:
+        parameters = parameters_from(own, printed, mechanism)
+    except UnknownNameError as error:
+        if not set(mechanism.mechanism_variables) <= set(error.known):  # of a part, such as a kind of section
+            raise
+        others = (*acting, *(f"run.{name}" for name in files.entry_names(RunTable)), *COMMON[:-2])
+        raise files.unknown_name(error.name, (*error.known, *others)) from None
     base = None if published is None or published.at_rest else published.initial
     initial = start_from(mechanism, data.get("initial", {}), base)
     inputs = Inputs(**found)

@@ -94,7 +94,7 @@ def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
     assert rows.shape == (81, 3)
     assert set(rows[:, 2]) <= {-1.0, 0.0, 1.0, 2.0}
     axis = plot(picture, title="basins").axes[0]
-    assert axis.get_xlabel() == "slider position at crank angle 0 [m]"
+    assert axis.get_xlabel() == "slider position at crank angle 0 [mm]"
     assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == ["stable motion", "unstable motion"]
     assert plot(picture.found).axes
 
