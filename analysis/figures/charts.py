@@ -157,10 +157,11 @@ def _ticks(norm: Normalize) -> list[float] | None:
     """Return ticks on both sides of the middle of a scale, which has as much room for either; None if it has no middle."""
     if not isinstance(norm, TwoSlopeNorm):
         return None
-    sides = ((norm.vmin, norm.vcenter), (norm.vcenter, norm.vmax))
+    least, middle, greatest = (float(value or 0.0) for value in (norm.vmin, norm.vcenter, norm.vmax))
+    sides = ((least, middle), (middle, greatest))
     ticks = {tick for low, high in sides for tick in MaxNLocator(4).tick_values(low, high) if low <= tick <= high}
     near = 0.1 * min(high - low for low, high in sides)
-    return sorted({tick for tick in ticks if abs(tick - norm.vcenter) > near} | {norm.vcenter})
+    return sorted({tick for tick in ticks if abs(tick - middle) > near} | {middle})
 
 
 def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:

@@ -83,7 +83,8 @@ def plot_outputs(
 
         def place(number: int, **options: Any) -> Axes:
             rows, places = np.nonzero(grid == number)
-            return figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
+            made: Axes = figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
+            return made
 
         axes: list[Axes] = []
         for number, panel in enumerate(panels):
