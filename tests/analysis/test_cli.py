@@ -521,3 +521,21 @@ def test_a_run_is_printed_in_mm_deg_and_rpm_with_the_size_of_joint_forces(linkwo
     (_, x), (_, y), (unit, size) = (rows[f"pin.A{part}"] for part in (".fx", ".fy", " force"))
     assert unit == "N"
     assert size[2] == pytest.approx(np.hypot(x[2], y[2]), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "--published", "table-3.1", "--out"],
+        ["stability", "--published", "table-3.1", "--out"],
+        ["synthesize", str(EXAMPLES / "hand-drawn.toml"), "--out"],
+        ["slider-crank", "tolerances", "--out"],
+        ["build", "--dest"],
+        ["studio", "--out"],
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_computed(linkwork, tmp_path, command):
+    (tmp_path / "file").touch()
+    result = linkwork(*command, tmp_path / "file" / "new")
+    assert result.exit_code == 2
+    assert "is no folder" in " ".join(result.stderr.split())
