@@ -1098,9 +1098,10 @@ libm = ctypes.CDLL("libm.so.6")
 traps = 1 | 4 | 8  # invalid, division by zero, overflow
 beyond = (ctypes.c_double * 6)(0.0, 9.0, 1.0, 0.0, 0.0, 0.0)
 for kind in ("cs", "me"):
-    for values in (dict(crank__length=math.nan), dict(crank__length=1e300), dict(crank__length=9.0), dict(drive__speed=math.inf), {}):
+    cases = dict(crank__length=math.nan, crank__mass=1e300, ground__length=9.0, drive__speed=math.inf, gravity=0.0)
+    for name, value in cases.items():
         i = c.instance(kind)
-        i.set(**values)
+        i.set(**{name: value})
         libm.feenableexcept(traps)
         i.enter()
         bad = i("ExitInitializationMode")
@@ -1122,7 +1123,12 @@ for kind in ("cs", "me"):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="traps are set by glibc")
 def test_a_host_that_traps_floating_point_exceptions_lives(five_bar: Library, tmp_path: Path) -> None:
-    subprocess.run([sys.executable, "-c", TRAPPING, five_bar.archive, tmp_path], check=True, timeout=60, cwd=Path(__file__).parents[2])
+    subprocess.run(
+        [sys.executable, "-c", TRAPPING, five_bar.archive, tmp_path],
+        check=True,
+        timeout=60,
+        cwd=Path(__file__).parents[2],
+    )
 
 
 def test_versions(library: Library) -> None:
