@@ -68,8 +68,9 @@ FMI(Status) FMI(ExitInitializationMode)(void *component) {
 
 FMI(Status) FMI(Terminate)(void *component) {
     ALLOW(EVENT | CONTINUOUS | STEP)
+    Status status = instance_check_commands(c);
     c->s.phase = TERMINATED;
-    return FMI(OK);
+    RETURN(status);
 }
 
 FMI(Status) FMI(Reset)(void *component) {
