@@ -185,7 +185,7 @@ def _pace(drive: Drive) -> float | None:
     """Return the prescribed speed, or the synchronous speed of the motor; None under a mere torque."""
     if drive.speed is None and drive.motor is not None:
         return float(drive.motor.synchronous_speed)
-    return drive.speed
+    return None if drive.speed is None else float(drive.speed)
 
 
 def _continued(
