@@ -83,7 +83,10 @@ class Maker:
         start = self.places[body][2] - self.places[base][2]
         if kind == "P":
             s = self.data["slides"][joint]
-            block, points = s["body"], self.data["ground"] if s["on"] == "ground" else self.data["bodies"][s["on"]]["points"]
+            block, points = (
+                s["body"],
+                self.data["ground"] if s["on"] == "ground" else self.data["bodies"][s["on"]]["points"],
+            )
             x, y, angle = self.places[s["on"]]
             ox, oy = points[s["through"]]
             ox, oy = x + np.cos(angle) * ox - np.sin(angle) * oy, y + np.sin(angle) * ox + np.cos(angle) * oy
@@ -91,7 +94,11 @@ class Maker:
             start = (bx - ox) * np.cos(turn) + (by - oy) * np.sin(turn)
         elif base == "ground":
             self.mates.append((body, self.place_of("ground", joint)))
-        self.data["freedoms"][self.name("f")] = {"joint": joint, "start": float(start), "driven": bool(self.rng.uniform() < 0.6)}
+        self.data["freedoms"][self.name("f")] = {
+            "joint": joint,
+            "start": float(start),
+            "driven": bool(self.rng.uniform() < 0.6),
+        }
 
     def place_of(self, body: str, own: str) -> np.ndarray:
         points = self.data["ground"] if body == "ground" else self.data["bodies"][body]["points"]
@@ -110,7 +117,9 @@ class Maker:
             self.mark(holder, through, self.spot())
             x, y, angle = self.places[holder]
             p = self.place_of(holder, through)
-            start = np.array([x + np.cos(angle) * p[0] - np.sin(angle) * p[1], y + np.sin(angle) * p[0] + np.cos(angle) * p[1]])
+            start = np.array(
+                [x + np.cos(angle) * p[0] - np.sin(angle) * p[1], y + np.sin(angle) * p[0] + np.cos(angle) * p[1]]
+            )
             direction = np.arctan2(at[1] - start[1], at[0] - start[0]) - angle
             self.data["slots"][name] = {"pin": own, "on": holder, "through": through, "direction": float(direction)}
             return None
@@ -155,14 +164,21 @@ class Maker:
         ends = {own for _, own in owned}
         if len(ends) > 1:
             pair = rng.choice(sorted(ends), 2, replace=False)
-            data["springs"][self.name("k")] = {"between": [str(own) for own in pair], "stiffness": 50.0, "damping": 0.5, "free": 0.2}
+            data["springs"][self.name("k")] = {
+                "between": [str(own) for own in pair],
+                "stiffness": 50.0,
+                "damping": 0.5,
+                "free": 0.2,
+            }
         if not owned:
             body = next(iter(data["bodies"]))
             owned = [(body, self.pin(body))]
         data["loads"] = [owned[int(rng.integers(len(owned)))][1]]
 
 
-def random_linkage(seed: int, kinds: tuple[str, ...] = KINDS) -> tuple[dict[str, Any], dict[str, tuple[float, float, float]]]:
+def random_linkage(
+    seed: int, kinds: tuple[str, ...] = KINDS
+) -> tuple[dict[str, Any], dict[str, tuple[float, float, float]]]:
     """Return the tables of a random linkage and the places of its bodies (x, y, angle)."""
     for attempt in range(100):
         maker = Maker(100 * seed + attempt)

@@ -278,10 +278,13 @@ _OTHERS = {
 
 def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return the kind of a case file, judged by the names of its tables; None if they do not show it."""
+    from ..linkages import described_in
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, acting_on
 
     names = set(tables)
+    if described_in(tables) and not names & {"tune", "task"}:
+        return RUN
     if "tune" in names:
         return TUNING
     if "task" in names:

@@ -1,19 +1,7 @@
-"""Planar linkages of the user's own: described as data, compiled into mechanisms."""
+"""Planar linkages of the user's own: described in a file or in Python, compiled into mechanisms that every analysis takes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import lazy_loader
 
-from linkwork.mechanism import Mechanism
-
-from .. import files
-from .description import Description as Description
-from .description import LinkageError as LinkageError
-from .package import Package as Package
-from .package import mechanism as mechanism
-
-
-def described(data: Mapping[str, Any], name: str = "linkage") -> Description:
-    """Read a description from nested tables."""
-    return files.read(Description, data, name)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

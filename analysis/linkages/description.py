@@ -6,15 +6,14 @@ Bodies that have a point of the same name are pinned to each other there. Everyt
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from linkwork.errors import LinkworkError, ParameterError
 
 from .. import files
-from ..files import Many, Quantity, Table, entry, unknown_name
+from ..files import Many, Quantity, Table, entry
 
 GROUND = "ground"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*")
@@ -41,7 +40,9 @@ def _named(reader: Any) -> Any:
     """Return the reader of a table whose entries have names of the user's choice."""
 
     def read(value: Any, name: str) -> dict[str, Any]:
-        return {_name(key, f"{name}.{key}"): reader(v, f"{name}.{key}") for key, v in files.as_table(value, name).items()}
+        return {
+            _name(key, f"{name}.{key}"): reader(v, f"{name}.{key}") for key, v in files.as_table(value, name).items()
+        }
 
     return read
 

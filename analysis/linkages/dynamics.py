@@ -81,7 +81,11 @@ class Motion:
                     rows.append(f"{name}_position, {rate} = {call}")
                     rows.append(f"{stretch} = {name}_position{f'{free}_position' if free else ''}")
             fields += [stretch, rate]
-        yield from ("class Springs(NamedTuple):", '    """Stretches of the springs, their rates, and the directions of those between points."""', "")
+        yield from (
+            "class Springs(NamedTuple):",
+            '    """Stretches of the springs, their rates, and the directions of those between points."""',
+            "",
+        )
         yield from (f"    {field}: float" for field in fields)
         yield from ("", "", "def springs(b: Places, x: tuple[float, ...], p: Constants) -> Springs:")
         yield '    """Compute the stretches of all springs."""'
@@ -107,7 +111,9 @@ class Motion:
         rows, lost, gained = [], [], []
         if self.description.gravity:
             for body in self.interface.centres:
-                on[body].append(f"force(p.{body}_mass * p.gx, p.{body}_mass * p.gy, m[{self.bodies.index(body)}].centre)")
+                on[body].append(
+                    f"force(p.{body}_mass * p.gx, p.{body}_mass * p.gy, m[{self.bodies.index(body)}].centre)"
+                )
         for name, spring in self.description.springs.items():
             resists = self.resistance(name, spring)
             pulls = f"p.{name}_stiffness * s.{name}_stretch" if given(spring.stiffness) else ""
@@ -148,8 +154,19 @@ class Motion:
         freedoms = [" ".join(terms) or "0.0" for terms in along]
         rows.append(f"along = ({', '.join(freedoms)},)")
         rows.append(f"return Acting(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})")
-        yield from ("class Acting(NamedTuple):", '    """Forces on the bodies, forces along the freedoms, power lost in dampers and friction, power of the loads (W)."""', "")
-        yield from ("    wrenches: tuple[Wrench, ...]", "    along: tuple[float, ...]", "    lost: float", "    gained: float", "", "")
+        yield from (
+            "class Acting(NamedTuple):",
+            '    """Forces on the bodies, forces along the freedoms, power lost in dampers and friction, power of the loads (W)."""',
+            "",
+        )
+        yield from (
+            "    wrenches: tuple[Wrench, ...]",
+            "    along: tuple[float, ...]",
+            "    lost: float",
+            "    gained: float",
+            "",
+            "",
+        )
         s = "s: Springs, " if self.description.springs else ""
         yield f"def acting(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> Acting:"
         yield '    """Compute what acts on the bodies and along the freedoms, but for the drives."""'
@@ -175,7 +192,9 @@ class Motion:
 
     def forces(self) -> Iterator[str]:
         """Write the function of the forces in all joints, from the last dyad back to the ground."""
-        rows = [f"on_{body} = needed(m.masses[{n}], m.accelerations, m.wrenches[{n}])" for n, body in enumerate(self.bodies)]
+        rows = [
+            f"on_{body} = needed(m.masses[{n}], m.accelerations, m.wrenches[{n}])" for n, body in enumerate(self.bodies)
+        ]
         rows += [f"on_{body} = Wrench(0.0, 0.0, 0.0)" for body in self.structure.bodies if body not in self.bodies]
         rows.insert(0, "b = m.places")
         taken: dict[str, int] = {}
@@ -211,14 +230,22 @@ class Motion:
                         supported(inside.joint, inside.parent, inside.body)
                     supported(side.joint, side.parent, side.body)
         names = [f"in_{r.name}" for r in self.reactions]
-        yield from ("class Forces(NamedTuple):", '    """Forces in the joints, each of one body on another, and their moments about the ground\'s origin."""', "")
+        yield from (
+            "class Forces(NamedTuple):",
+            '    """Forces in the joints, each of one body on another, and their moments about the ground\'s origin."""',
+            "",
+        )
         yield from (f"    {name}: Wrench" for name in names)
         yield from ("", "", "def forces(m: Motion, p: Constants) -> Forces:")
         yield '    """Compute the forces in all joints, from the last dyad back to the ground."""'
         yield from indented([*rows, f"return Forces({', '.join(names)})"])
 
     def _mesh(self, step: Geared) -> str:
-        pins = [j for j in self.structure.joints.values() if isinstance(j, Pin) and {step.mate, step.carrier} <= set(j.bodies)]
+        pins = [
+            j
+            for j in self.structure.joints.values()
+            if isinstance(j, Pin) and {step.mate, step.carrier} <= set(j.bodies)
+        ]
         ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
         return f"mesh(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
 
@@ -256,7 +283,11 @@ class Motion:
             else:
                 values.append(f"{drive.name}_load")
         loads = [f"{own}_{axis}" for own in self.description.loads for axis in ("fx", "fy")]
-        yield from ("class Applied(NamedTuple):", '    """Loads along the freedoms (N.m, N), whether their rates are commanded, and then their accelerations; loads on points (N)."""', "")
+        yield from (
+            "class Applied(NamedTuple):",
+            '    """Loads along the freedoms (N.m, N), whether their rates are commanded, and then their accelerations; loads on points (N)."""',
+            "",
+        )
         yield from (f"    {field}: float" for field in (*fields, *loads))
         yield from ("", "", "def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:")
         yield '    """Return what acts on the linkage from the values of the modes and the inputs."""'
@@ -282,15 +313,36 @@ class Motion:
         rows += [f"a = acting(b, m, {s}i, p)", f"f = generalised_forces(m, a.wrenches, {self.n})"]
         right = [f"f[{k}] + a.along[{k}] + i.{drives[k].name}_load" for k in n]
         rows += [f"right = ({', '.join(right)},)", f"matrix = mass_matrix(m, {self.n})"]
-        rows += [f"held_ones = {held}", f"e = accelerations(matrix, right, held_ones, {known})", "inertial = multiplied(matrix, e)"]
-        loads = [f"i.{d.name}_load{f' + held_ones[{k}] * (inertial[{k}] - right[{k}])' if d.table else ''}" for k, d in enumerate(drives)]
+        rows += [
+            f"held_ones = {held}",
+            f"e = accelerations(matrix, right, held_ones, {known})",
+            "inertial = multiplied(matrix, e)",
+        ]
+        loads = [
+            f"i.{d.name}_load{f' + held_ones[{k}] * (inertial[{k}] - right[{k}])' if d.table else ''}"
+            for k, d in enumerate(drives)
+        ]
         rows.append(f"loads = ({', '.join(loads)},)")
         power = " + ".join(f"loads[{k}] * x[{self.n + k}]" for k in n)
         rows.append(f"return Motion(b, m, a.wrenches, e, loads, a.lost, {power} + a.gained)")
-        yield from ("class Motion(NamedTuple):", '    """Places, masses and forces on the bodies, accelerations of the freedoms and loads on them, power lost and supplied (W)."""', "")
+        yield from (
+            "class Motion(NamedTuple):",
+            '    """Places, masses and forces on the bodies, accelerations of the freedoms and loads on them, power lost and supplied (W)."""',
+            "",
+        )
         yield from ("    places: Places", "    masses: tuple[Mass, ...]", "    wrenches: tuple[Wrench, ...]")
-        yield from ("    accelerations: tuple[float, ...]", "    loads: tuple[float, ...]", "    lost: float", "    supplied: float", "", "")
-        yield from ("def motion(x: tuple[float, ...], i: Applied, p: Constants) -> Motion:", '    """Compute the accelerations, and the loads that hold the commanded rates."""')
+        yield from (
+            "    accelerations: tuple[float, ...]",
+            "    loads: tuple[float, ...]",
+            "    lost: float",
+            "    supplied: float",
+            "",
+            "",
+        )
+        yield from (
+            "def motion(x: tuple[float, ...], i: Applied, p: Constants) -> Motion:",
+            '    """Compute the accelerations, and the loads that hold the commanded rates."""',
+        )
         yield from indented(rows)
         yield from ("", "", "def derivative(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:")
         yield '    """Compute the time derivative of the state."""'
@@ -301,7 +353,10 @@ class Motion:
         yield from ("", "", "def start(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:")
         yield from ('    """Return the state at the start as it is."""', "    return x")
         yield from ("", "", "def clearance(x: tuple[float, ...], i: Applied, p: Constants) -> float:")
-        yield from ('    """Compute the least sine of all dyads, negative in the wrong assembly."""', "    return places(x, p).clearance")
+        yield from (
+            '    """Compute the least sine of all dyads, negative in the wrong assembly."""',
+            "    return places(x, p).clearance",
+        )
 
     def _energies(self) -> Iterator[str]:
         terms = []
@@ -319,11 +374,17 @@ class Motion:
         yield from ("", "", "def energy(x: tuple[float, ...], p: Constants) -> float:")
         yield '    """Compute the mechanical energy (J)."""'
         s = "springs(b, x, p), " if self.description.springs else ""
-        yield from indented(["b = places(x, p)", "m = masses(b, p)", f"return kinetic_energy(m) + potential_energy(m, {s}p)"])
+        yield from indented(
+            ["b = places(x, p)", "m = masses(b, p)", f"return kinetic_energy(m) + potential_energy(m, {s}p)"]
+        )
 
     def _jump(self, held: str) -> Iterator[str]:
         n = range(self.n)
-        yield from ("", "", "def jump(x: tuple[float, ...], i: Applied, u: tuple[float, ...], p: Constants) -> tuple[float, ...]:")
+        yield from (
+            "",
+            "",
+            "def jump(x: tuple[float, ...], i: Applied, u: tuple[float, ...], p: Constants) -> tuple[float, ...]:",
+        )
         yield '    """Return the state after a jump of the commanded rates: the momenta of the other freedoms are conserved."""'
         place, changes = 0, []
         for k, drive in enumerate(self.interface.drives):

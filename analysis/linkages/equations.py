@@ -8,6 +8,7 @@ from .description import GROUND, Description
 from .parameters import Interface
 from .structure import Dyad, Freed, Geared, Pin, Side, Slider, Structure
 
+
 class Writer:
     """The equations of one linkage, line by line."""
 
@@ -112,7 +113,9 @@ class Writer:
         self.angles[step.body] = terms, constants
         turn = f"{step.body}_turn"
         self.lines.append(f"{turn} = {self.angled(terms, constants)}")
-        self.lines.append(f"{step.body}_frame = {self.hung(self.at(step.parent, step.pin.name), turn, step.body, step.pin.name)}")
+        self.lines.append(
+            f"{step.body}_frame = {self.hung(self.at(step.parent, step.pin.name), turn, step.body, step.pin.name)}"
+        )
 
     # Dyads
 
@@ -246,7 +249,9 @@ class Writer:
         self.lines.append(f"v = ({', '.join(f'x[{self.n + n}]' for n in range(self.n))},)")
         for step in self.structure.steps:
             if isinstance(step, Freed):
-                self.lines.append(f"# the freedom {self.interface.drives[step.freedom].name}: {step.body} from {step.parent}")
+                self.lines.append(
+                    f"# the freedom {self.interface.drives[step.freedom].name}: {step.body} from {step.parent}"
+                )
                 self.freed(step)
             elif isinstance(step, Geared):
                 self.lines.append(f"# {step.body}, geared to {step.mate}")
@@ -267,10 +272,19 @@ class Writer:
                 turn = f"{holder}_frame.turn" if holder != GROUND else f"held(1.0, 0.0, {self.n})"
                 self.lines.append(f"{name}_line = {self.inclined(turn, joint)}")
         self.lines += [f"clearance = {margin}", f"return Places({', '.join(fields)}, clearance)"]
-        record = ["class Places(NamedTuple):", '    """The bodies, the points, the lines of slides, and the clearance to the limit of assembly."""', ""]
+        record = [
+            "class Places(NamedTuple):",
+            '    """The bodies, the points, the lines of slides, and the clearance to the limit of assembly."""',
+            "",
+        ]
         kinds = {"frame": "Frame", "line": "Turn"}
-        record += [f"    {name}: {kinds.get(name.rpartition('_')[2], 'Vector')}" for name in fields] + ["    clearance: float"]
-        head = ["def places(x: tuple[float, ...], p: Constants) -> Places:", '    """Compute the places of all bodies, freedom after freedom and dyad after dyad."""']
+        record += [f"    {name}: {kinds.get(name.rpartition('_')[2], 'Vector')}" for name in fields] + [
+            "    clearance: float"
+        ]
+        head = [
+            "def places(x: tuple[float, ...], p: Constants) -> Places:",
+            '    """Compute the places of all bodies, freedom after freedom and dyad after dyad."""',
+        ]
         return [*record, "", "", *head, *indented(self.lines)]
 
 

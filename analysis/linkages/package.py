@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import re
 import sys
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -71,7 +71,11 @@ class Package:
         body += ["", "", *self.motion.acting(), "", "", *self.motion.motion(), "", "", *self.motion.forces()]
         body += [*self._outputs_function(), *self._error_scale(), *self._positions()]
         text = "\n".join(body)
-        used = [name for name in vars(planar) if re.search(rf"\b{name}\b", text) and getattr(vars(planar)[name], "__module__", "") == planar.__name__]
+        used = [
+            name
+            for name in vars(planar)
+            if re.search(rf"\b{name}\b", text) and getattr(vars(planar)[name], "__module__", "") == planar.__name__
+        ]
         friction = [n for n in ("FRICTION_RATE", "FRICTION_SPEED", "lesser") if re.search(rf"\b{n}\b", text)]
         head = [
             f'"""Equations of the {self.description.name}, written from its description: freedom after freedom, dyad after dyad.',
@@ -127,7 +131,8 @@ class Package:
             text = f"{what} of the freedom {drive.name}, at {drive.joint}"
             yield Output(f'output("{drive.coordinate}", "{unit}", {_quoted(text)}, "", *POSITION{deg})', f"x[{k}]")
             yield Output(
-                f'output("{drive.rate}", "{rate_unit}", "Its rate", "", *RATE, rate_of="{drive.coordinate}"{rpm})', f"x[{n + k}]"
+                f'output("{drive.rate}", "{rate_unit}", "Its rate", "", *RATE, rate_of="{drive.coordinate}"{rpm})',
+                f"x[{n + k}]",
             )
             yield Output(
                 f'output("{drive.name}.acceleration", "{rate_unit}2", "Its acceleration", rate_of="{drive.rate}")',
@@ -159,12 +164,19 @@ class Package:
                 x, y = self.interface.points[holder].get(joint.through, ("0.0", "0.0"))
                 frame = f"b.{holder}_frame" if holder != GROUND else f"ground({n})"
                 call = f"position_along({frame}, {x}, {y}, b.{name}_line, b.{block}_frame)"
-                yield Output(f'output("{name}.position", "m", "Position of the {block} on the line of {name}", "", *POSITION)', f"{call}[0]")
-                yield Output(f'output("{name}.velocity", "m/s", "Its rate", "", *RATE, rate_of="{name}.position")', f"{call}[1]")
+                yield Output(
+                    f'output("{name}.position", "m", "Position of the {block} on the line of {name}", "", *POSITION)',
+                    f"{call}[0]",
+                )
+                yield Output(
+                    f'output("{name}.velocity", "m/s", "Its rate", "", *RATE, rate_of="{name}.position")', f"{call}[1]"
+                )
         for name, spring in self.description.springs.items():
             if spring.between:
                 free = f" + p.{name}_free_length" if given(spring.free) else ""
-                yield Output(f'output("{name}.length", "m", "Length of {name}", "", *POSITION)', f"s.{name}_stretch{free}")
+                yield Output(
+                    f'output("{name}.length", "m", "Length of {name}", "", *POSITION)', f"s.{name}_stretch{free}"
+                )
             elif name not in self.motion.along and isinstance(self.structure.joints[spring.at], Pin):
                 text = f"Angle of {spring.at} from that at which {name} is free"
                 yield Output(f'output("{spring.at}.turn", "rad", {_quoted(text)}, "", *POSITION)', f"s.{name}_stretch")
@@ -192,7 +204,10 @@ class Package:
                 continue
             line = f"b.{r.joint.name}_line"
             normal = f"{line}.c * f.in_{r.name}.y - {line}.s * f.in_{r.name}.x"
-            yield Output(f'output("{r.name}.force", "N", "Force {of} across the line of {r.joint.name}", role="guide force")', normal)
+            yield Output(
+                f'output("{r.name}.force", "N", "Force {of} across the line of {r.joint.name}", role="guide force")',
+                normal,
+            )
             block = r.joint.bodies[1]
             yield Output(
                 f'output("{r.name}.moment", "N.m", "Moment {of} in {r.joint.name}, about the origin of the {block}")',
@@ -207,7 +222,11 @@ class Package:
 
     def _outputs_function(self) -> Iterator[str]:
         s = "s, " if self.description.springs else ""
-        yield from ("", "", "def outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]:")
+        yield from (
+            "",
+            "",
+            "def outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]:",
+        )
         yield '    """Compute all real outputs, in the order of the interface."""'
         yield from ("    m = motion(x, i, p)", "    f = forces(m, p)", "    b = m.places")
         if s:
@@ -222,7 +241,9 @@ class Package:
         length, drives = size(self.interface), self.interface.drives
         mass = sum(p.value for p in self.interface.parameters if p.unit == "kg") or 1.0
         rates = [f"{'' if d.turns else f'{length!r} * '}speed" for d in drives]
-        speeds = " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns) or "0.0"
+        speeds = (
+            " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns) or "0.0"
+        )
         yield from ("", "", "def error_scale(parameters: object, x: tuple[float, ...]) -> tuple[float, ...]:")
         yield '    """Return magnitudes below which errors are absolute, from the size, the mass and the speed at the start."""'
         yield f"    speed = (1.0 + {speeds}) ** 0.5"
@@ -240,11 +261,23 @@ class Package:
         for name, joint in sliders(self.structure).items():
             holder, block = joint.bodies
             line, start = f"b.{name}_line", f"b.at_{joint.through}"
-            joints.append((f"{name}Block", f"the {block}", f"*(b.{block}_frame.origin.x, b.{block}_frame.origin.y, 0.0)"))
-            joints.append((f"{name}End", f"direction of {name}", f"*({start}.x + {length!r} * {line}.c, {start}.y + {length!r} * {line}.s, 0.0)"))
+            joints.append(
+                (f"{name}Block", f"the {block}", f"*(b.{block}_frame.origin.x, b.{block}_frame.origin.y, 0.0)")
+            )
+            joints.append(
+                (
+                    f"{name}End",
+                    f"direction of {name}",
+                    f"*({start}.x + {length!r} * {line}.c, {start}.y + {length!r} * {line}.s, 0.0)",
+                )
+            )
             along = f'("{name}Block", "{joint.through}", "{name}End")'
             parts.append(f'Part("guide", ("{joint.through}", "{name}End"), "line of {name}")')
-            parts += [f'Part("spring", {along}, "{s}", "{s}.stiffness")' for s, t in d.springs.items() if t.at == name and given(t.stiffness)]
+            parts += [
+                f'Part("spring", {along}, "{s}", "{s}.stiffness")'
+                for s, t in d.springs.items()
+                if t.at == name and given(t.stiffness)
+            ]
             parts.append(f'Part("slider", {along}, "{block}")')
         for own in d.ground:
             if own in self.structure.joints:
@@ -320,7 +353,10 @@ class Package:
             "class Initial:",
             '    """State at the start."""',
             "",
-            *(f"    {name}: float = {value if 'angle' in name or 'position' in name else 0.0!r}" for name, value in initial),
+            *(
+                f"    {name}: float = {value if 'angle' in name or 'position' in name else 0.0!r}"
+                for name, value in initial
+            ),
             "",
             "    def __post_init__(self) -> None:",
             "        check_initial(self)",
@@ -388,14 +424,20 @@ class Package:
         return "\n".join(lines)
 
     def _position_names(self, initial: list[tuple[str, float]]) -> list[str]:
-        placing = [p.name for p in self.interface.parameters if p.unit in ("m", "") or p.name.endswith((".direction", ".ratio", ".phase"))]
+        placing = [
+            p.name
+            for p in self.interface.parameters
+            if p.unit in ("m", "") or p.name.endswith((".direction", ".ratio", ".phase"))
+        ]
         placing = [name for name in placing if ".cog_" not in name and ".free_" not in name]
         return [*placing, *(f"initial.{name}" for name, _ in initial[: len(self.interface.drives)])]
 
     def _drive_text(self) -> str:
         many = sum(bool(e.table) for e in self.interface.drives) > 1
         return ", ".join(
-            f'"{f"{e.name}_speed" if many else "speed"}": {e.speed!r}' for e in self.interface.drives if e.table and e.speed != 0.0
+            f'"{f"{e.name}_speed" if many else "speed"}": {e.speed!r}'
+            for e in self.interface.drives
+            if e.table and e.speed != 0.0
         )
 
     def _freedom_text(self, e: Any) -> str:
@@ -422,13 +464,19 @@ class Package:
             table, prefix = (e.table, f"{e.name}_" if many else "") if e.table else (e.name, f"{e.name}_")
             what = "Torque" if e.turns else "Force"
             channels.append(f'Channel("{table}.{e.load}", "{prefix}{e.load}", "force", {number})')
-            inputs.append(f'Variable("{table}.{e.load}", "input", "{e.load_unit}", "{what} along the freedom {e.name}")')
+            inputs.append(
+                f'Variable("{table}.{e.load}", "input", "{e.load_unit}", "{what} along the freedom {e.name}")'
+            )
             if e.table:
                 channels.append(f'Channel("{table}.speed", "{prefix}speed", "command", {number})')
                 channels.append(f'Channel("{table}.acceleration", "{prefix}acceleration", "rate", {number})')
                 unit = f"{e.unit}/s"
-                inputs.append(f'Variable("{table}.speed", "input", "{unit}", "Commanded rate of {e.name}", "", {e.speed!r}{_display(unit)})')
-                inputs.append(f'Variable("{table}.acceleration", "input", "{unit}2", "Rate of the commanded rate over a step")')
+                inputs.append(
+                    f'Variable("{table}.speed", "input", "{unit}", "Commanded rate of {e.name}", "", {e.speed!r}{_display(unit)})'
+                )
+                inputs.append(
+                    f'Variable("{table}.acceleration", "input", "{unit}2", "Rate of the commanded rate over a step")'
+                )
         for own in self.description.loads:
             for axis in "xy":
                 channels.append(f'Channel("{own}.f{axis}", "{own}_f{axis}", displacement="{own}.{axis}")')
@@ -453,7 +501,11 @@ class Package:
                 turned = [
                     f"initial.{self.interface.drives[step.freedom].name}_angle"
                     for step in self.structure.steps
-                    if isinstance(step, Freed) and step.body == body and isinstance(step.joint, Pin) and bar and own == bar[1]
+                    if isinstance(step, Freed)
+                    and step.body == body
+                    and isinstance(step.joint, Pin)
+                    and bar
+                    and own == bar[1]
                 ]
                 moves = [name for name in found if name in names] + turned
                 if moves:
@@ -509,7 +561,8 @@ def mechanism(description: Description, folder: Path | None = None) -> Mechanism
             (own / name).write_text(text, encoding="utf-8")
     if str(place) not in sys.path:
         sys.path.append(str(place))
-    made: Mechanism = import_module(package.name).MECHANISM
+    importlib.invalidate_caches()
+    made: Mechanism = importlib.import_module(package.name).MECHANISM
     if known is not None:
         if not hasattr(sys.modules[str(known.modules[-1].__package__)], "check_assembly"):
             raise LinkageError(f"there is a mechanism {description.name} already: give the linkage another name")

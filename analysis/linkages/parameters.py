@@ -134,7 +134,8 @@ def interface(description: Description, structure: Structure) -> Interface:
 
     def place(body: str, own: str, at: tuple[float, float]) -> tuple[str, str]:
         x, y = (
-            expression(f"{body}.{own}_{axis}", value, f"Point {own} of the {body}, {axis}") for axis, value in zip("xy", at)
+            expression(f"{body}.{own}_{axis}", value, f"Point {own} of the {body}, {axis}")
+            for axis, value in zip("xy", at)
         )
         return x, y
 
@@ -144,8 +145,12 @@ def interface(description: Description, structure: Structure) -> Interface:
         points[name] = {}
         if body.bar:
             if body.length <= 0.0:
-                raise LinkageError(f"linkage.bodies.{name} is a bar from {body.bar[0]} to {body.bar[1]}: it must have a length")
-            length = expression(f"{name}.length", body.length, f"Length of the {name}, {' to '.join(body.bar)}", "positive")
+                raise LinkageError(
+                    f"linkage.bodies.{name} is a bar from {body.bar[0]} to {body.bar[1]}: it must have a length"
+                )
+            length = expression(
+                f"{name}.length", body.length, f"Length of the {name}, {' to '.join(body.bar)}", "positive"
+            )
             points[name] = {body.bar[0]: ("0.0", "0.0"), body.bar[1]: (length, "0.0")}
         for own, at in body.points.items():
             points[name][own] = place(name, own, at)
@@ -169,14 +174,22 @@ def interface(description: Description, structure: Structure) -> Interface:
         first, second = gear.bodies
         if gear.ratio == 0.0:
             raise ParameterError(f"linkage.gears.{name}.ratio", 0.0, "not be zero")
-        found.append(Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free"))
-        found.append(Parameter(f"{name}.phase", "rad", f"Angle of the {second} where that of the {first} is zero", gear.phase, "free"))
+        found.append(
+            Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
+        )
+        found.append(
+            Parameter(
+                f"{name}.phase", "rad", f"Angle of the {second} where that of the {first} is zero", gear.phase, "free"
+            )
+        )
     by_joint = {drive.joint: drive for drive in drives}
     for name, spring in description.springs.items():
         found += _spring(name, spring, structure, by_joint.get(spring.at))
     if description.gravity:
         found.append(Parameter("gravity", "m/s2", "Acceleration of gravity", description.gravity))
-        found.append(Parameter("ground.gravity_direction", "rad", "Direction of gravity", description.gravity_direction, "free"))
+        found.append(
+            Parameter("ground.gravity_direction", "rad", "Direction of gravity", description.gravity_direction, "free")
+        )
     for dyad in structure.dyads:
         if dyad.assembled:
             sign = description.assembly.get(dyad.inner.name, 1)
@@ -187,7 +200,9 @@ def interface(description: Description, structure: Structure) -> Interface:
     unused = set(description.assembly) - {dyad.inner.name for dyad in structure.dyads if dyad.assembled}
     if unused:
         joints = ", ".join(dyad.inner.name for dyad in structure.dyads if dyad.assembled) or "none here"
-        raise LinkageError(f"linkage.assembly has {', '.join(sorted(unused))}: the joints with two assemblies are {joints}")
+        raise LinkageError(
+            f"linkage.assembly has {', '.join(sorted(unused))}: the joints with two assemblies are {joints}"
+        )
     _check_names(found)
     return Interface(tuple(found), drives, points, centres)
 
@@ -210,14 +225,22 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
     """Yield the parameters of a spring, those that are given."""
     where = f"linkage.springs.{name}"
     if bool(spring.between) == bool(spring.at):
-        raise LinkageError(f"{where} is between {spring.between or 'nothing'} and at {spring.at or 'nothing'}: it must have one")
+        raise LinkageError(
+            f"{where} is between {spring.between or 'nothing'} and at {spring.at or 'nothing'}: it must have one"
+        )
     joint = structure.joints.get(spring.at)
     if spring.at and (joint is None or len(joint.bodies) != 2):
         names = ", ".join(n for n, j in structure.joints.items() if len(j.bodies) == 2)
         raise LinkageError(f"{where} is at {spring.at}: it must be at a joint of two bodies, {names}")
     about = isinstance(joint, Pin)
     kind, unit = ("angle", "rad") if about else ("length" if spring.between else "position", "m")
-    of = f"{name}.length" if spring.between else drive.coordinate if drive else f"{spring.at}.{'turn' if about else 'position'}"
+    of = (
+        f"{name}.length"
+        if spring.between
+        else drive.coordinate
+        if drive
+        else f"{spring.at}.{'turn' if about else 'position'}"
+    )
     rows = (
         ("stiffness", spring.stiffness, "N.m/rad" if about else "N/m", f"Stiffness of {name}", "", "stiffness"),
         ("damping", spring.damping, "N.m.s/rad" if about else "N.s/m", f"Viscous damping of {name}", "", "damping"),
@@ -227,7 +250,9 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
     for own, value, in_unit, text, rule, role in rows:
         if value != 0 or not isinstance(value, int):
             number = Quantity(in_unit, **({} if rule else {"least": 0.0}))(value, f"{where}.{own}")
-            yield Parameter(f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else "")
+            yield Parameter(
+                f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else ""
+            )
 
 
 def _check_names(found: list[Parameter]) -> None:
@@ -235,7 +260,9 @@ def _check_names(found: list[Parameter]) -> None:
     names = [parameter.name for parameter in found]
     for name in names:
         if names.count(name) > 1:
-            raise LinkageError(f"two parameters are called {name}: bodies, joints and springs must have names of their own")
+            raise LinkageError(
+                f"two parameters are called {name}: bodies, joints and springs must have names of their own"
+            )
 
 
 def size(found: Interface) -> float:

@@ -147,7 +147,9 @@ def joints(description: Description) -> dict[str, Joint]:
     found |= lines
     for body in description.bodies:
         if not any(body in joint.bodies for joint in found.values()):
-            raise LinkageError(f"the body {body} is joined to nothing: it must share a point with another, or slide on one")
+            raise LinkageError(
+                f"the body {body} is joined to nothing: it must share a point with another, or slide on one"
+            )
     return found
 
 
@@ -193,7 +195,9 @@ def analyse(description: Description) -> Structure:
     steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
     if left:
         others = _choices(description, found, count)
-        hint = "; these joints as freedoms would do: " + " or ".join(" and ".join(o) for o in others[:3]) if others else ""
+        hint = (
+            "; these joints as freedoms would do: " + " or ".join(" and ".join(o) for o in others[:3]) if others else ""
+        )
         raise LinkageError(
             f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: their "
             f"places do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"

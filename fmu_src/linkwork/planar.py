@@ -14,7 +14,7 @@ Throughout u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90 de
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import atan2, cos, degrees, asin, fabs, sin, sqrt
+from math import asin, atan2, cos, degrees, fabs, sin, sqrt
 from typing import Any, NamedTuple
 
 from .errors import AssemblyError
@@ -388,9 +388,7 @@ def accelerations(matrix: Matrix, forces: Rates, held: Rates, given: Rates) -> t
     """Solve for the accelerations of the freedoms, where ``held`` is 1 for those that are given and 0 for the others."""
     n = range(len(forces))
     free = [1.0 - h for h in held]
-    rows = tuple(
-        tuple(free[i] * free[j] * matrix[i][j] + (held[i] if i == j else 0.0) for j in n) for i in n
-    )
+    rows = tuple(tuple(free[i] * free[j] * matrix[i][j] + (held[i] if i == j else 0.0) for j in n) for i in n)
     right = tuple(
         free[i] * (forces[i] - sum(matrix[i][j] * held[j] * given[j] for j in n)) + held[i] * given[i] for i in n
     )

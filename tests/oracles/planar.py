@@ -154,14 +154,20 @@ class Multipliers:
     ) -> Solution:
         """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations."""
         jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
-        drift = casadi.jtimes(casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v)
+        drift = casadi.jtimes(
+            casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
+        )
         kinetic = casadi.SX(0)
         for n, name in enumerate(self.bodies):
             body = self.d.bodies[name]
             vx, vy = (casadi.jtimes(c, self.q, self.v) for c in self.centre(name))
             kinetic += 0.5 * (body.mass or 0.0) * (vx**2 + vy**2) + 0.5 * (body.inertia or 0.0) * self.v[3 * n + 2] ** 2
         momentum = casadi.gradient(kinetic, self.v)
-        force = casadi.gradient(kinetic, self.q) - casadi.jtimes(momentum, self.q, self.v) - casadi.gradient(self.potential(), self.q)
+        force = (
+            casadi.gradient(kinetic, self.q)
+            - casadi.jtimes(momentum, self.q, self.v)
+            - casadi.gradient(self.potential(), self.q)
+        )
         for s in self.d.springs.values():
             measure = self.stretch(s)
             force -= float(s.damping) * casadi.jtimes(measure, self.q, self.v) * casadi.gradient(measure, self.q)
