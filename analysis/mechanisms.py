@@ -90,6 +90,10 @@ def _faults_of_interface(m: Mechanism) -> Iterator[str]:
     for name in m.position_parameters:
         if name not in names:
             yield f"there is no parameter {name}"
+    for link in m.links:
+        for name in (link.length, link.mass, link.inertia, *link.centre):
+            if name not in names or not name.startswith(f"{link.name}."):
+                yield f"the link {link.name} has {name!r}: it must be one of its parameters"
     if not isinstance(getattr(m.parameters, "RULES", None), Rules):
         yield f"{m.parameters.__name__} has no RULES: it must have an attribute of that name, a linkwork.parameters.Rules"
     for what, wanted, there in (

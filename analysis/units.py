@@ -30,6 +30,7 @@ _PINT = {
     "1": "dimensionless",
     "N.m": "N*m",
     "kg.m2": "kg*m**2",
+    "kg/m3": "kg/m**3",
     "m/s2": "m/s**2",
     "rad/s2": "rad/s**2",
     "N.s/m": "N*s/m",

@@ -344,18 +344,21 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """Return the case of a file or of a published set, with the changes of ``--set``."""
-    from ..run import case_from, load_case, published_case
+    from ..run import case_from, in_sentences, load_case, published_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
     overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
     if file is not None:
         check_kind(file, RUN, PARAMETERS)
-        return load_case(file, overrides)
-    assert published is not None
-    if overrides:
-        return case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
-    return published_case(published)
+        case = load_case(file, overrides)
+    elif overrides:
+        case = case_from({"published": published}, folder=Path.cwd(), title=str(published), overrides=overrides)
+    else:
+        case = published_case(str(published))
+    for warning in in_sentences(case.masses)[1]:
+        print_error(f"note: {warning}")
+    return case
 
 
 def say(text: str) -> None:

@@ -54,6 +54,16 @@ _WISH: Mapping[str, Any] = {
 }
 
 
+#: The section of the links of a new case: their masses follow from it.
+_SECTION = {"kind": "bar", "width": "30 mm", "thickness": "8 mm", "material": "steel"}
+_OF_SECTIONS = """\
+# Masses, centres of mass and moments of inertia of {links} follow from their lengths and sections: say
+# what yours are made of, or give the numbers behind a # instead. A weighed mass may stand beside a section.
+{kinds}
+#   materials: {materials}, or a density such as "7.85 g/cm3"; overhang: material beyond each pin
+# All other numbers, such as {other}, are those of {source}: give your own."""
+
+
 def kinds() -> dict[str, str]:
     """Return the kinds of files that `linkwork new` writes, each with the command that reads it."""
     runs = dict.fromkeys(MECHANISMS, "linkwork run")
@@ -98,20 +108,50 @@ def _value(variable: Any, value: Any) -> Any:
     return float(value) if variable.unit == "1" else in_words(value, variable.unit)
 
 
-def _parameter_rows(mechanism: Mechanism) -> dict[str, str]:
-    """Return the rows of the parameters of the first published set."""
+def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
+    """Return the rows of the parameters of the first published set; with ``sections`` these give the masses of links."""
     from ..files import line
+    from ..run import parameters_from
 
     made = next(iter(mechanism.published.values())).parameters
-    return {
-        name: line(name.rpartition(".")[2], _value(v, getattr(made, field_name(name))), v.description, active=True)
+    rows = {}
+    computed = set()
+    for link in mechanism.links if sections else ():
+        computed |= {link.mass, link.inertia, *link.centre}
+        rows[f"{link.name}.section"] = line("section", _SECTION, "", active=True)
+        made = parameters_from({f"{link.name}.section": _SECTION}, made)
+    return rows | {
+        name: line(
+            name.rpartition(".")[2],
+            _value(v, getattr(made, field_name(name))),
+            v.description,
+            active=name not in computed,
+        )
         for name, v in mechanism.mechanism_variables.items()
     }
 
 
+def _whose_masses(mechanism: Mechanism) -> str:
+    """Say where the numbers of a new case come from."""
+    from ..run import SECTIONS
+    from ..sections import DENSITIES
+
+    own = {link.mass for link in mechanism.links}
+    other = [v.name for v in mechanism.mechanism_variables.values() if v.unit in ("kg", "N/m") and v.name not in own]
+    return _OF_SECTIONS.format(
+        links=", ".join(link.name for link in mechanism.links),
+        kinds="\n".join(f"#   {kind}: {', '.join(table.readers)}" for kind, table in SECTIONS.items()),
+        materials=", ".join(DENSITIES),
+        other=", ".join(other),
+        source=next(iter(mechanism.published.values())).source,
+    )
+
+
 def _parameters(mechanism: Mechanism) -> Iterator[str]:
+    source = next(iter(mechanism.published.values())).source
+    yield f"# All numbers, masses too, are those of {source}: give your own."
     yield f'mechanism = "{mechanism.name}"'
-    yield from _grouped(_parameter_rows(mechanism))
+    yield from _grouped(_parameter_rows(mechanism, sections=False))
 
 
 def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
@@ -126,9 +166,11 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     of_torques = set(signal_kinds("N.m", Path())) - set(signal_kinds("N", Path()))
     for kind, table in signal_kinds("N.m", Path()).items():
         yield f"#   {kind}{' (of torques)' if kind in of_torques else ''}: {', '.join(table.readers)}"
+    if mechanism.links:
+        yield _whose_masses(mechanism)
     yield f'mechanism = "{mechanism.name}"'
     yield line("title", Path(file).stem, "of tables and pictures", active=True)
-    rows = _parameter_rows(mechanism)
+    rows = _parameter_rows(mechanism, sections=True)
     start = mechanism.initial()
     for name, v in mechanism.initial_variables.items():
         value = getattr(published.initial, name)

@@ -95,7 +95,7 @@ def run(
     """
     from .. import figures
     from ..files import save_figure
-    from ..run import INTERFACES, RunInterrupted, cosimulate, simulate
+    from ..run import INTERFACES, RunInterrupted, cosimulate, in_sentences, simulate
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
@@ -123,6 +123,7 @@ def run(
     if plot and len(result) > 1:
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
+    say(in_sentences(chosen.masses)[0])
     print_written(written)
     if fmu is not None and interface == INTERFACES[0] and not chosen.inputs.held_exactly:
         print_error(
@@ -368,7 +369,7 @@ def info(what: str | None) -> None:
     from ..files import read_tables
     from ..mechanisms import MECHANISMS
     from ..numerics.cache import cache_root
-    from ..run import load_case, load_parameters
+    from ..run import in_sentences, load_case, load_parameters
 
     if what is None:
         kinds = [(m.name, m.title, f"{m.fmu}.fmu") for m in MECHANISMS.values()]
@@ -390,6 +391,7 @@ def info(what: str | None) -> None:
         else:
             case = load_case(what)
             _print_parameters(case.title, case.parameters)
+            say(in_sentences(case.masses)[0])
     else:
         raise unknown(what, (*MECHANISMS, *PUBLISHED), f"mechanism, published set, case file or FMU {what!r}")
 

@@ -84,7 +84,7 @@ def _open(address: str) -> None:
 
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
-    from ..files import read_tables
+    from ..files import read_tables, unknown_name
     from ..run import case_from, load_case
     from ..studio import opening_state, state_of
 
@@ -95,7 +95,7 @@ def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
     if what in PUBLISHED:
         return state_of(case_from({"published": what}, folder=Path.cwd(), title=what, overrides=overrides))
     if not Path(what).is_file():
-        raise click.UsageError(f"{what!r} is no file, and no published set: {', '.join(PUBLISHED)}")
+        raise unknown_name(what, PUBLISHED, f"file or published set {what!r}")
     check_kind(what, RUN, PARAMETERS)
     tables = read_tables(what)
     if "run" not in tables and not any(name.startswith("run.") for name in overrides):

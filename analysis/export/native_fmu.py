@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import platform as machine
+import shutil
 import struct
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import check
-from ..numerics.cache import code_folder
+from ..numerics.cache import code_folder, hashes_below, keep_hashes, read_hashes
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals
@@ -163,6 +164,8 @@ def compile_library(
 ) -> None:
     """Compile C files of a folder to a library in it.
 
+    What Zig compiles for itself, such as the C library, is kept with hashes and compiled again if a file has changed.
+
     Raises
     ------
     BuildError
@@ -171,22 +174,27 @@ def compile_library(
         If Zig is not installed.
     """
     require("ziglang")
-    cache = code_folder("zig")
-    known = cache / f"{target}.known"
+    cache = code_folder(f"zig-{target}")
+    known, kept = cache / "hashes", read_hashes(cache / "hashes")
+    found = hashes_below(cache / "o")
+    if any(found.get(name) != digest for name, digest in kept.items()):
+        sys.stderr.write(f"linkwork: {cache}: a file has changed or is gone: all are compiled again\n")
+        shutil.rmtree(cache)
+        cache.mkdir(mode=0o700)
     if not known.is_file():
         sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
-    environment = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
-    done = subprocess.run(
-        [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, "-lm"],
-        cwd=folder,
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    with tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
+        done = subprocess.run(
+            [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, "-lm"],
+            cwd=folder,
+            env=os.environ | {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": own},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     if done.returncode != 0:
         raise BuildError(f"{library} cannot be compiled for {target}:\n{done.stderr}")
-    known.touch()
+    keep_hashes(known, hashes_below(cache / "o"))
 
 
 def _universal(parts: Sequence[bytes]) -> bytes:

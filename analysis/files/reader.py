@@ -17,7 +17,6 @@ linkwork.errors.UnknownNameError: there is no bar.hoels; did you mean bar.holes?
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
@@ -33,10 +32,8 @@ Made = TypeVar("Made")
 
 
 def unknown_name(name: str, known: Iterable[str], words: str | None = None) -> UnknownNameError:
-    """Return the error for a name that is not among those known, with the nearest one; ``words`` replace the name in it."""
-    names = tuple(known)
-    near = difflib.get_close_matches(name, names, n=1)
-    return UnknownNameError(words or name, names, near[0] if near else None)
+    """Return the error for a name that is not among those known, with the nearest ones; ``words`` replace the name in it."""
+    return UnknownNameError(name, tuple(known), words or "")
 
 
 def entry(reader: Reader, default: Any = MISSING, *, factory: Any = MISSING, key: str = "") -> Any:
@@ -223,7 +220,7 @@ class Choice:
     def __call__(self, value: Any, name: str) -> str:
         names = tuple(self.names)
         if not isinstance(value, str):
-            raise ParameterError(name, value, f"be one of {', '.join(names)}")
+            raise ParameterError(name, value, f"be one of {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}")
         if value not in names:
             raise unknown_name(value, names, f"{name} {value!r}")
         return value

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -34,6 +37,38 @@ def code_folder(name: str) -> Path:
     if _usable(folder) and _ours(folder, user):
         return folder
     return Path(tempfile.mkdtemp(prefix="linkwork-"))
+
+
+def keep(path: Path, content: bytes) -> None:
+    """Write a file of the cache, complete or not at all; where the disk is full or read-only it is made again the next time."""
+    part = path.with_suffix(f".{os.getpid()}")
+    with suppress(OSError):
+        try:
+            part.write_bytes(content)
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def hashes_below(folder: Path) -> dict[str, str]:
+    """Return the hash of every file below a folder, by its path in the folder."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def keep_hashes(path: Path, hashes: Mapping[str, str]) -> None:
+    """Write the hashes of files to a list, one a line as `sha256sum` does, if the list has others."""
+    content = "".join(f"{digest}  {name}\n" for name, digest in hashes.items()).encode()
+    if not path.is_file() or path.read_bytes() != content:
+        keep(path, content)
+
+
+def read_hashes(path: Path) -> dict[str, str]:
+    """Return what `keep_hashes` wrote; nothing if there is no such file."""
+    with suppress(OSError):
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    return {}
 
 
 @cache

@@ -16,7 +16,6 @@ import ctypes
 import ctypes.util
 import errno
 import hashlib
-import os
 import shutil
 import sys
 import warnings
@@ -40,7 +39,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from linkwork.errors import LinkworkError
 
 from . import linking
-from .cache import code_folder
+from .cache import code_folder, keep
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -122,14 +121,7 @@ def _kept(key: str, make: Callable[[], bytes]) -> bytes:
         if hashlib.sha256(code).digest() == digest:
             return code
     code = make()
-    # where the disk is full or read-only, it is compiled again the next time
-    part = path.with_suffix(f".{os.getpid()}")
-    with suppress(OSError):
-        try:
-            part.write_bytes(hashlib.sha256(code).digest() + code)
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
+    keep(path, hashlib.sha256(code).digest() + code)
     return code
 
 
@@ -364,7 +356,7 @@ class Kernel:
                         return self._compiled
                     if not any(folder.glob("**/*.nb[ic]")):
                         raise
-                    # Numba raises any kind of error for a damaged file
+                    # an error of `linking`, or of any kind where a file is too short
                     warnings.warn(
                         f"the compiled code in {folder} is damaged ({error!r}): it is compiled again",
                         RuntimeWarning,
@@ -382,10 +374,14 @@ class Kernel:
             numba.config.CACHE_DIR = str(folder)
         try:
             with _announced(self.purpose):
-                return njit(
-                    *self.signature, cache=folder is not None, error_model="numpy", nogil=True, no_cfunc_wrapper=True,
-                    pipeline_class=linking.KernelCompiler,
-                )(self.py_func)  # fmt: skip
+                made = njit(
+                    error_model="numpy", nogil=True, no_cfunc_wrapper=True, pipeline_class=linking.KernelCompiler
+                )(self.py_func)
+                if folder is not None:
+                    linking.keep(made)
+                made.compile(*self.signature)
+                made.disable_compile()
+                return made
         finally:
             numba.config.CACHE_DIR = before
 

@@ -2,18 +2,26 @@
 
 By default Numba optimises each function with all that it calls, makes machine code of it, and does the same again for its
 caller. Where Python calls only the kernel, nobody uses the code of the inner functions, and it takes a third of the time. Numba
-has no public option for this: the classes below override private ones, hence the upper bound of its version.
+has no public option for this: the classes below override private ones, hence the upper bound of its version. Nor does it
+notice that a bit of machine code on disk has changed: here every file ends with a hash of its bytes.
 """
 
 from __future__ import annotations
 
 import ctypes
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
+from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 
 _HASH = hash(Flags())
+_DIGEST = sha256().digest_size
 _ALIVE: list[Any] = []
 
 
@@ -57,3 +65,36 @@ class PartCompiler(KernelCompiler):
 
     def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
         super().__init__(typing_context, context, library or _Part(context.codegen(), "part"), *rest)
+
+
+class _Files(IndexDataCacheFile):
+    """Files of a kernel's machine code, each with a hash of its bytes at its end, which is checked before Numba reads it."""
+
+    @contextmanager
+    def _open_for_write(self, path: str) -> Iterator[io.BytesIO]:
+        with super()._open_for_write(path) as file:
+            yield (content := io.BytesIO())
+            file.write(content.getvalue() + sha256(content.getvalue()).digest())
+
+    def _load_index(self) -> Any:
+        if Path(self._index_path).exists():
+            _check(Path(self._index_path))
+        return super()._load_index()
+
+    def _load_data(self, name: str) -> Any:
+        _check(Path(self._data_path(name)))
+        return super()._load_data(name)
+
+
+def _check(path: Path) -> None:
+    """Raise ValueError if the hash at the end of a file is not that of its bytes; Numba ignores the hash."""
+    content = path.read_bytes()
+    if sha256(content[:-_DIGEST]).digest() != content[-_DIGEST:]:
+        raise ValueError(f"the bytes of {path.name} do not have their hash")
+
+
+def keep(dispatcher: Any) -> None:
+    """Keep the machine code of a dispatcher in files of Numba's cache folder, with hashes."""
+    dispatcher.enable_caching()
+    file = dispatcher._cache._cache_file
+    file.__class__ = _Files

@@ -12,7 +12,9 @@ import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from linkwork.errors import InputError, LinkworkError
@@ -33,6 +35,8 @@ _Found = tuple[int, Any, Exception | None]
 _WATCHED: set[int] = set()
 #: Seconds between two checks that the caller is alive.
 _INTERVAL = 0.5
+#: Seconds without a result after which the scheduler of a cluster is asked whether it is there, and that it has to answer.
+_PATIENCE = 60.0
 
 
 class WorkersLost(LinkworkError):
@@ -91,14 +95,14 @@ def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
     return not _workers(n_jobs, threads)[1]
 
 
-def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool]:
-    """Return the number of workers, and whether they are other processes."""
+def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool, Any]:
+    """Return the number of workers, whether they are other processes, and the backend of joblib."""
     import joblib
 
     check_jobs(n_jobs)
     backend, default = joblib.parallel.get_active_backend(prefer="threads" if threads else None)
     count = int(backend.effective_n_jobs((default or 1) if n_jobs is None else n_jobs))
-    return count, count > 1 and not getattr(backend, "supports_sharedmem", False)
+    return count, count > 1 and not getattr(backend, "supports_sharedmem", False), backend
 
 
 def over_workers(
@@ -126,14 +130,15 @@ def over_workers(
     Raises
     ------
     WorkersLost
-        If workers were killed more than `RETRIES` times, or fail otherwise.
+        If workers were killed more than `RETRIES` times, or fail otherwise, or the scheduler of a cluster does not answer. A
+        part that ends every worker of a cluster is named, after the others have been yielded.
 
     Notes
     -----
     Processes of this machine pass large results in files: if a sender is killed in the middle of a message, joblib waits for
     ever for the rest.
     """
-    count, elsewhere = _workers(n_jobs, threads)
+    count, elsewhere, backend = _workers(n_jobs, threads)
     listening = Heard() if heard is None else heard
     todo = dict(enumerate(items))
     with (
@@ -141,7 +146,12 @@ def over_workers(
     ) as folder:
         for attempt in range(RETRIES + 1):
             tasks = [(work, number, item, os.getpid(), folder) for number, item in todo.items()]
-            results = _in_processes(tasks, n_jobs) if elsewhere else _here(tasks, count)
+            if not elsewhere:
+                results = _here(tasks, count)
+            elif hasattr(backend, "client"):
+                results = _in_cluster(tasks, backend)
+            else:
+                results = _in_processes(tasks, n_jobs)
             try:
                 while todo:
                     listening.waiting = elsewhere
@@ -166,7 +176,11 @@ def over_workers(
                 raise
             except BrokenExecutor as error:
                 if attempt == RETRIES:
-                    raise WorkersLost(f"workers were killed {attempt + 1} times, as where memory runs out") from error
+                    numbers = ", ".join(str(number + 1) for number in list(todo)[:5])
+                    raise WorkersLost(
+                        f"workers were killed {attempt + 1} times, as where memory runs out: {len(todo)} of {len(items)} "
+                        f"parts are not done, {numbers}{' ...' if len(todo) > 5 else ''}"
+                    ) from error
                 warnings.warn(
                     f"a worker was killed: {len(todo)} of {len(items)} parts are given out again",
                     RuntimeWarning,
@@ -187,8 +201,62 @@ def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Any:
 
     # small results in one batch would make a large message
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered", batch_size=1)
-    # as one tuple: Dask would keep a large argument on one worker only, and lose it with that worker
     return parallel(joblib.delayed(_one)(task) for task in tasks)
+
+
+def _in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, None]:
+    """Yield what the workers of a Dask cluster send, as it comes; joblib would wait for ever for a part that ends its worker.
+
+    Raises WorkersLost for such a part when the others are done, and if the scheduler does not answer or has no worker.
+    """
+    suspects = yield from _round(tasks, backend)
+    # a cluster gives up parts that waited on a worker that was killed, too: one after the other it is clear which it was
+    guilty = suspects if len(suspects) < 2 else []
+    for task in suspects[len(guilty) :]:
+        guilty += yield from _round([task], backend)
+    if guilty:
+        numbers = ", ".join(str(number + 1) for _, number, *_ in guilty)
+        raise WorkersLost(
+            f"every worker that began part {numbers} of {len(tasks)} was killed, as where memory runs out"
+        )
+
+
+def _round(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, list[_Task]]:
+    """Yield the results of tasks given to a cluster; return the tasks that it gave up as their workers were killed."""
+    client, done = backend.client, SimpleQueue[Any]()
+    # as one tuple: Dask would keep a large argument on one worker only, and lose it with that worker
+    futures = {client.submit(_one, task, pure=False, **backend.submit_kwargs): task for task in tasks}
+    for future in futures:
+        future.add_done_callback(done.put)
+    given_up = []
+    try:
+        for _ in tasks:
+            future = _patiently(client, partial(done.get, timeout=_PATIENCE))
+            error = _patiently(client, partial(future.exception, timeout=_PATIENCE))
+            if type(error).__name__ == "KilledWorker":
+                given_up.append(futures[future])
+            elif error is not None:
+                raise error
+            else:
+                yield _patiently(client, partial(future.result, timeout=_PATIENCE))
+    finally:
+        with suppress(Exception):  # of a scheduler that is gone
+            client.cancel(list(futures))
+    return given_up
+
+
+def _patiently(client: Any, wait: Callable[[], Any]) -> Any:
+    """Return what ``wait`` waits for, as long as the scheduler of a cluster answers and has workers."""
+    while True:
+        try:
+            return wait()
+        except (Empty, TimeoutError):
+            try:
+                workers = client.sync(client.scheduler.identity, callback_timeout=_PATIENCE)["workers"]
+            except Exception as error:
+                raise WorkersLost(f"the scheduler of the cluster has not answered for {_PATIENCE:g} s") from error
+            if not workers:
+                raise WorkersLost(f"the cluster has had no worker for {_PATIENCE:g} s") from None
 
 
 def _here(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:

@@ -48,6 +48,11 @@ from .inputs import Inputs as Inputs
 from .inputs import align as align
 from .inputs import encode as encode
 from .inputs import given as given
+from .masses import SECTIONS as SECTIONS
+from .masses import Mass as Mass
+from .masses import in_sentences as in_sentences
+from .masses import mass_origins as mass_origins
+from .masses import with_sections as with_sections
 from .prepared import outputs_of as outputs_of
 from .sampling import sample as sample
 from .signals import MOTOR as MOTOR

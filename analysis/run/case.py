@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from .arguments import driven, published_set, turn_durations
 from .inputs import Inputs, given
+from .masses import Mass, mass_origins
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,6 +24,8 @@ class Case:
     step : float
         Distance of the samples, and communication step of the FMU (s).
     tolerance : float
+    masses : tuple of Mass
+        Where the masses come from; empty if it is not known.
     """
 
     title: str
@@ -32,6 +35,7 @@ class Case:
     stop_time: float
     step: float = 1e-3
     tolerance: float = 1e-9
+    masses: tuple[Mass, ...] = ()
 
     def __post_init__(self) -> None:
         # inputs and start of another mechanism are refused here, not when it is run
@@ -62,4 +66,5 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
         inputs=inputs,
         stop_time=stop_time,
         step=step,
+        masses=mass_origins(entry.parameters, {}, entry.parameters, name),
     )

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
+from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
@@ -25,6 +25,7 @@ from ..units import with_unit
 from .arguments import driven, turn_durations
 from .case import Case
 from .inputs import Inputs, parameter_readers, start_from
+from .masses import mass_origins, resolve_sections
 from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
 
 # Parameters
@@ -34,6 +35,8 @@ def parameters_from(
     data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism | None = None
 ) -> Parameters:
     """Read parameters from nested tables or dotted names; missing ones are taken from ``base``.
+
+    The ``section`` of a link gives its mass, its centre of mass and its moment of inertia; see `docs/case-files.md`.
 
     Parameters
     ----------
@@ -53,8 +56,9 @@ def parameters_from(
         raise ParameterError("mechanism", data["mechanism"], f"be {mechanism.name}")
     data = {name: value for name, value in data.items() if name != "mechanism"}
     keys = {field_name(name): name for name in mechanism.mechanism_variables}
+    flat = resolve_sections(mechanism, files.flattened(data), base)
     made: Parameters = files.read(
-        mechanism.parameters, files.flattened(data), "", readers=parameter_readers(mechanism), keys=keys, base=base
+        mechanism.parameters, flat, "", readers=parameter_readers(mechanism), keys=keys, base=base
     )
     return made
 
@@ -192,7 +196,14 @@ def case_from(
     acting = acting_on(mechanism)
     data = files.overridden(_without_rivals(data, overrides or {}, mechanism, acting), overrides or {})
     own, found = _divided(data, mechanism, acting, folder)
-    parameters = parameters_from(own, None if published is None else published.parameters, mechanism)
+    printed = None if published is None else published.parameters
+    try:
+        parameters = parameters_from(own, printed, mechanism)
+    except UnknownNameError as error:
+        if not set(mechanism.mechanism_variables) <= set(error.known):  # of a part, such as a kind of section
+            raise
+        others = (*acting, *(f"run.{name}" for name in files.entry_names(RunTable)), *COMMON[:-2])
+        raise files.unknown_name(error.name, (*error.known, *others)) from None
     base = None if published is None or published.at_rest else published.initial
     initial = start_from(mechanism, data.get("initial", {}), base)
     inputs = Inputs(**found)
@@ -209,6 +220,7 @@ def case_from(
         stop_time=stop_time,
         step=step,
         tolerance=run.tolerance,
+        masses=mass_origins(parameters, files.flattened(own), printed, str(named.get("published", ""))),
     )
 
 

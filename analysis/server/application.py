@@ -16,6 +16,7 @@ from urllib.parse import parse_qs
 
 from linkwork.errors import InputError
 
+from ..files import unknown_name
 from ..libraries import MissingLibraryError
 from ..synthesis import Kind
 from .worker import Busy, Worker
@@ -26,11 +27,21 @@ try:
 except ImportError as error:
     raise MissingLibraryError("waitress") from error
 
-#: The only address that is listened at; bytes of a request's body and of its head, at most; seconds of silence after which a
-#: connection is closed; connections at a time.
-ADDRESS, BODY, HEAD, SILENCE, CONNECTIONS = "127.0.0.1", 512_000, 16_000, 30, 32
+#: The only address that is listened at; bytes of a request's body and of its head, at most; connections at a time, below the
+#: 512 that Windows can wait for.
+ADDRESS, BODY, HEAD, CONNECTIONS = "127.0.0.1", 512_000, 16_000, 400
+#: Seconds of silence after which a connection is closed, and where more than half of all are open.
+SILENCE, SHORT_SILENCE = 30.0, 2.0
 #: Where the page sends its token.
 TOKEN = "X-Linkwork-Token"
+#: Kinds of jobs: the names of `jobs.JOBS`, whose import takes a second.
+JOB_KINDS = ("linkages", "slider", "tune", "run", "export")
+_LOST = "the token is missing or wrong: open the address that linkwork studio printed"
+#: Served in the place of the page where the address has no token: the page moves it from there to the browser's storage.
+_LOST_PAGE = f"""<!doctype html><html lang="en"><meta charset="utf-8"><title>linkwork studio</title><p>{_LOST}</p><script>
+const token = localStorage.getItem("linkwork-token");
+if (token && !location.search) location.replace(`/?token=${{encodeURIComponent(token)}}${{location.hash}}`);
+</script></html>"""
 #: How the page knows that there is a server, and what kinds of linkages it searches.
 _MARK = f'<meta name="linkwork-server" content="{" ".join(get_args(Kind))}">'
 
@@ -80,7 +91,8 @@ class Application:
         #: Hosts that are this server, known once it listens.
         self.hosts: tuple[str, ...] = ()
         self.page = page.replace("<title>", f"{_MARK}\n<title>", 1).encode()
-        self._policy = _POLICY.format(_hashes(page))
+        self._lost = _LOST_PAGE.encode()
+        self._policy = _POLICY.format(_hashes(page + _LOST_PAGE))
         self._places: dict[str, dict[str, Callable[[Mapping[str, Any]], tuple[HTTPStatus, bytes]]]] = {
             "/": {"GET": self._page},
             "/job": {"GET": self._look, "POST": self._give, "DELETE": self._cancel},
@@ -92,7 +104,7 @@ class Application:
             status, body = self._served(environ)
         except _Refused as refused:
             status, body = refused.status, _json({"sentence": refused.sentence})
-        page = body is self.page
+        page = body is self.page or body is self._lost
         headers.append(("Content-Type", "text/html; charset=utf-8" if page else "application/json"))
         headers.append(("Content-Security-Policy", self._policy if page else "default-src 'none'"))
         headers.append(("Content-Length", str(len(body))))
@@ -119,9 +131,9 @@ class Application:
         if served is None:
             raise _Refused(HTTPStatus.METHOD_NOT_ALLOWED, f"this place takes {', '.join(self._places[place])}")
         if not secrets.compare_digest(self._token(environ).encode(), self.token.encode()):
-            raise _Refused(
-                HTTPStatus.UNAUTHORIZED, "the token is missing or wrong: open the address that linkwork studio printed"
-            )
+            if place == "/":
+                return HTTPStatus.UNAUTHORIZED, self._lost
+            raise _Refused(HTTPStatus.UNAUTHORIZED, _LOST)
         return served(environ)
 
     def _token(self, environ: Mapping[str, Any]) -> str:
@@ -148,6 +160,8 @@ class Application:
         kind = request.get("kind") if isinstance(request, dict) else None
         if not isinstance(kind, str):
             raise _Refused(HTTPStatus.BAD_REQUEST, "this is no job: it has no kind")
+        if kind not in JOB_KINDS:
+            raise _Refused(HTTPStatus.BAD_REQUEST, str(unknown_name(kind, JOB_KINDS, f"job {kind!r}")))
         try:
             return HTTPStatus.ACCEPTED, _json(self.worker.give(kind, request))
         except Busy as error:
@@ -204,11 +218,11 @@ class Server:
             ident=None,
             threads=4,
             connection_limit=CONNECTIONS,
-            channel_timeout=SILENCE,
-            cleanup_interval=SILENCE // 3,
+            cleanup_interval=1,
             max_request_body_size=BODY,
             max_request_header_size=HEAD,
         )
+        self._server.maintenance = self._close_silent
         self.port = int(listening.getsockname()[1])
         self.application.hosts = hosts_of(self.port)
 
@@ -229,6 +243,13 @@ class Server:
     def stop(self) -> None:
         """End `run`."""
         self._server.trigger.pull_trigger(self._close)
+
+    def _close_silent(self, now: float) -> None:
+        """Close connections that have said nothing for some time and wait for no answer; waitress calls this each second."""
+        silence = SILENCE if len(self._sockets) < CONNECTIONS // 2 else SHORT_SILENCE
+        for channel in self._server.active_channels.values():
+            if not channel.requests and channel.last_activity < now - silence:
+                channel.will_close = True
 
     def _close(self) -> None:
         wasyncore.close_all(self._sockets, ignore_all=True)

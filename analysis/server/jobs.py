@@ -14,7 +14,7 @@ from typing import Any
 from linkwork.errors import InputError
 
 from ..export import KINDS, NATIVE, PLATFORMS, PYTHON, build, build_native, kinds_here, this_platform, with_starts
-from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text, unknown_name
+from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text
 from ..mechanisms import mechanism_of
 from ..periodic import drive_of, of_the_motor
 from ..run import Case, cosimulate
@@ -62,8 +62,6 @@ def do(kind: str, request: Mapping[str, Any]) -> Answer:
     LinkworkError
         Of whatever kind the job has.
     """
-    if kind not in JOBS:
-        raise unknown_name(kind, JOBS, f"job {kind!r}")
     wanted, work = JOBS[kind]
     state = request.get("state")
     if not isinstance(state, Mapping):

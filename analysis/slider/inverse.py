@@ -24,6 +24,7 @@ from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
+from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
 from ..run import at_its_speed, outputs_of, takes_published
@@ -101,7 +102,7 @@ class SliderDrive:
 
     def __getitem__(self, name: str) -> FloatArray:
         if name not in NAMES:
-            raise InputError(f"a prescribed motion has no output {name!r}: it has {', '.join(NAMES)}")
+            raise unknown_name(name, NAMES, f"output {name!r} of a prescribed motion")
         return self.values[:, NAMES.index(name)]
 
     def pin_force(self, pin: str) -> FloatArray:

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from linkwork.errors import InputError
-
+from ..files import unknown_name
 from ..libraries import MissingLibraryError
 from ..mechanisms import PUBLISHED
 from ..run import Case, case_from
@@ -50,7 +49,7 @@ class Widget(anywidget.AnyWidget):
     def __init__(self, what: Case | str | None = None, *, height: int = 900) -> None:
         if isinstance(what, str):
             if what not in PUBLISHED:
-                raise InputError(f"{what!r} is no published set: {', '.join(PUBLISHED)}")
+                raise unknown_name(what, PUBLISHED, f"published set {what!r}")
             what = case_from({"published": what}, folder=Path(), title=what)
         state = opening_state() if what is None else state_of(what)
         super().__init__(state=state, page=page_of(state), height=height)

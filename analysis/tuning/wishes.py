@@ -229,9 +229,9 @@ class Wish:
                 if driven
                 else "its speed cannot be prescribed"
             )
-            names = ", ".join(name for name in driving_names(self.mechanism) if name != speed)
+            names = ", ".join([name for name in driving_names(self.mechanism) if name != speed][:5])
             raise InputError(
-                f"the crank has no range of speeds: {why}; give over and between instead, over one of {names}"
+                f"the crank has no range of speeds: {why}; give over and between instead, over one of {names}, ..."
             )
         known = driving_names(self.mechanism)
         if self.over and self.over not in known:

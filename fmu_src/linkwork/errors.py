@@ -7,6 +7,10 @@ class LinkworkError(Exception):
     """Base of every error that Linkwork raises on purpose."""
 
 
+#: Names that a message lists at most, where there are many: to choose from, and missing.
+_LISTED, _MISSING = 5, 12
+
+
 def _shown(value: object) -> str:
     """Return the text of a value for an error message, cut to a bounded length."""
     try:
@@ -41,14 +45,22 @@ class InputError(LinkworkError, ValueError):
 
 
 class UnknownNameError(ParameterError, InputError):
-    """An unknown name; ``known`` are the valid names, ``near`` the one that was probably meant."""
+    """An unknown name; ``known`` are the valid names, ``near`` the one that was probably meant.
 
-    def __init__(self, name: str, known: tuple[str, ...], near: str | None) -> None:
+    The message lists the valid names, or the nearest five if there are more than eight; ``words`` replace the name in it.
+    """
+
+    def __init__(self, name: str, known: tuple[str, ...], words: str = "") -> None:
+        from difflib import get_close_matches
+
         self.known = known
-        self.near = near
-        super().__init__(name, None, f"be one of {', '.join(known)}")
-        hint = f"; did you mean {near}?" if near else ""
-        self.args = (f"there is no {name}{hint} (the names are {', '.join(known)})",)
+        self.near = next(iter(get_close_matches(name, known, 1)), None)
+        few = len(known) <= 8
+        listed = ", ".join(known if few else get_close_matches(name, known, _LISTED, 0.0))
+        super().__init__(words or name, None, f"be one of {listed}")
+        hint = f"; did you mean {self.near}?" if self.near else ""
+        which = "the names" if few else f"the nearest of {len(known)} names"
+        self.args = (f"there is no {words or name}{hint} ({which} are {listed})",)
 
 
 class MissingParameterError(ParameterError):
@@ -56,7 +68,10 @@ class MissingParameterError(ParameterError):
 
     def __init__(self, name: str, others: tuple[str, ...] = ()) -> None:
         super().__init__(name, None, "be given")
-        also = f", and so {'is' if len(others) == 1 else 'are'} {', '.join(others)}" if others else ""
+        # all of them have to be given: more are listed than of names to choose from
+        rest = len(others) - _MISSING
+        also = f", and so {'is' if len(others) == 1 else 'are'} {', '.join(others[:_MISSING])}" if others else ""
+        also += f" and {rest} more" if rest > 0 else ""
         self.args = (f"parameter {name} is missing{also}",)
 
 

@@ -164,6 +164,30 @@ class Part(NamedTuple):
 PARTS = {"pivot": 1, "link": 2, "guide": 2, "slider": 3, "spring": 3, "damper": 3, "axis": 2}
 
 
+class Link(NamedTuple):
+    """A link whose mass follows from its length and its section, where a case gives one.
+
+    Attributes
+    ----------
+    name : str
+        First part of the names of its parameters.
+    length, mass, inertia : str
+        FMI parameters.
+    centre : tuple of str
+        FMI parameters of its centre of mass from its first pin: the distance along the link, and the coordinate across it or
+        the angle from it, if it has one.
+    about_pin : bool
+        Whether the moment of inertia is about the first pin, not about the centre of mass.
+    """
+
+    name: str
+    length: str
+    mass: str
+    inertia: str
+    centre: tuple[str, ...]
+    about_pin: bool = False
+
+
 class Drawing(NamedTuple):
     """The drawing of a mechanism.
 
@@ -255,6 +279,8 @@ class Mechanism:
     switch : str
         Name of the one constant, zero or greater, on which the equations may branch: on whether it is zero. They are traced
         once for either, so that what is switched off costs nothing. Empty where there is none.
+    links : tuple of Link
+        Those whose masses a section can give.
     drawing : Drawing or None
         How it is drawn; None where there is no picture of it.
     """
@@ -277,6 +303,7 @@ class Mechanism:
     check_assembly: Callable[[Any, Sequence[float]], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
     switch: str = ""
+    links: tuple[Link, ...] = ()
     drawing: Drawing | None = None
 
     def __reduce__(self) -> Any:

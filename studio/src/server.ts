@@ -59,11 +59,17 @@ export class Server {
     readonly kinds: string[],
   ) {}
 
-  /** The server that this page came from; undefined where it is a file. */
+  /**
+   * The server that this page came from; undefined where it is a file. The token leaves the address for the browser's
+   * storage, so that no link that is copied has it; the server asks the storage when the page is loaded again.
+   */
   static here(): Server | undefined {
     const token = new URLSearchParams(location.search).get("token");
     const mark = document.querySelector<HTMLMetaElement>('meta[name="linkwork-server"]');
-    return token && mark ? new Server(token, mark.content.split(" ")) : undefined;
+    if (!token || !mark) return undefined;
+    localStorage.setItem("linkwork-token", token);
+    history.replaceState(null, "", location.pathname + location.hash);
+    return new Server(token, mark.content.split(" "));
   }
 
   async give(kind: string, state: Request, wanted: object): Promise<Job> {

@@ -224,7 +224,7 @@ def test_a_branch_goes_down_to_the_least_value_there_may_be() -> None:
 @pytest.mark.parametrize(
     ("vary", "drive", "message"),
     [
-        ("slider.mess", Drive(speed=1.0), r"no slider\.mess; did you mean slider\.mass. \(the names are drive\.torque"),
+        ("slider.mess", Drive(speed=1.0), r"no slider\.mess; did you mean slider\.mass. \(the nearest of \d+ names"),
         ("assembly.branch", Drive(speed=1.0), "there is no assembly"),
         ("drive.torque", Drive(speed=1.0), "the drive is by speed"),
         ("drive.speed", Drive(torque=1.0), "the drive is by torque"),

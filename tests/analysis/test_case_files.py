@@ -167,6 +167,8 @@ step = "1 ms"
     [
         ('published = "table-3.2"', r"did you mean table-3\.1"),
         ('published = "table-3.1"\n[run]\nstop = 1', r"run\.stop"),
+        ('published = "table-3.1"\nspeed = 1', r"did you mean drive\.speed"),
+        ('published = "table-3.1"\nstop_time = 1', r"did you mean run\.stop_time"),
         ('published = "table-3.1"\n[drive]\nspeeed = 1', r"did you mean drive\.speed"),
         ('published = "table-3.1"\n[drive]\ntorque = 1', r"run\.stop_time is missing"),
         ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bra"\ntorque = 1', "torsion-bar"),

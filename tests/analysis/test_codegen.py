@@ -161,6 +161,13 @@ def test_a_sparse_output_and_an_operation_without_counterpart_are_refused() -> N
 # --- The cache
 
 
+def flipped(content: bytes, share: float) -> bytes:
+    """Return bytes of which one bit, at a share of their length, is another."""
+    changed = bytearray(content)
+    changed[int(share * len(content))] ^= 4
+    return bytes(changed)
+
+
 def _compile_and_run() -> dict[str, Any]:
     from time import perf_counter
 
@@ -251,10 +258,11 @@ def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-@pytest.mark.parametrize("harm", ["cut", "empty", "junk"])
+@pytest.mark.parametrize("harm", ["cut", "empty", "junk", 0.0, 0.4, 0.7, 0.9999])
 def test_damaged_machine_code_is_compiled_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, harm: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, harm: str | float
 ) -> None:
+    """The file is cut, emptied, replaced, or has one bit flipped at a share of its length."""
     monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
 
     def made() -> Kernel:
@@ -263,7 +271,10 @@ def test_damaged_machine_code_is_compiled_again(
     assert made()(2.0) == 4.0
     (path,) = tmp_path.rglob(f"*.{suffix}")
     content = path.read_bytes()
-    path.write_bytes({"cut": content[: len(content) // 2], "empty": b"", "junk": b"junk" * 99}[harm])
+    if isinstance(harm, float):
+        path.write_bytes(flipped(content, harm))
+    else:
+        path.write_bytes({"cut": content[: len(content) // 2], "empty": b"", "junk": b"junk" * 99}[harm])
     with pytest.warns(RuntimeWarning, match="is damaged .* it is compiled again"):
         assert made()(2.0) == 4.0
     assert made()(3.0) == 6.0  # from the cache, without a warning
@@ -287,7 +298,7 @@ def test_machine_code_of_functions_is_kept_and_checked(tmp_path: Path, monkeypat
     assert (value(3.0), value(3.0), len(written)) == (1.5, 1.5, 1)
     assert (value(4.0), len(written)) == (2.0, 2)
     for path in (tmp_path / "llvm").iterdir():
-        path.write_bytes(path.read_bytes()[:-9] + b"some junk")
+        path.write_bytes(flipped(path.read_bytes(), 0.5))
     assert (value(3.0), value(4.0), value(3.0), len(written)) == (1.5, 2.0, 1.5, 4)
 
 

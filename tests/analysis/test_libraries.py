@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -136,3 +138,36 @@ def test_numba_is_bounded_as_kernels_are_linked_by_what_it_does_not_publish() ->
     ):
         assert all(hasattr(kind, name) for name in names), kind
     assert hasattr(Flags(), "_values")
+
+
+def _told(code: str, folder: Path, *paths: Path) -> str:
+    """Return what a process that begins in a folder prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (folder, *paths)))},
+    )  # fmt: skip
+    return done.stdout + done.stderr
+
+
+def test_linkwork_has_the_names_of_the_api_when_they_are_asked_for(tmp_path: Path) -> None:
+    code = """if True:
+        import sys, linkwork
+        assert not hasattr(linkwork, "__wrapped__") and "analysis" not in sys.modules
+        from linkwork import five_bar, simulate, slider_crank
+        import analysis
+        assert simulate is analysis.simulate and linkwork.periodic is analysis.periodic
+        assert slider_crank is sys.modules["linkwork.slider_crank"] and not hasattr(linkwork, "simulat")
+    """
+    assert _told(code, tmp_path, ROOT / "fmu_src", ROOT) == ""
+
+
+def test_an_analysis_of_the_users_own_is_named(tmp_path: Path) -> None:
+    (tmp_path / "analysis.py").touch()
+    said = _told("import linkwork; linkwork.simulate", tmp_path, ROOT / "fmu_src", ROOT)
+    assert f"{tmp_path / 'analysis.py'} is imported in its place" in said
+
+
+def test_inside_an_fmu_linkwork_has_no_names_of_the_api(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "fmu_src" / "linkwork", tmp_path / "linkwork_01234567")
+    said = _told("import linkwork_01234567 as inside; inside.simulate", tmp_path, ROOT / "fmu_src", ROOT)
+    assert "module 'linkwork_01234567' has no attribute 'simulate'" in said

@@ -225,7 +225,7 @@ def test_the_command_reports_and_replays(fmu, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--check", "nothing"], "there is no check 'nothing' (the names are starts"),
+        (["--check", "nothing"], "there is no check 'nothing' (the nearest of 14 names are"),
         (["--replay", "0/cs/nothing/1"], "there is no case '0/cs/nothing/1'"),
     ],
 )

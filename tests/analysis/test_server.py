@@ -31,9 +31,9 @@ from analysis.cli.studio import _open as open_page
 from analysis.export import PLATFORMS, this_platform
 from analysis.mechanisms import MECHANISMS, PUBLISHED
 from analysis.run import case_from, heard_by, simulate
-from analysis.server import BODY, TOKEN, Server, Worker
+from analysis.server import BODY, TOKEN, Server, Worker, application
 from analysis.server.application import hosts_of
-from analysis.server.jobs import do
+from analysis.server.jobs import JOBS, do
 from analysis.server.worker import _answer, _Teller
 from analysis.studio import PAGE, case_of, opening_state, page_of, state_of
 from analysis.synthesis import LeastTransmission, synthesis_case_from
@@ -145,6 +145,7 @@ JSON = {"Content-Type": "application/json"}
         pytest.param("POST", "/job", JSON, b"[" * 100_000, 400, "no JSON", id="deep"),
         pytest.param("POST", "/job", JSON, b"[1]", 400, "no kind", id="list"),
         pytest.param("POST", "/job", JSON, b'{"kind": 3}', 400, "no kind", id="number"),
+        pytest.param("POST", "/job", JSON, b'{"kind": "runs"}', 400, "there is no job 'runs'", id="unknown kind"),
         pytest.param("POST", "/job", JSON, b"1" * (BODY + 1), 413, "", id="large"),
         pytest.param("GET", "/job", {"X-Long": "a" * 20_000}, None, 431, "", id="large head"),
     ],
@@ -205,6 +206,24 @@ def test_a_connection_that_says_nothing_holds_up_nobody(server: Server) -> None:
     with socket.create_connection(("127.0.0.1", server.port)) as slow:
         slow.sendall(b"POST /job HTTP/1.1\r\nContent-Length: 400000\r\n\r\n{")
         assert _job(server) == (200, {"state": "idle"})
+
+
+@pytest.mark.parametrize(("limit", "half_open"), [(400, 300), (20, 30)])
+def test_connections_that_say_nothing_make_room(monkeypatch: pytest.MonkeyPatch, limit: int, half_open: int) -> None:
+    monkeypatch.setattr(application, "CONNECTIONS", limit)
+    monkeypatch.setattr(application, "SHORT_SILENCE", 0.2)
+    for server in _running(PAGE_TEXT):
+        with ExitStack() as stack:
+            for _ in range(half_open):
+                slow = stack.enter_context(socket.create_connection(("127.0.0.1", server.port)))
+                slow.sendall(b"POST /job HTTP/1.1\r\n")
+            begun = time.monotonic()
+            assert _job(server) == (200, {"state": "idle"})
+            assert time.monotonic() - begun < 10.0
+
+
+def test_kinds_of_jobs_are_known_without_their_modules() -> None:
+    assert set(application.JOB_KINDS) == set(JOBS)
 
 
 def test_a_port_that_is_taken_is_said(server: Server) -> None:
@@ -279,8 +298,8 @@ def test_jobs_fail_in_a_sentence_come_one_at_a_time_and_stop_where_they_are_canc
         assert not Path(folder).exists()
         assert _job(server)[1]["state"] == "cancelled"
         # and the next is done, by another process, which ends with the server
-        assert _job(server, "POST", kind="nothing", state=opening_state())[0] == 202
-        assert "there is no job 'nothing'" in _until(server, "failed")["sentence"]
+        assert _job(server, "POST", kind="run")[0] == 202
+        assert "no state" in _until(server, "failed")["sentence"]
         last = server.worker._process
         assert last.is_alive()
     assert not last.is_alive()
@@ -509,6 +528,23 @@ def _part(page: Page, title: str) -> None:
 def _values(page: Page) -> dict[str, float]:
     values: dict[str, float] = page.evaluate("window.studio.state.values")
     return values
+
+
+@pytest.mark.slow
+def test_the_token_is_in_no_link_and_the_page_can_be_loaded_again(browser: Browser, studio: Server) -> None:
+    address = f"http://127.0.0.1:{studio.port}/"
+    context = browser.new_context()
+    page, other = context.new_page(), context.new_page()
+    for tab, opened in ((page, studio.address), (page, address), (other, address)):
+        tab.goto(opened)
+        tab.wait_for_selector("#python")
+        assert tab.url == address
+    other.evaluate("localStorage.clear()")
+    answer = other.goto(address)
+    assert answer is not None
+    assert answer.status == 401
+    assert "open the address that linkwork studio printed" in other.inner_text("body")
+    context.close()
 
 
 @pytest.mark.slow

@@ -45,7 +45,7 @@ def test_a_widget_shows_what_it_is_made_of(what: Any, state: dict[str, Any]) -> 
 def test_a_published_set_is_its_case_and_another_name_is_refused() -> None:
     widget = Widget("table-3.1")
     assert widget.case.parameters == PUBLISHED["table-3.1"].parameters
-    with pytest.raises(InputError, match="'table-9' is no published set"):
+    with pytest.raises(InputError, match="no published set 'table-9'"):
         Widget("table-9")
 
 

@@ -549,7 +549,7 @@ class TestBadInput:
             ({"search": {"n_jobs": 0}}, InputError, "0 cores"),
             ({"weights": [1.0, 2.0]}, InputError, r"weights have the shape \(2,\)"),
             ({"constraints": ["short"]}, InputError, "constraint 'short' is none: use .*LeastTransmission"),
-            ({"bounds": {"crank": (0, 1)}}, ParameterError, "crank is .* have the name of a dimension"),
+            ({"bounds": {"crank": (0, 1)}}, ParameterError, "no dimension 'crank'.* crank_length"),
             (
                 {"bounds": {"crank_length": (0.2, 0.1)}},
                 syn.InfeasibleError,

@@ -15,6 +15,7 @@ from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import joblib
@@ -22,6 +23,7 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, simulate_many
+from analysis.numerics import workers as workers_module
 from analysis.numerics.workers import WorkersLost, _handed_over, interruptible, over_workers, worker_count
 from analysis.periodic import Drive, grid, plane
 from analysis.slider_crank import Tolerance, force_turn, monte_carlo
@@ -176,7 +178,7 @@ def test_workers_that_are_killed_again_and_again_are_given_up() -> None:
     work = partial(kill_own_worker, caller=os.getpid())
     with (
         pytest.warns(RuntimeWarning, match="5 of 5 parts"),
-        pytest.raises(WorkersLost, match="workers were killed 4 times, as where memory runs out"),
+        pytest.raises(WorkersLost, match=r"workers were killed 4 times, .* 5 of 5 parts are not done, 1, 2, 3, 4, 5"),
     ):
         list(over_workers(work, range(5), n_jobs=2))
 
@@ -385,6 +387,67 @@ def test_so_does_one_whose_worker_is_killed(work: Callable[[Path], list[Any]], s
         found = work(tmp_path)
     assert len(killed) == 1
     assert_same(found, serial(work))
+
+
+def kill_on_two(value: int) -> int:
+    if value == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(value)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_a_part_that_kills_every_worker_of_a_cluster_is_named() -> None:
+    dask = pytest.importorskip("dask")
+    found = []
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        new_cluster(),
+        joblib.parallel_config("dask"),
+        pytest.raises(WorkersLost, match="part 3 of 5 was killed"),
+    ):
+        found.extend(over_workers(kill_on_two, range(5)))
+    assert sorted(found) == [(n, n * n) for n in (0, 1, 3, 4)]
+
+
+class Waiting:
+    """A future that is never done."""
+
+    def add_done_callback(self, _: Any) -> None: ...
+
+
+class Silent:
+    """A client of Dask whose tasks are never done, with a scheduler that answers with some workers, or with an error."""
+
+    def __init__(self, workers: dict[str, Any] | None) -> None:
+        self.scheduler, self.workers, self.cancelled = SimpleNamespace(identity=None), workers, 0
+
+    def submit(self, *_: Any, **__: Any) -> Any:
+        return Waiting()
+
+    def sync(self, *_: Any, callback_timeout: float) -> dict[str, Any]:
+        if self.workers is None:
+            raise TimeoutError
+        return {"workers": self.workers}
+
+    def cancel(self, futures: list[Any]) -> None:
+        self.cancelled += len(futures)
+
+
+@pytest.mark.parametrize(
+    ("workers", "said"),
+    [(None, "the scheduler of the cluster has not answered"), ({}, "the cluster has had no worker")],
+)
+def test_a_cluster_that_does_not_answer_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, workers: dict[str, Any] | None, said: str
+) -> None:
+    monkeypatch.setattr(workers_module, "_PATIENCE", 0.05)
+    client = Silent(workers)
+    backend = SimpleNamespace(client=client, submit_kwargs={}, effective_n_jobs=lambda _: 2)
+    monkeypatch.setattr(joblib.parallel, "get_active_backend", lambda **_: (backend, None))
+    with pytest.raises(WorkersLost, match=said):
+        list(over_workers(square, range(3)))
+    assert client.cancelled == 3
 
 
 @pytest.mark.slow

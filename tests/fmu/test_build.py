@@ -8,12 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 
 import build_fmu
-from analysis.export import BuildError, build
+from analysis.export import BuildError, build, compile_library
 from build_fmu import FMUS
 
 from .conftest import changed_sources, model_description
@@ -194,3 +195,27 @@ def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, message: st
     assert message in (done.stdout if code == 0 else done.stderr)
     built = {path.stem for path in tmp_path.glob("*.fmu")}
     assert built == (set() if code else set(arguments or MODELS))
+
+
+def test_a_changed_file_of_the_compilers_cache_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The compiler is a stand-in that keeps one object, as Zig keeps the C library."""
+    made: list[Path] = []
+
+    def compiler(*_: Any, env: dict[str, str], **__: Any) -> subprocess.CompletedProcess[str]:
+        kept = Path(env["ZIG_GLOBAL_CACHE_DIR"], "o", "1", "libc.o")
+        if not kept.exists():
+            kept.parent.mkdir(parents=True)
+            kept.write_bytes(b"code")
+            made.append(kept)
+        assert not Path(env["ZIG_LOCAL_CACHE_DIR"]).is_relative_to(tmp_path / "cache")
+        return subprocess.CompletedProcess([], 0)
+
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(subprocess, "run", compiler)
+    for content in (b"code", b"cofe", b"code"):
+        compile_library(tmp_path, ["a.c"], "a.so", "a-machine")
+        made[0].write_bytes(content)
+    assert [path.read_bytes() for path in made] == [b"code"] * 2
+    assert capsys.readouterr().err.count("all are compiled again") == 1

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from linkwork.errors import LinkworkError, MissingParameterError, ParameterError
+from linkwork.errors import LinkworkError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.parameters import InitialState, reach
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.parameters import field_name, fmi_name
@@ -406,9 +406,24 @@ def test_a_value_is_shown_up_to_500_characters(length: int, cut: bool) -> None:
     assert str(ParameterError("x", value, "be short")) == f"parameter x is {shown}: it must be short"
 
 
+@pytest.mark.parametrize(("count", "listed"), [(8, [f"a.{n}" for n in range(8)]), (60, ["a.1"])])
+def test_of_many_names_the_nearest_five_are_listed(count: int, listed: list[str]) -> None:
+    error = UnknownNameError("a.1x", tuple(f"a.{n}" for n in range(count)), words="a name 'a.1x'")
+    assert (error.near, len(error.known)) == ("a.1", count)
+    found = str(error).partition("names are ")[2].rstrip(")").split(", ")
+    assert len(found) == (count if count <= 8 else 5)
+    assert set(listed) <= set(found)
+    assert f"the nearest of {count} names" in str(error) or count <= 8
+
+
 @pytest.mark.parametrize(
     ("others", "said"),
-    [((), ""), (("b",), ", and so is b"), (("b", "c"), ", and so are b, c"), (("b",) * 3, ", and so are b, b, b")],
+    [
+        ((), ""),
+        (("b",), ", and so is b"),
+        (("b", "c"), ", and so are b, c"),
+        (("b",) * 15, f", and so are {'b, ' * 11}b and 3 more"),
+    ],
 )
 def test_what_is_missing_is_named_with_the_others(others: tuple[str, ...], said: str) -> None:
     assert str(MissingParameterError("a", others)) == f"parameter a is missing{said}"

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 
 from ...display import Shown, format_count
+from ...files import unknown_name
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.continuation import Evaluation
 from ...run import outputs_of, takes_published
@@ -104,7 +105,7 @@ class Turn:
 
     def __getitem__(self, name: str) -> FloatArray:
         if name not in self.names:
-            raise InputError(f"an orbit has no output {name!r}: it has {', '.join(self.names)}")
+            raise unknown_name(name, self.names, f"output {name!r} of an orbit")
         return self.values[:, self.names.index(name)]
 
     @property

@@ -71,9 +71,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
         return InputError(f"in the formula {text!r}: {ast.unparse(node)!r} {reason}")
 
     def unknown(node: ast.AST, name: str, known: list[str]) -> InputError:
-        near = unknown_name(name, known).near
-        hint = f"; did you mean {near}?" if near else ""
-        return refused(node, f"is not known{hint} (there are {', '.join(known)})")
+        return refused(node, f"is not known: {unknown_name(name, known)}")
 
     def value(node: ast.AST, t: FloatArray) -> Any:
         match node:

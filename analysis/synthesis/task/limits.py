@@ -142,7 +142,7 @@ def make_limits(
     bounds = {name: ends for name, ends in (bounds or {}).items() if name != SECOND_LENGTH}
     for name in bounds:
         if name not in UNKNOWNS:
-            raise ParameterError(name, bounds[name], f"have the name of a dimension: {', '.join(sorted(UNKNOWNS))}")
+            raise unknown_name(name, sorted(UNKNOWNS), f"dimension {name!r}, which is to have bounds")
     for c in constraints:
         if not isinstance(c, Constraint):
             raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi
 
 from .. import friction
-from ..mechanism import Channel, Equations, Freedom, Mechanism, Mode
+from ..mechanism import Channel, Equations, Freedom, Link, Mechanism, Mode
 from . import assembly, drawing, dynamics, kinematics, published, variables
 from .parameters import FiveBarParameters, InitialState
 
@@ -62,6 +62,17 @@ MECHANISM = Mechanism(
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
+    links=tuple(
+        Link(
+            name,
+            f"{name}.length",
+            f"{name}.mass",
+            f"{name}.inertia",
+            (f"{name}.cog_distance", f"{name}.cog_angle"),
+            name == "crank",
+        )
+        for name in ("crank", "coupler", "rocker")
+    ),
     drawing=drawing.DRAWING,
     switch="rough",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi
 
 from .. import friction
-from ..mechanism import Channel, Equations, Freedom, Mechanism, Mode
+from ..mechanism import Channel, Equations, Freedom, Link, Mechanism, Mode
 from . import assembly, drawing, dynamics, kinematics, published, variables, vectors
 from .parameters import InitialState, SliderCrankParameters
 
@@ -76,5 +76,9 @@ MECHANISM = Mechanism(
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
+    links=(
+        Link("crank", "crank.length", "crank.mass", "crank.inertia", ("crank.cog_x", "crank.cog_y"), True),
+        Link("rod", "rod.length", "rod.mass", "rod.inertia", ("rod.cog_distance",)),
+    ),
     drawing=drawing.DRAWING,
 )

@@ -1,0 +1,231 @@
+"""Masses of links: computed from the ``section`` of a link in a case file, and where the masses of a case come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from math import atan2, hypot, isclose
+from typing import Any, NamedTuple
+
+from linkwork.errors import ParameterError
+from linkwork.mechanism import Link, Mechanism
+from linkwork.parameters import field_name
+
+from ..files import Kinds, Many, Quantity, Reader, Table, unknown_name
+from ..mechanisms import Parameters, mechanism_of
+from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
+
+
+class Mass(NamedTuple):
+    """A mass of a case, and where it comes from.
+
+    Attributes
+    ----------
+    name : str
+        FMI parameter.
+    value : float
+        (kg).
+    origin : str
+        In words, such as ``"of table-3.1"``.
+    stale : str
+        In words, what the case keeps of the published set though it changes the length of the link; else empty.
+    """
+
+    name: str
+    value: float
+    origin: str
+    stale: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """What a link is made of: a section as long as the link and an ``overhang`` (m) beyond each pin, or a plate."""
+
+    section: Section | Plate
+    words: str
+    overhang: float = 0.0
+    corners: tuple[tuple[float, float], ...] = ()
+
+    def properties(self, length: float) -> MassProperties:
+        """Return mass, centre of mass from the first pin along and across the link, and moment of inertia about it."""
+        if isinstance(self.section, Plate):
+            return self.section.properties(self.corners)
+        body = length + 2.0 * self.overhang
+        return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
+
+
+def _mm(*lengths: float) -> str:
+    return " x ".join(f"{1e3 * length:g}" for length in lengths) + " mm"
+
+
+def _bar(width: float, thickness: float, material: float, overhang: float = 0.0) -> _Made:
+    return _Made(Bar(width, thickness, material), f"bar of {_mm(width, thickness)}, {material:g} kg/m3", overhang)
+
+
+def _rod(diameter: float, material: float, overhang: float = 0.0) -> _Made:
+    return _Made(Rod(diameter, material), f"rod of {_mm(diameter)}, {material:g} kg/m3", overhang)
+
+
+def _tube(outer: float, inner: float, material: float, overhang: float = 0.0) -> _Made:
+    return _Made(Tube(outer, inner, material), f"tube of {_mm(outer, inner)}, {material:g} kg/m3", overhang)
+
+
+def _plate(thickness: float, corners: tuple[Any, ...], material: float) -> _Made:
+    words = f"plate of {_mm(thickness)}, {len(corners)} corners, {material:g} kg/m3"
+    return _Made(Plate(thickness, material), words, corners=corners)
+
+
+_LENGTH = Quantity("m", above=0.0)
+_COMMON: Mapping[str, Reader] = {"material": density, "overhang": Quantity("m", least=0.0)}
+#: The kinds of a ``section`` with their entries.
+SECTIONS: Mapping[str, Table] = {
+    "bar": Table(_bar, {"width": _LENGTH, "thickness": _LENGTH, **_COMMON}),
+    "rod": Table(_rod, {"diameter": _LENGTH, **_COMMON}),
+    "tube": Table(_tube, {"outer": _LENGTH, "inner": _LENGTH, **_COMMON}),
+    "plate": Table(
+        _plate, {"thickness": _LENGTH, "corners": Many(Many(Quantity("m"), length=2), least=3), "material": density}
+    ),
+}
+
+
+def _values(link: Link, units: Mapping[str, str], made: _Made, length: float, mass: float | None) -> dict[str, float]:
+    """Return mass, moment of inertia and centre of mass of a link by the names of the parameters, in SI."""
+    own, (x, y), inertia = made.properties(length)
+    if mass is not None:  # weighed: of the same shape, and so of the same radius of gyration
+        own, inertia = mass, inertia * mass / own
+    if link.about_pin:
+        inertia += own * (x * x + y * y)
+    if len(link.centre) == 1:
+        if abs(y) > 1e-9 * length:
+            wanted = "have its centre of mass on the line of the pins"
+            raise ParameterError(f"{link.name}.section", f"a plate whose centre is {y:g} m off", wanted)
+        centre: tuple[float, ...] = (x,)
+    elif units[link.centre[1]] == "rad":
+        centre = (hypot(x, y), atan2(y, x))
+    else:
+        centre = (x, y)
+    return {link.mass: own, link.inertia: inertia, **dict(zip(link.centre, centre))}
+
+
+def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
+    """Return parameters with the masses, centres of mass and moments of inertia of links of these sections.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+        Their lengths stay.
+    **sections
+        By link, such as ``coupler=Bar("20 mm", "5 mm", "steel")``; see `analysis.sections`.
+
+    Raises
+    ------
+    UnknownNameError
+        If the mechanism has no such link.
+    """
+    mechanism = mechanism_of(parameters)
+    links = {link.name: link for link in mechanism.links}
+    units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}
+    for name, section in sections.items():
+        if name not in links:
+            raise unknown_name(name, links, f"link {name!r} of the {mechanism.name}")
+        length = getattr(parameters, field_name(links[name].length))
+        values = _values(links[name], units, _Made(section, ""), length, None)
+        parameters = replace(parameters, **{field_name(key): value for key, value in values.items()})
+    return parameters
+
+
+def _section_of(link: Link, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries of a link's section among the dotted names of a file."""
+    head = f"{link.name}.section"
+    if head in flat:
+        raise ParameterError(head, flat[head], f"be a table with a kind, of {', '.join(SECTIONS)}")
+    return {name.removeprefix(f"{head}."): value for name, value in flat.items() if name.startswith(f"{head}.")}
+
+
+def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parameters | None) -> dict[str, Any]:
+    """Return the dotted names of a file with numbers in the place of the sections of links.
+
+    A mass that is given beside a section is a weighed one: centre and radius of gyration stay those of the section.
+
+    Raises
+    ------
+    ParameterError
+        If a section is wrong, or another number is given that follows from it.
+    """
+    result = dict(flat)
+    units = {v.name: v.unit for v in mechanism.mechanism_variables.values()}
+    for link in mechanism.links:
+        table = _section_of(link, flat)
+        if not table:
+            continue
+        head = f"{link.name}.section"
+        for name in (link.inertia, *link.centre):
+            if name in flat:
+                raise ParameterError(name, flat[name], f"not come together with {head}, from which it follows")
+        made = Kinds(SECTIONS)(table, head)
+        result = {name: value for name, value in result.items() if not name.startswith(f"{head}.")}
+        if link.length in flat:
+            length = _LENGTH(flat[link.length], link.length)
+        elif base is not None:
+            length = getattr(base, field_name(link.length))
+        else:
+            continue  # the reader of the parameters asks for the length
+        mass = Quantity("kg", above=0.0)(flat[link.mass], link.mass) if link.mass in flat else None
+        result |= _values(link, units, made, length, mass)
+    return result
+
+
+def mass_origins(
+    parameters: Parameters, flat: Mapping[str, Any], base: Parameters | None = None, source: str = ""
+) -> tuple[Mass, ...]:
+    """Tell where the masses of a case come from.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    flat : mapping
+        What the case gives, by dotted name, before `resolve_sections`.
+    base : parameters, optional
+        The published ones that stand where the case gives nothing.
+    source : str
+        Name of the published set.
+    """
+    mechanism = mechanism_of(parameters)
+    links = {link.mass: link for link in mechanism.links}
+    get = partial(getattr, parameters)
+    found = []
+    for name, variable in mechanism.mechanism_variables.items():
+        if variable.unit != "kg":
+            continue
+        link, stale = links.get(name), ""
+        table = {} if link is None else _section_of(link, flat)
+        if table:
+            origin = f"{'weighed, shaped as a ' if name in flat else 'of a '}{Kinds(SECTIONS)(table, name).words}"
+        elif name in flat:
+            origin = "as given"
+        elif base is None:
+            origin = "zero where nothing is given"
+        else:
+            origin = f"of {source}"
+        if link is not None and base is not None and not table:
+            length, own = get(field_name(link.length)), getattr(base, field_name(link.length))
+            kept = [n for n in (link.mass, *link.centre[:1], link.inertia) if n not in flat]
+            if kept and not isclose(length, own):
+                stale = f"{link.length} is {_mm(length)} where {source} has {_mm(own)}, whose {', '.join(kept)} stay"
+        found.append(Mass(name, get(field_name(name)), origin, stale))
+    return tuple(found)
+
+
+def in_sentences(masses: tuple[Mass, ...]) -> tuple[str, list[str]]:
+    """Return one sentence that names masses with their origins, and a warning for each that its link's length has left.
+
+    >>> in_sentences((Mass("crank.mass", 0.1, "as given"), Mass("slider.mass", 0.6, "as given")))[0]
+    'masses: crank.mass 0.1 kg, slider.mass 0.6 kg (as given)'
+    """
+    by_origin: dict[str, list[str]] = {}
+    for mass in masses:
+        by_origin.setdefault(mass.origin, []).append(f"{mass.name} {mass.value:.4g} kg")
+    sentence = "masses: " + "; ".join(f"{', '.join(names)} ({origin})" for origin, names in by_origin.items())
+    warnings = [f"{mass.stale}: give them, or {mass.name.rpartition('.')[0]}.section" for mass in masses if mass.stale]
+    return sentence, warnings
