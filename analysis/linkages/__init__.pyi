@@ -8,3 +8,6 @@ from .description import Description as Description
 from .description import LinkageError as LinkageError
 from .package import Package as Package
 from .package import mechanism as mechanism
+from .sections import SECTIONS as SECTIONS
+from .sections import Made as Made
+from .sections import millimetres as millimetres

@@ -1,6 +1,6 @@
 """A planar linkage as data: bodies with named points, what joins them, what acts on them.
 
-Bodies that have a point of the same name are pinned to each other there. Everything else that joins bodies has a table of its own.
+Bodies that have a point of the same name are pinned to each other there. Whatever else joins them has a table of its own.
 """
 
 from __future__ import annotations
@@ -8,12 +8,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import Any
 
 from linkwork.errors import LinkworkError, ParameterError
 
 from .. import files
-from ..files import Many, Quantity, Table, entry
+from ..files import Kinds, Many, Quantity, Table, entry
+from .laws import law
+from .sections import SECTIONS
 
 GROUND = "ground"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*")
@@ -26,6 +29,11 @@ class LinkageError(LinkworkError):
 def coordinate(value: Any, name: str) -> float:
     """Read a length; the whole number 0 stands for a coordinate that is always zero, and no parameter."""
     return value if value == 0 and isinstance(value, int) and value is not False else Quantity("m")(value, name)
+
+
+def given(value: Any) -> bool:
+    """Return whether an entry of a spring is there: the whole number 0 stands for none."""
+    return value != 0 or not isinstance(value, int)
 
 
 def _name(value: Any, name: str) -> str:
@@ -66,8 +74,8 @@ class Body:
         Mass (kg) and moment of inertia about the centre of mass (kg.m2).
     cog : tuple of float
         Centre of mass (m); by default the body's origin, of a bar its middle.
-    section : object
-        Cross-section and material, of which mass, centre of mass and inertia follow where they are not given.
+    section : table
+        Section and material, from which mass, centre of mass and inertia follow: of a bar, or a plate with corners.
     """
 
     points: Mapping[str, tuple[float, float]] = entry(_named(_PLACE), factory=dict)
@@ -76,6 +84,7 @@ class Body:
     mass: float | None = entry(Quantity("kg", least=0.0), None)
     inertia: float | None = entry(Quantity("kg.m2", least=0.0), None)
     cog: tuple[float, ...] | None = entry(_PLACE, None)
+    section: Any = entry(Kinds(SECTIONS), None)
 
     @property
     def all_points(self) -> dict[str, tuple[float, float]]:
@@ -163,6 +172,11 @@ class Spring:
         Length, position (m) or angle (rad) at which the spring is free.
     friction : float
         Level of Coulomb friction (N, N.m), smooth about rest.
+    law : str or list of (x, force)
+        A further force against the stretch x, as a formula in x and its rate v such as "2e5*x**3 + 4*v", or as a table,
+        between whose rows it is straight (SI). Its work counts as dissipated.
+    driven : bool
+        Whether an input drives it, as of a cylinder or a linear motor: a force that lengthens it, a torque that turns it.
     """
 
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
@@ -171,6 +185,8 @@ class Spring:
     damping: Any = entry(files.unchanged, 0)
     free: Any = entry(files.unchanged, 0)
     friction: Any = entry(files.unchanged, 0)
+    law: str = entry(law, "")
+    driven: bool = entry(files.flag, False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,8 +234,8 @@ class Description:
         By name, one to four; where none are given they are proposed.
     assembly : mapping of str to int
         +1 or -1 by the joint between the two bodies of a dyad, +1 by default.
-    loads : tuple of str
-        Points on which forces can act.
+    loads, torques : tuple of str
+        Points on which forces, and bodies on which torques can act.
     gravity : float
         Acceleration of gravity (m/s2).
     gravity_direction : float
@@ -238,5 +254,6 @@ class Description:
     freedoms: Mapping[str, FreedomTable] = entry(_named(_freedom), factory=dict)
     assembly: Mapping[str, int] = entry(_named(files.Whole()), factory=dict)
     loads: tuple[str, ...] = entry(Many(_name), ())
+    torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)
-    gravity_direction: float = entry(Quantity("rad"), -1.5707963267948966)
+    gravity_direction: float = entry(Quantity("rad"), -0.5 * pi)

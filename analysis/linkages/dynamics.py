@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import GROUND, Description, Spring
+from .description import GROUND, Description, Spring, given
 from .equations import indented
-from .parameters import Drive, Interface
-from .structure import Dyad, Freed, Geared, Joint, Pin, Side, Slider, Structure
+from .parameters import Interface
+from .structure import Dyad, Freed, Geared, Joint, Pin, Side, Structure
 
 
 class Reaction(NamedTuple):
@@ -24,11 +24,6 @@ def springs_at(description: Description, interface: Interface) -> dict[str, int]
     """Return the springs that act along a freedom, with its number."""
     numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
     return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
-
-
-def given(value: object) -> bool:
-    """Return whether an entry of a spring is given: 0 stands for none."""
-    return value != 0 or not isinstance(value, int)
 
 
 class Motion:
@@ -102,7 +97,17 @@ class Motion:
         if given(spring.friction):
             about = not spring.between and isinstance(self.structure.joints[spring.at], Pin)
             words.append(f"p.{name}_friction * tanh(s.{name}_rate / {'FRICTION_RATE' if about else 'FRICTION_SPEED'})")
+        if spring.law:
+            words.append(f"{name}_law(s.{name}_stretch, s.{name}_rate)")
         return " + ".join(words)
+
+    def laws(self) -> Iterator[str]:
+        """Write the functions of the springs' own laws."""
+        for name, spring in self.description.springs.items():
+            if spring.law:
+                yield f"def {name}_law(x: float, v: float) -> float:"
+                yield f'    """Return the force of {name} at a stretch and its rate (N, N.m)."""'
+                yield from (f"    return {spring.law}", "", "")
 
     def acting(self) -> Iterator[str]:
         """Write the function of the forces on all bodies and along all freedoms."""
@@ -121,6 +126,10 @@ class Motion:
                 rows.append(f"{name}_resistance = {resists}")
                 lost.append(f"{name}_resistance * s.{name}_rate")
             total = " + ".join(filter(None, (pulls, f"{name}_resistance" if resists else ""))) or "0.0"
+            if spring.driven:
+                load = next(load for load in self.interface.loads if load.name.partition(".")[0] == name)
+                total += f" - i.{load.field}"
+                gained.append(f"i.{load.field} * s.{name}_rate")
             rows.append(f"{name}_force = {total}")
             if name in self.along:
                 along[self.along[name]].append(f"- {name}_force")
@@ -143,8 +152,11 @@ class Motion:
                     line, f = f"b.{joint.name}_line", f"{sign}{name}_force"
                     on[body].append(f"force({f} * {line}.c, {f} * {line}.s, b.{second}_frame.origin)")
         for own in self.description.loads:
-            on[self.owner(own)].append(f"force(i.{own}_fx, i.{own}_fy, b.at_{own})")
-            gained += [f"i.{own}_fx * b.at_{own}.vx", f"i.{own}_fy * b.at_{own}.vy"]
+            on[self.owner(own)].append(f"force(i.{own}_load_x, i.{own}_load_y, b.at_{own})")
+            gained += [f"i.{own}_load_x * b.at_{own}.vx", f"i.{own}_load_y * b.at_{own}.vy"]
+        for body in self.description.torques:
+            on[body].append(f"torque(i.{body}_torque)")
+            gained.append(f"i.{body}_torque * b.{body}_frame.turn.w")
         nothing = "Wrench(0.0, 0.0, 0.0)"
         rows.append("wrenches = (")
         for terms in on.values():
@@ -154,9 +166,10 @@ class Motion:
         freedoms = [" ".join(terms) or "0.0" for terms in along]
         rows.append(f"along = ({', '.join(freedoms)},)")
         rows.append(f"return Acting(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})")
+        yield from self.laws()
         yield from (
             "class Acting(NamedTuple):",
-            '    """Forces on the bodies, forces along the freedoms, power lost in dampers and friction, power of the loads (W)."""',
+            '    """Forces on the bodies and along the freedoms, power lost in dampers and friction, and of the loads (W)."""',
             "",
         )
         yield from (
@@ -174,6 +187,7 @@ class Motion:
 
     def masses(self) -> Iterator[str]:
         """Write the function of the bodies' masses."""
+        names = {parameter.name for parameter in self.interface.parameters}
         yield "def masses(b: Places, p: Constants) -> tuple[Mass, ...]:"
         yield '    """Compute the masses of the bodies at their places."""'
         yield "    return ("
@@ -184,7 +198,7 @@ class Motion:
                 continue
             x, y = self.interface.centres[body]
             centre = f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
-            inertia = f"p.{body}_inertia" if self.description.bodies[body].inertia is not None else "0.0"
+            inertia = f"p.{body}_inertia" if f"{body}.inertia" in names else "0.0"
             yield f"        Mass(p.{body}_mass, {inertia}, {centre}, {frame}),"
         yield "    )"
 
@@ -282,10 +296,10 @@ class Motion:
                 values += [f"(1.0 - {mode}) * {drive.name}_load", mode, f"{mode} * {drive.name}_rate"]
             else:
                 values.append(f"{drive.name}_load")
-        loads = [f"{own}_{axis}" for own in self.description.loads for axis in ("fx", "fy")]
+        loads = [load.field for load in self.interface.loads]
         yield from (
             "class Applied(NamedTuple):",
-            '    """Loads along the freedoms (N.m, N), whether their rates are commanded, and then their accelerations; loads on points (N)."""',
+            '    """Loads along the freedoms, whether their rates are commanded, their accelerations then; other loads."""',
             "",
         )
         yield from (f"    {field}: float" for field in (*fields, *loads))
@@ -327,7 +341,7 @@ class Motion:
         rows.append(f"return Motion(b, m, a.wrenches, e, loads, a.lost, {power} + a.gained)")
         yield from (
             "class Motion(NamedTuple):",
-            '    """Places, masses and forces on the bodies, accelerations of the freedoms and loads on them, power lost and supplied (W)."""',
+            '    """The bodies, forces on them, accelerations of the freedoms and loads on them, power lost and supplied."""',
             "",
         )
         yield from ("    places: Places", "    masses: tuple[Mass, ...]", "    wrenches: tuple[Wrench, ...]")
@@ -395,17 +409,8 @@ class Motion:
             f"change = accelerations(matrix, ({'0.0, ' * self.n}), {held}, ({', '.join(changes)},))",
             f"before = ({', '.join(f'x[{self.n + k}]' for k in n)},)",
             "after = tuple(a + b for a, b in zip(before, change))",
-            "work = 0.5 * sum(a * b - c * d for a, b, c, d in zip(after, multiplied(matrix, after), before, multiplied(matrix, before)))",
+            "gained = zip(after, multiplied(matrix, after), before, multiplied(matrix, before))",
+            "work = 0.5 * sum(a * b - c * d for a, b, c, d in gained)",
             f"return ({', '.join(f'x[{k}]' for k in n)}, *after, x[{2 * self.n}], x[{2 * self.n + 1}] + work)",
         ]
         yield from indented(rows)
-
-
-def drives_text(drives: tuple[Drive, ...]) -> str:
-    """Return the state in words."""
-    return ", ".join((*(drive.coordinate for drive in drives), *(drive.rate for drive in drives)))
-
-
-def sliders(structure: Structure) -> dict[str, Slider]:
-    """Return the slides and slots by name."""
-    return {name: joint for name, joint in structure.joints.items() if isinstance(joint, Slider)}

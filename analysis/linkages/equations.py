@@ -9,8 +9,8 @@ from .parameters import Interface
 from .structure import Dyad, Freed, Geared, Pin, Side, Slider, Structure
 
 
-class Writer:
-    """The equations of one linkage, line by line."""
+class Places:
+    """The function of the places of all bodies of one linkage, line by line."""
 
     def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
         self.description, self.structure, self.interface = description, structure, interface
@@ -171,7 +171,6 @@ class Writer:
 
     def dyad(self, step: Dyad) -> None:
         """Write the places of the bodies of a dyad."""
-        one, other = step.sides
         name = step.inner.name
         self.lines.append(f"# dyad {step.kind}: {' and '.join(s.body for s in step.sides)}, joined at {name}")
         for side in step.sides:
@@ -242,7 +241,7 @@ class Writer:
 
     # Functions of the module
 
-    def places_function(self) -> list[str]:
+    def function(self) -> list[str]:
         """Return the function of the places of all bodies, and the record that it returns."""
         for n, drive in enumerate(self.interface.drives):
             self.lines.append(f"{drive.variable} = x[{n}]")

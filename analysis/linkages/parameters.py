@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import hypot
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
-from ..files import Quantity
-from .description import GROUND, Body, Description, LinkageError, Spring
+from ..files import Quantity, unknown_name
+from .description import GROUND, Body, Description, LinkageError, Spring, given
 from .structure import Pin, Slider, Structure
 
 
 class Parameter(NamedTuple):
-    """A parameter: its FMI name, unit and meaning, its value, and its rule: ``positive``, ``free`` in sign, ``sign`` or none."""
+    """A parameter: FMI name, unit, meaning, value, and its rule: ``positive``, ``free`` (in sign), ``sign`` or none."""
 
     name: str
     unit: str
@@ -65,6 +64,20 @@ class Drive(NamedTuple):
         return "N.m" if self.turns else "N"
 
 
+class Load(NamedTuple):
+    """An input that drives no freedom: its FMI name, unit and meaning, and the output along which it acts."""
+
+    name: str
+    unit: str
+    text: str
+    displacement: str
+
+    @property
+    def field(self) -> str:
+        """Its name among the inputs of the equations."""
+        return field_name(self.name)
+
+
 @dataclass(frozen=True, slots=True)
 class Interface:
     """What the interface of a described linkage consists of.
@@ -74,6 +87,7 @@ class Interface:
     parameters : tuple of Parameter
     drives : tuple of Drive
         The freedoms in their order.
+    loads : tuple of Load
     points : mapping
         Own coordinates of each point of each body, as expressions of the equations.
     centres : mapping
@@ -82,6 +96,7 @@ class Interface:
 
     parameters: tuple[Parameter, ...]
     drives: tuple[Drive, ...]
+    loads: tuple[Load, ...]
     points: Mapping[str, Mapping[str, tuple[str, str]]]
     centres: Mapping[str, tuple[str, str]]
 
@@ -154,15 +169,17 @@ def interface(description: Description, structure: Structure) -> Interface:
             points[name] = {body.bar[0]: ("0.0", "0.0"), body.bar[1]: (length, "0.0")}
         for own, at in body.points.items():
             points[name][own] = place(name, own, at)
-        for parameter, at in _mass(name, body):
-            if parameter is not None:
-                found.append(parameter)
-            else:
-                x, y = (
-                    expression(f"{name}.cog_{axis}", value, f"Centre of mass of the {name}, {axis}")
-                    for axis, value in zip("xy", at)
-                )
-                centres[name] = (x, y)
+        mass = _mass(name, body)
+        if mass is not None:
+            found.append(Parameter(f"{name}.mass", "kg", f"Mass of the {name}", mass.mass))
+            if mass.inertia is not None:
+                text = f"Moment of inertia of the {name} about its centre of mass"
+                found.append(Parameter(f"{name}.inertia", "kg.m2", text, mass.inertia))
+            x, y = (
+                expression(f"{name}.cog_{axis}", value, f"Centre of mass of the {name}, {axis}")
+                for axis, value in zip("xy", mass.centre)
+            )
+            centres[name] = (x, y)
     for name in description.slots:
         points[name] = {description.slots[name].pin: ("0.0", "0.0")}
     for joint in structure.joints.values():
@@ -204,21 +221,63 @@ def interface(description: Description, structure: Structure) -> Interface:
             f"linkage.assembly has {', '.join(sorted(unused))}: the joints with two assemblies are {joints}"
         )
     _check_names(found)
-    return Interface(tuple(found), drives, points, centres)
+    return Interface(tuple(found), drives, tuple(_loads(description, structure, points)), points, centres)
 
 
-def _mass(name: str, body: Body) -> Iterator[tuple[Parameter | None, tuple[float, float]]]:
-    """Yield the parameters of a body's mass and, as None with its place, the centre of mass."""
+def _loads(
+    description: Description, structure: Structure, points: Mapping[str, Mapping[str, tuple[str, str]]]
+) -> Iterator[Load]:
+    """Yield the inputs that drive no freedom."""
+    moving = {own for body in description.bodies for own in points[body]}
+    for own in description.loads:
+        if own not in moving:
+            raise unknown_name(own, sorted(moving), f"point {own}, of linkage.loads")
+        fixed = own in description.ground
+        yield from (Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}", "" if fixed else f"{own}.{c}") for c in "xy")
+    for body in description.torques:
+        if body not in description.bodies:
+            raise unknown_name(body, description.bodies, f"body {body}, of linkage.torques")
+        yield Load(f"{body}.torque", "N.m", f"Torque on the {body}", "")
+    for name, spring in description.springs.items():
+        for own in spring.between:
+            if own not in moving | set(description.ground):
+                raise unknown_name(own, sorted(moving), f"point {own}, of linkage.springs.{name}.between")
+        if spring.driven and spring.between:
+            yield Load(f"{name}.force", "N", f"Force that lengthens {name}", f"{name}.length")
+        elif spring.driven:
+            about = isinstance(structure.joints[spring.at], Pin)
+            yield Load(f"{name}.{'torque' if about else 'force'}", "N.m" if about else "N", f"Drive of {name}", "")
+
+
+class _Mass(NamedTuple):
+    """Mass, centre of mass and moment of inertia of a body, the last None where it has none."""
+
+    mass: float
+    centre: tuple[float, float]
+    inertia: float | None
+
+
+def _mass(name: str, body: Body) -> _Mass | None:
+    """Return the mass of a body, as given or of its section; None where it has none."""
+    where = f"linkage.bodies.{name}"
+    if body.section is not None:
+        if body.inertia is not None or body.cog is not None:
+            raise LinkageError(
+                f"{where} has a section: its centre of mass and inertia follow from it, and must not be given"
+            )
+        if not body.bar and not body.section.corners:
+            raise LinkageError(f"{where}.section is none of a plate: the body must have a bar and its length")
+        mass, centre, inertia = body.section.properties(body.length)
+        x, y = (0 if abs(c) < 1e-12 else float(c) for c in centre)
+        # a mass beside a section is weighed: the radius of gyration stays
+        own = mass if body.mass is None else body.mass
+        return _Mass(float(own), (x, y), float(inertia * own / mass))
     if body.mass is None:
         if body.inertia is not None or body.cog is not None:
-            raise LinkageError(f"linkage.bodies.{name} has an inertia or a centre of mass: it must have a mass, too")
-        return
+            raise LinkageError(f"{where} has an inertia or a centre of mass: it must have a mass, too")
+        return None
     centre = body.cog if body.cog is not None else (0.5 * body.length, 0) if body.bar else (0, 0)
-    yield Parameter(f"{name}.mass", "kg", f"Mass of the {name}", body.mass), (0, 0)
-    if body.inertia is not None:
-        text = f"Moment of inertia of the {name} about its centre of mass"
-        yield Parameter(f"{name}.inertia", "kg.m2", text, body.inertia), (0, 0)
-    yield None, (centre[0], centre[1])
+    return _Mass(body.mass, (centre[0], centre[1]), body.inertia)
 
 
 def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
@@ -248,8 +307,8 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
         (f"free_{kind}", spring.free, unit, f"The {kind} at which {name} is free", "free", ""),
     )
     for own, value, in_unit, text, rule, role in rows:
-        if value != 0 or not isinstance(value, int):
-            number = Quantity(in_unit, **({} if rule else {"least": 0.0}))(value, f"{where}.{own}")
+        if given(value):
+            number = (Quantity(in_unit) if rule else Quantity(in_unit, least=0.0))(value, f"{where}.{own}")
             yield Parameter(
                 f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else ""
             )
@@ -265,7 +324,8 @@ def _check_names(found: list[Parameter]) -> None:
             )
 
 
-def size(found: Interface) -> float:
-    """Return a length that is usual for the linkage (m): the greatest coordinate of its points."""
-    lengths: list[Any] = [abs(p.value) for p in found.parameters if p.unit == "m" and "free" not in p.name]
-    return hypot(max(lengths, default=1.0), 0.0)
+def size(found: Interface) -> tuple[float, float]:
+    """Return a length (m), the greatest coordinate of a point, and the mass of all bodies (kg); 1 where there is none."""
+    lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and "free" not in p.name]
+    masses = [p.value for p in found.parameters if p.unit == "kg"]
+    return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

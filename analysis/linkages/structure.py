@@ -21,7 +21,7 @@ class Pin(NamedTuple):
 
 
 class Slider(NamedTuple):
-    """A block on a line of another body, through one of its points; ``inclined`` where the line is not parallel to its x axis."""
+    """A block on a line of another body, through one of its points; ``inclined`` where it is not parallel to its x axis."""
 
     name: str
     bodies: tuple[str, str]
@@ -33,7 +33,7 @@ Joint = Pin | Slider
 
 
 class Freed(NamedTuple):
-    """A body that is known through a freedom: by its joint with ``parent``; ``sign`` is -1 where the body is the joint's first."""
+    """A body that follows through a freedom, its joint with ``parent``; ``sign`` is -1 where it is the joint's first body."""
 
     body: str
     parent: str
@@ -43,7 +43,7 @@ class Freed(NamedTuple):
 
 
 class Geared(NamedTuple):
-    """A gear that is known through its mate's angle: pinned to ``parent``; ``inverse`` where its mate is the second of the pair."""
+    """A gear that follows from its mate's angle, pinned to ``parent``; ``inverse`` where the mate is the second of the pair."""
 
     body: str
     parent: str
@@ -126,15 +126,14 @@ def joints(description: Description) -> dict[str, Joint]:
         for own in body.all_points:
             owners.setdefault(own, []).append(name)
     known = (GROUND, *description.bodies)
-    for kind, tables in (("slides", description.slides), ("slots", description.slots)):
-        for name, table in tables.items():
-            where = f"linkage.{kind}.{name}"
-            named = (table.on, table.body) if kind == "slides" else (table.on,)  # type: ignore[union-attr]
-            for body in named:
-                if body not in known:
-                    raise unknown_name(body, known, f"body {body}, of {where}")
-            if table.on not in owners.get(table.through, ()):
-                raise LinkageError(f"{where}.through is {table.through!r}: it must be a point of {table.on}")
+    for name, slide in description.slides.items():
+        _check_line(f"linkage.slides.{name}", (slide.on, slide.body), slide.through, owners, known)
+        if slide.body in (GROUND, slide.on):
+            raise LinkageError(
+                f"linkage.slides.{name}.body is {slide.body}: it must be a moving body other than that of the line"
+            )
+    for name, slot in description.slots.items():
+        _check_line(f"linkage.slots.{name}", (slot.on,), slot.through, owners, known)
     for name, slot in description.slots.items():
         if slot.pin not in owners:
             raise unknown_name(slot.pin, owners, f"point {slot.pin}, of linkage.slots.{name}")
@@ -145,12 +144,32 @@ def joints(description: Description) -> dict[str, Joint]:
     for name in lines.keys() & found.keys():
         raise LinkageError(f"{name} is a point and a slide: each joint must have a name of its own")
     found |= lines
-    for body in description.bodies:
-        if not any(body in joint.bodies for joint in found.values()):
+    for name, gear in description.gears.items():
+        for part in gear.bodies:
+            if part not in known:
+                raise unknown_name(part, known, f"body {part}, of linkage.gears.{name}")
+    for own in description.bodies:
+        if not any(own in joint.bodies for joint in found.values()):
             raise LinkageError(
-                f"the body {body} is joined to nothing: it must share a point with another, or slide on one"
+                f"the body {own} is joined to nothing: it must share a point with another, or slide on one"
             )
     return found
+
+
+def _check_line(
+    where: str, bodies: tuple[str, ...], through: str, owners: Mapping[str, list[str]], known: tuple[str, ...]
+) -> None:
+    """Raise an error if a line is on a body that is not there, or through a point that the body has not."""
+    for body in bodies:
+        if body not in known:
+            raise unknown_name(body, known, f"body {body}, of {where}")
+    if bodies[0] not in owners.get(through, ()):
+        raise LinkageError(f"{where}.through is {through!r}: it must be a point of {bodies[0]}")
+
+
+def sliders(structure: Structure) -> dict[str, Slider]:
+    """Return the slides and slots by name."""
+    return {name: joint for name, joint in structure.joints.items() if isinstance(joint, Slider)}
 
 
 def mobility(description: Description, found: Mapping[str, Joint]) -> int:
@@ -166,16 +185,16 @@ def analyse(description: Description) -> Structure:
     Raises
     ------
     LinkageError
-        If the number of freedoms is not the linkage's, or the bodies are no chain of dyads from these freedoms; the error names the
-        bodies that are left, and other choices of freedoms that would do.
+        If the number of freedoms is not the linkage's, or the bodies are no chain of dyads from these freedoms; the error
+        names the bodies that are left, and other choices of freedoms that would do.
     """
     found = joints(description)
     count = mobility(description, found)
     freedoms = dict(description.freedoms)
     if not 1 <= count <= MOST_FREEDOMS:
         raise LinkageError(
-            f"{description.name} has {count} freedoms by Gruebler's count, 3 x {len(description.bodies) + len(description.slots)} "
-            f"of its bodies less what the joints take away: it must have 1 to {MOST_FREEDOMS}"
+            f"{description.name} has {count} freedoms by Gruebler's count, three of each body less what the joints take away: "
+            f"it must have 1 to {MOST_FREEDOMS}"
         )
     if not freedoms:
         freedoms = _proposed(description, found, count)
@@ -189,8 +208,8 @@ def analyse(description: Description) -> Structure:
             raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, of linkage.freedoms.{name}")
         if len(found[freedom.joint].bodies) != 2:
             raise LinkageError(
-                f"the freedom {name} is of the pin {freedom.joint} of {', '.join(found[freedom.joint].bodies)}: it must be of one "
-                "of two bodies; give the others a point of another name there"
+                f"the freedom {name} is of the pin {freedom.joint} of {', '.join(found[freedom.joint].bodies)}: it must be of "
+                "one of two bodies; give the others a point of another name there"
             )
     steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
     if left:
@@ -199,8 +218,8 @@ def analyse(description: Description) -> Structure:
             "; these joints as freedoms would do: " + " or ".join(" and ".join(o) for o in others[:3]) if others else ""
         )
         raise LinkageError(
-            f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: their "
-            f"places do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"
+            f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: they "
+            f"do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"
         )
     names = (*description.bodies, *description.slots)
     return Structure(names, found, freedoms, tuple(steps))
@@ -287,7 +306,7 @@ def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tu
 
 
 def _dyads(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Iterator[Dyad]:
-    """Yield the pairs of groups that follow from bodies whose places are known; ``trees`` are the freedoms from each body on."""
+    """Yield the pairs of groups that follow from known bodies; ``trees`` are the freedoms from each body on."""
     base = set(known)
     sides = [
         Side(body, parent, joint, tuple(inside))

@@ -1,12 +1,12 @@
 """Kinematics and forces of planar linkages built of dyads: what the equations of every described linkage consist of.
 
-Every vector and every turn carries its velocity coefficients: one column for each freedom, the change with that coordinate, and
-as last column the bias acceleration, which is left when all coordinates have no acceleration. With coordinates q and rates v the
+Every vector and every turn carries its velocity coefficients: one column for each freedom, the change with that coordinate,
+and as last column the bias acceleration, which is left when no coordinate accelerates. With coordinates q and rates v the
 velocity is the sum of column times v, the acceleration the sum of column times q'' plus the bias.
 
-A dyad is a pair of bodies, each joined to a base whose motion is known and both to each other; its two unknowns follow in
-closed form (Artobolevskii's groups of the second class; Haug, Computer Aided Kinematics and Dynamics, 1989, ch. 3). R is a pin, P
-a slide; the middle letter is the joint between the two bodies. The functions are straight lines of arithmetic.
+A dyad is a pair of bodies, joined to each other and each to a body whose motion is known; its two unknowns follow in closed
+form (the groups of the second class of Assur and Artobolevskii). R is a pin, P a slide; the middle letter is the joint
+between the two bodies. The functions are straight lines of arithmetic.
 
 Throughout u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90 degrees.
 """
@@ -182,8 +182,8 @@ def _shares(c: float, s: float, a: Vector) -> tuple[tuple[float, float], ...]:
 def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Rates) -> tuple[Turn, Turn, float]:
     """Solve the dyad RRR: body 1 is pinned at p, body 2 at q, and they at each other at the ends of their arms a and b.
 
-    ``branch`` is the sign of (C - p) x (C - q), C the pin between them. Returns both directions and the sine of the transmission
-    angle, positive in the branch.
+    ``branch`` is the sign of (C - p) x (C - q), C the pin between them. Returns both directions and the sine of the
+    transmission angle, positive in the branch.
     """
     dx, dy = q.x - p.x, q.y - p.y
     dd, aa, bb = dx * dx + dy * dy, a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y
@@ -219,9 +219,9 @@ def pin_pin_slide(
 ) -> tuple[Turn, Vector, float]:
     """Solve the dyad RRP: body 1 is pinned at p, body 2, a block, slides on the line through o of direction t.
 
-    ``a`` and ``b`` are their arms to the pin between them, ``b`` from the block's origin, which is on the line. ``branch`` is the
-    sign of the component of C - p along the line, C that pin. Returns the direction of body 1, the position of the block as an
-    arm along the line, and the sine of the angle between body 1 and the normal of the line.
+    ``a`` and ``b`` are their arms to the pin C between them, ``b`` from the block's origin, which is on the line.
+    ``branch`` is the sign of the component of C - p along the line. Returns the direction of body 1, the position of the
+    block as an arm along the line, and the sine of the angle between body 1 and the normal of the line.
     """
     x0, y0, share, bias = _on_line(o, t, b)
     fx, fy = o.x + x0 - p.x, o.y + y0 - p.y
@@ -252,7 +252,7 @@ def pin_pin_slide(
 def slide_pin_slide(
     o: Vector, t: Turn, a: Vector, p: Vector, r: Turn, b: Vector, v: Rates
 ) -> tuple[Vector, Vector, float]:
-    """Solve the dyad PRP: blocks on two lines, through o along t and through p along r, pinned at the ends of their arms a and b.
+    """Solve the dyad PRP: blocks on the lines through o along t and through p along r, pinned at the ends of their arms a, b.
 
     Returns their positions as arms along their lines, and the magnitude of the sine of the angle between the lines.
     """
@@ -292,9 +292,9 @@ def _slid(z: float, rate: float, share: list[float], bias: float) -> Vector:
 def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Rates) -> tuple[Turn, Vector, float]:
     """Solve the dyad RPR: body 1, which holds a line, is pinned at p, body 2, its block, at q.
 
-    ``a`` is the pin p in the axes of the line, from the line's origin; ``b`` the pin q in the block's, which are parallel.
-    ``branch`` is the sign of the component of q - p along the line. Returns the direction of the line, the position of the block
-    as an arm along it, and the sine of the angle between line and the normal of q - p.
+    ``a`` is the pin p in the axes of the line, from the line's origin; ``b`` the pin q in the block's axes, which are
+    parallel. ``branch`` is the sign of the component of q - p along the line. Returns the direction of the line, the position
+    of the block as an arm along it, and the sine of the angle between the line and the normal of q - p.
     """
     dx, dy = q.x - p.x, q.y - p.y
     lever = minus(b, a)
@@ -325,9 +325,9 @@ def pin_slide_slide(
 ) -> tuple[Vector, Vector, float]:
     """Solve the dyad RPP: body 2 slides on the line through o along t, body 1 is pinned at p and slides on body 2, or 2 on it.
 
-    ``r`` is the direction of the slide between them, ``a`` the pin p in its axes from body 1's end of it, ``b`` the other end,
-    on body 2, in the axes of t from the origin of body 2. Returns the position of body 2 along its line, that of body 1 along the
-    slide from the end on body 2, and the magnitude of the sine of the angle between both lines.
+    ``r`` is the direction of the slide between them, ``a`` the pin p in its axes from body 1's end of it, ``b`` the other
+    end, on body 2, in the axes of t from the origin of body 2. Returns the position of body 2 along its line, that of body 1
+    along the slide from the end on body 2, and the magnitude of the sine of the angle between both lines.
     """
     x1, y1, share1, bias1 = _on_line(o, t, b)
     pin = turned(r, a)
@@ -457,7 +457,7 @@ def moment_about(f: Wrench, at: Vector) -> float:
 
 
 def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c; ``on1`` and ``on2`` are what their joints must give."""
+    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c; their joints must give ``on1`` and ``on2``."""
     ux, uy, wx, wy = c.x - p.x, c.y - p.y, c.x - q.x, c.y - q.y
     # u x F = m1, w x F = -m2
     m1, m2, cross = moment_about(on1, p), moment_about(on2, q), ux * wy - uy * wx

@@ -1,7 +1,7 @@
-"""Planar linkages in all coordinates of their bodies: closure written from the description, Lagrange multipliers for the joints.
+"""Planar linkages in all coordinates of their bodies: closure from the description, Lagrange multipliers for the joints.
 
-Nothing of `linkwork.planar` or of the structure analysis is used: each body has a place (x, y, angle), each joint its equations, and
-accelerations and joint forces follow from one linear system.
+Nothing of `linkwork.planar` or of the structure analysis is used: each body has a place (x, y, angle), each joint its
+equations, and accelerations and joint forces follow from one linear system.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from analysis.linkages.description import GROUND, Description
 
 
 class Solution(NamedTuple):
-    """Accelerations of the freedoms, loads on them, forces by joint: (x, y) of pins, (across, couple) of slides; kinetic energy."""
+    """Accelerations of the freedoms, loads on them, kinetic energy; by joint (x, y) of a pin, (across, couple) of a slide."""
 
     accelerations: np.ndarray
     loads: np.ndarray
@@ -96,17 +96,6 @@ class Multipliers:
         first, second = self.owners[joint]
         return self.pose(second)[2] - self.pose(first)[2]
 
-    def potential(self) -> Any:
-        """Energy of springs and gravity."""
-        total = casadi.SX(0)
-        g = self.d.gravity * np.array([np.cos(self.d.gravity_direction), np.sin(self.d.gravity_direction)])
-        for name in self.bodies:
-            x, y = self.centre(name)
-            total -= (self.d.bodies[name].mass or 0.0) * (g[0] * x + g[1] * y)
-        for s in self.d.springs.values():
-            total += 0.5 * float(s.stiffness) * (self.stretch(s) - float(s.free)) ** 2
-        return total
-
     def moving(self, own: str) -> str:
         """The body on which a force at a point acts: the first that moves, where several are pinned there."""
         return next((body for body in self.owners[own] if body != GROUND), GROUND)
@@ -151,8 +140,12 @@ class Multipliers:
         loads: np.ndarray,
         commanded: Mapping[int, float],
         points: Mapping[str, tuple[float, float]],
+        forces: Mapping[str, float],
     ) -> Solution:
-        """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations."""
+        """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations.
+
+        ``points`` are forces on points, ``forces`` torques on bodies and forces of driven springs by their names.
+        """
         jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
         drift = casadi.jtimes(
             casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
@@ -163,14 +156,19 @@ class Multipliers:
             vx, vy = (casadi.jtimes(c, self.q, self.v) for c in self.centre(name))
             kinetic += 0.5 * (body.mass or 0.0) * (vx**2 + vy**2) + 0.5 * (body.inertia or 0.0) * self.v[3 * n + 2] ** 2
         momentum = casadi.gradient(kinetic, self.v)
-        force = (
-            casadi.gradient(kinetic, self.q)
-            - casadi.jtimes(momentum, self.q, self.v)
-            - casadi.gradient(self.potential(), self.q)
-        )
-        for s in self.d.springs.values():
+        force = casadi.gradient(kinetic, self.q) - casadi.jtimes(momentum, self.q, self.v)
+        g = self.d.gravity * np.array([np.cos(self.d.gravity_direction), np.sin(self.d.gravity_direction)])
+        for name in self.bodies:
+            for component, c in zip(g, self.centre(name)):
+                force += (self.d.bodies[name].mass or 0.0) * component * casadi.gradient(c, self.q)
+        for name, s in self.d.springs.items():
             measure = self.stretch(s)
-            force -= float(s.damping) * casadi.jtimes(measure, self.q, self.v) * casadi.gradient(measure, self.q)
+            x, v = measure - float(s.free), casadi.jtimes(measure, self.q, self.v)
+            law = eval(s.law, {"x": x, "v": v, "fabs": casadi.fabs}) if s.law else 0.0
+            pull = float(s.stiffness) * x + float(s.damping) * v + law - forces.get(name, 0.0)
+            force -= pull * casadi.gradient(measure, self.q)
+        for name in self.d.torques:
+            force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
         for own, (fx, fy) in points.items():
             x, y = self.at(self.moving(own), own)
             force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
@@ -195,7 +193,7 @@ class Multipliers:
         multipliers = solution[len(q) :]
         all_loads = loads.copy()
         all_loads[held] = multipliers[size:]
-        forces = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
+        joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
         for name, gear in self.d.gears.items():
-            self.share(forces, q, gear, float(forces[name][0]))
-        return Solution(accelerations, all_loads, forces, float(energy[0, 0]))
+            self.share(joints, q, gear, float(joints[name][0]))
+        return Solution(accelerations, all_loads, joints, float(energy[0, 0]))
