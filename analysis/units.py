@@ -14,6 +14,7 @@ from linkwork.errors import ParameterError
 from linkwork.units import CM_PER_METRE as CM_PER_METRE
 from linkwork.units import INCH as INCH
 from linkwork.units import RAD_S_PER_RPM as RAD_S_PER_RPM
+from linkwork.variables import UNITS
 
 #: A number in SI, or a text with its unit such as "420 rpm", which `in_si` converts to a float; also an array or list of them.
 Amount = Any
@@ -37,6 +38,12 @@ _PINT = {
     "N.m/rad": "N*m/rad",
     "N.m.s/rad": "N*m*s/rad",
 }
+
+
+def display_of(unit: str) -> tuple[str, float]:
+    """Return the unit in which tables and pictures show a quantity, such as mm for m, and the factor to it."""
+    displays = UNITS[unit].displays if unit in UNITS else ()
+    return displays[0] if displays else (unit, 1.0)
 
 
 def with_unit(value: float, unit: str) -> str:

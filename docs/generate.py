@@ -228,7 +228,7 @@ def closed_form_pictures() -> Iterator[Picture]:
 
     for name, count in (("five-poses", 6), ("four-poses", 1)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        yield name, plot(guidance(case.task, count), title=case.title), 72
+        yield name, plot(guidance(case.task, count), title=case.title), 90
 
 
 def race_pictures() -> Iterator[Picture]:

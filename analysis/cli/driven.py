@@ -14,6 +14,7 @@ import click
 from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED, mechanism_of
+from ..units import display_of
 from .common import (
     ENDED_EARLY,
     INTERRUPTED,
@@ -110,6 +111,7 @@ def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def swing_of(orbit: Any) -> tuple[str, float, str]:
-    """Return the coordinate whose amplitude is printed, with factor and unit: centimetres for lengths."""
-    what, unit = orbit.swing
-    return (what, 100.0, "cm") if unit == "m" else (what, 1.0, unit)
+    """Return the coordinate whose amplitude is printed, with factor and unit: millimetres for lengths."""
+    what, si = orbit.swing
+    unit, factor = display_of(si)
+    return what, factor, unit

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from ..libraries import MissingLibraryError
-from .common import console, handled, print_error, say
+from .common import check_place, console, handled, print_error, say
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The examples: beside the package in a checkout, inside it where Linkwork is installed as a wheel.
@@ -24,7 +24,12 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
 @click.command()
 @click.argument("models", nargs=-1, metavar="[MODEL]...")
 @click.option(
-    "--dest", default="build", show_default=True, type=click.Path(file_okay=False), help="Folder for the FMUs."
+    "--dest",
+    default="build",
+    show_default=True,
+    type=click.Path(file_okay=False),
+    callback=check_place,
+    help="Folder for the FMUs.",
 )
 @click.option(
     "--kinds",
@@ -45,6 +50,7 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
     "--publish",
     metavar="FOLDER",
     type=click.Path(file_okay=False),
+    callback=check_place,
     help="Write each FMU there too, with inputs, reference results and who imports it.",
 )
 @handled

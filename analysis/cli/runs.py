@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
@@ -14,7 +14,7 @@ from linkwork import __version__
 from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED
-from ..units import RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
@@ -44,6 +44,8 @@ from .common import (
 
 #: Outputs in the plot of a check beside the freedoms, of those that the mechanism has.
 COMPARED = ("drive.applied_torque", "pin.C.fx", "pin.C.fy", "slider_pin.fx", "slider_pin.fy")
+#: Share of the largest value in the same unit below which a value is rounding, and printed as zero.
+_ROUNDING = 1e-12
 #: Where the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
 
@@ -162,15 +164,38 @@ def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[s
 def _print_extremes(title: str, result: Any) -> None:
     """Print least, greatest and last value of each output of a run, and its events."""
     headings = ("output", "unit", "least", "greatest", "at the end")
-    columns = ((name, result[name]) for name in result.names)
+    columns = [(name, si, (x.min(), x.max(), x[-1])) for name, x, si in _with_magnitudes(result)]
+    largest: dict[str, float] = {}
+    for _, si, values in columns:
+        largest[si] = max(largest.get(si, 0.0), *map(abs, values))
+    rows = []
+    for name, si, values in columns:
+        unit, factor = display_of(si)
+        numbers = (factor * v if abs(v) > _ROUNDING * largest[si] else 0.0 for v in values)
+        rows.append((name, unit, *(f"{number:.6g}" for number in numbers)))
     show_table(
         f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
         headings,
-        [(name, result.units[name], *(f"{v:.6g}" for v in (x.min(), x.max(), x[-1]))) for name, x in columns],
+        rows,
         words=headings[:2],
     )
     for event in result.events:
         console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
+
+
+def _with_magnitudes(result: Any) -> Iterator[tuple[str, Any, str]]:
+    """Yield name, values and SI unit of each output of a run, and after a joint's forces their magnitude."""
+    import numpy as np
+
+    from ..mechanisms import mechanism_of
+
+    joints = {} if result.parameters is None else mechanism_of(result.parameters).joints
+    last = {names[-1]: (joint, names) for joint, names in joints.items() if set(names) <= set(result.names)}
+    for name in result.names:
+        yield name, result[name], result.units[name]
+        if name in last:
+            joint, names = last[name]
+            yield f"{joint} force", np.sqrt(sum(result[one] ** 2 for one in names)), result.units[name]
 
 
 @click.command()

@@ -35,7 +35,7 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     operation = family.parameters, family.drive
     # a percent of nothing is nothing
     names = [name for name in gradient_names(*operation) if name != family.vary and value_of(*operation, name) != 0.0]
-    what, size, cm = swing_of(response.branches[0].orbits[0])
+    what, size, length = swing_of(response.branches[0].orbits[0])
     rows, shown = [], []
     for word, point in _points(response):
         try:
@@ -45,14 +45,14 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
             continue
         place, amplitude = found.place, found.amplitude
         rows.append([factor * place.value, size * amplitude.value, *_shares(place), *_shares(amplitude)])
-        shown.append((word, f"{rows[-1][0]:.2f}", _named(place), f"{rows[-1][1]:.4f}", _named(amplitude)))
+        shown.append((word, f"{rows[-1][0]:.2f}", _named(place), f"{rows[-1][1]:.3f}", _named(amplitude)))
     if not rows:
         console.print("no special point of which one could say what moves it", highlight=False)
         return []
-    headings = ["", f"at [{unit}]", f"its place: {family.name}", f"amplitude [{cm}]", f"amplitude of {what} there"]
+    headings = ["", f"at [{unit}]", f"its place: {family.name}", f"amplitude [{length}]", f"amplitude of {what} there"]
     title = "what moves it most: percent for a percent of a parameter"
     show_table(title, headings, shown, words=headings[::2])
-    headings = [f"at [{unit}]", f"amplitude of {what} [{cm}]"]
+    headings = [f"at [{unit}]", f"amplitude of {what} [{length}]"]
     headings += [f"{of} by {name} [%/%]" for of in ("place", "amplitude") for name in names]
     return [write_csv(path, dict(zip(headings, np.array(rows).T)))]
 

@@ -210,9 +210,9 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     if not entries:
         console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
         return
-    what, size, cm = swing_of(response.branches[0].orbits[0])
+    what, size, length = swing_of(response.branches[0].orbits[0])
     names = () if table is None else tuple(table.amplitudes)
-    headings = ("", f"at [{unit}]", f"amplitude [{cm}]", "motion", *(f"{name} [{cm}]" for name in names))
+    headings = ("", f"at [{unit}]", f"amplitude [{length}]", "motion", *(f"{name} [{length}]" for name in names))
     if table is not None and _friction(response.family.parameters):
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     entries.sort(key=lambda entry: entry[1].parameter)
@@ -221,9 +221,9 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
         (
             word,
             f"{factor * extremum.parameter:.2f}",
-            f"{size * extremum.amplitude:.4f}",
+            f"{size * extremum.amplitude:.3f}",
             extremum.stability.value,
-            *(f"{size * values[number]:.4f}" for values in beside),
+            *(f"{size * values[number]:.3f}" for values in beside),
         )
         for number, (word, extremum) in enumerate(entries)
     ]
@@ -239,13 +239,13 @@ def _avoid(response: Any, factor: float, unit: str) -> None:
     else:
         rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.risk.value) for a in ranges]
         show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
-    what, size, cm = swing_of(response.branches[0].orbits[0])
+    what, size, length = swing_of(response.branches[0].orbits[0])
     for jump in response.jumps:
         side, way = ("below", "rises") if jump.direction > 0 else ("above", "falls")
         after = " or ".join(f"{size * amplitude:.4g}" for amplitude in jump.after)
-        then = f"it jumps to {after} {cm}" if after else "it ends, and no other stable motion was followed"
+        then = f"it jumps to {after} {length}" if after else "it ends, and no other stable motion was followed"
         say(
-            f"the stable motion of {size * jump.before:.4g} {cm} of {what} is there only {side} "
+            f"the stable motion of {size * jump.before:.4g} {length} of {what} is there only {side} "
             f"{factor * jump.parameter:.6g} {unit}: where {response.family.name} {way} past it, {then}"
         )
 

@@ -163,9 +163,32 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         "jump": (run, [trace.jump]),
         "jump_forward": ([*run, dx, du, dp], forward([trace.jump], at, change)),
         "jump_reverse": ([*run, *jump_weights], jump_gradient),
+        "following": ([*run, (rates := sx.sym("rates", mechanism.size))], [_following(mechanism, trace, rates)]),
         "forward": ([*run, dx, du, dp, *beside], forward(values, at, change)),
         "reverse": ([*run, *weights, *beside], gradient),
     }
+
+
+def _following(mechanism: Mechanism, trace: equations.Traced, rates: Any) -> Any:
+    """Return the derivative of a state x whose motion is jump(x, u) with commands that move at an unknown rate.
+
+    ``rates`` is the derivative F of the motion for some accelerations of the commands. What they are does not matter: a change
+    of a command alters the motion by jump_u, as it alters F, so that jump_x x' = F - jump_u a holds for all a alike.
+    """
+    casadi = symbolic.library()
+    s, n = trace.symbols, len(mechanism.freedoms)
+    moving = casadi.SX.zeros(len(mechanism.channels))
+    for number, channel in enumerate(mechanism.channels):
+        if channel.kind == "command":
+            moving[number] = rates[n + channel.freedom]
+
+    def along(change: Any) -> Any:
+        return casadi.jtimes(trace.jump, casadi.vertcat(s.x, s.u), casadi.vertcat(change, moving))
+
+    free = casadi.diag(casadi.jacobian(trace.jump, s.x))[n : 2 * n]  # 1 for a freedom that nothing commands, else 0
+    kept = casadi.vertcat(rates[: 2 * n], 0.0, 0.0)
+    result = casadi.vertcat(rates[:n], rates[n : 2 * n] - free * (along(kept) - kept)[n : 2 * n], 0.0, 0.0)
+    return casadi.vertcat(result[: 2 * n], (rates - along(result))[2 * n :])
 
 
 def _in_solution(

@@ -66,8 +66,8 @@ _NOTES = (
     "The equations are those of the Python sources of Linkwork, written as C and compiled; nothing but the C library is "
     "needed. The sources are in the archive.",
     "In model exchange the state is that of crank and slider and the work done; the event indicator is the distance from "
-    "the limit of assembly. A commanded speed is taken at the initialisation and at events: between events the "
-    "acceleration input is its rate of change.",
+    "the limit of assembly. A commanded speed is followed at every instant; accelerations, torque and "
+    "forces are those of the acceleration input, which must move with it.",
 )
 
 

@@ -97,6 +97,8 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch);
 int instance_state(unsigned reference);
 
 /* Model exchange */
+/* WARNING, and a sentence, where commands contradicted their accelerations. */
+Status instance_check_commands(Instance *c);
 void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);
 Status instance_set_time(Instance *c, const char *function, double time);
 Status instance_set_states(Instance *c, const char *function, const double x[], size_t count);

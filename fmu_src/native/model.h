@@ -67,6 +67,7 @@ Equation equations_derivative;    /* x, m, u, p -> x' */
 Equation equations_outputs;       /* x, m, u, p -> y */
 Equation equations_clearance;     /* x, m, u, p -> clearance */
 Equation equations_jump;          /* x, m, u, p -> x */
+Equation equations_following;     /* x, m, u, p, derivative of the motion -> x' where the motion is that of a jump to u */
 Equation equations_jump_forward;  /* x, m, u, p, dx, du, dp -> dx */
 Equation equations_jump_reverse;  /* x, m, u, p, gx -> gx, gu, gp */
 Equation equations_forward;       /* x, m, u, p, dx, du, dp -> dy, dx', dclearance */

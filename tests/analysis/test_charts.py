@@ -118,7 +118,7 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     traces = np.loadtxt(found.boundaries_to_csv(tmp_path / "boundaries.csv"), delimiter=",", skiprows=1)
     assert set(traces[:, 0]) == set(range(1, len(found.boundaries) + 1))
     figure = figures.plot(found, title="chart")
-    assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
+    assert figure.axes[0].get_xlabel() == "crank speed [rpm]"
 
 
 @pytest.mark.slow

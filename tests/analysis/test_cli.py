@@ -341,7 +341,7 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     assert "speeds to avoid" in result.output
     assert "resonance, above 0.71 of the peak" in result.output
     out = tmp_path / "out"
-    assert "amplitude of u [cm]" in (out / "rig-2-spring-c-resonance.html").read_text(encoding="utf-8")
+    assert "amplitude of u [mm]" in (out / "rig-2-spring-c-resonance.html").read_text(encoding="utf-8")
     header = (out / "rig-2-spring-c-resonance.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header.startswith("branch,drive.speed [rad/s],turns in a period")
     assert (out / "rig-2-spring-c-resonance.png").read_bytes().startswith(b"\x89PNG")
@@ -356,7 +356,7 @@ def test_resonance_says_what_moves_it(linkwork, tmp_path):
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     # half a percent for a percent of the stiffness: w^2 = k / m; an amplitude that the damper alone limits
-    assert re.search(r"maximum │ +586\.1\d │ slider\.stiffness \+0\.49\d* +│ +1\.7153 ", result.output), result.output
+    assert re.search(r"maximum │ +586\.1\d │ slider\.stiffness \+0\.49\d* +│ +17\.153 ", result.output), result.output
     path = tmp_path / "out" / "rig-2-spring-c-resonance-sensitivity.csv"
     columns = dict(zip(*(row.split(",") for row in path.read_text(encoding="utf-8").splitlines())))
     assert float(columns["amplitude by slider.damping [%/%]"]) == pytest.approx(-1.0, abs=0.02)
@@ -380,11 +380,11 @@ def test_resonance_reports_a_fold(linkwork):
     assert "fold at 1035.97" in result.output
     sentence = next(line for line in result.output.splitlines() if "it jumps to" in line)
     assert sentence.startswith(
-        "the stable motion of 3.791 cm of u is there only below 1035.97 rpm: where drive.speed rises"
+        "the stable motion of 37.91 mm of u is there only below 1035.97 rpm: where drive.speed rises"
     )
     # the large motion at the fold, found by itself
     rig = SETS["rig-1-spring-b"].parameters
-    large = [100.0 * orbit.amplitude for orbit in find_orbits(rig, speed="1035.97 rpm").stable][-1]
+    large = [1e3 * orbit.amplitude for orbit in find_orbits(rig, speed="1035.97 rpm").stable][-1]
     assert float(sentence.split()[-2]) == pytest.approx(large, rel=2e-3)
 
 
@@ -467,7 +467,7 @@ def test_constant_inputs_of_a_case_count(linkwork, tmp_path):
     result = linkwork("stability", "case.toml", "--no-chart")
     assert result.exit_code == 0, result.output
     orbit = find_orbit(TABLE_3_1, speed=10.0 * np.pi, inputs=Inputs(force=5.0, load_y=-20.0))
-    assert f"amplitude {100.0 * orbit.amplitude:.5g} cm" in result.output
+    assert f"amplitude {1e3 * orbit.amplitude:.5g} mm" in result.output
     assert "at 300 rpm" in result.output
     bare = linkwork("stability", "--published", "table-3.1", "--set", "drive.speed=300 rpm", "--no-chart")
     assert bare.exit_code == 0, bare.output
@@ -508,3 +508,34 @@ def test_periodic_motion_of_a_mechanism_of_which_nothing_is_free_is_refused(link
     result = linkwork(*words, "--published", "rahman-ideal")
     assert result.exit_code == 1
     assert "nothing of the slider-crank is free at a prescribed speed" in result.stderr
+
+
+def test_a_run_is_printed_in_mm_deg_and_rpm_with_the_size_of_joint_forces(linkwork):
+    result = linkwork("run", "--published", "table-3.1", "--no-plot")
+    lines = [[cell.strip() for cell in line.strip("│").split("│")] for line in result.output.splitlines()]
+    rows = {cells[0]: (cells[1], [float(cell) for cell in cells[2:]]) for cells in lines if len(cells) == 5}
+    assert rows["crank.angle"] == ("deg", [0.0, 1080.0, 1080.0])
+    assert rows["crank.speed"] == ("rpm", [420.0] * 3)
+    # a crank of 5 cm
+    assert rows["coupler.point.y"] == ("mm", [-50.0, 50.0, 0.0])
+    (_, x), (_, y), (unit, size) = (rows[f"pin.A{part}"] for part in (".fx", ".fy", " force"))
+    assert unit == "N"
+    assert size[2] == pytest.approx(np.hypot(x[2], y[2]), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "--published", "table-3.1", "--out"],
+        ["stability", "--published", "table-3.1", "--out"],
+        ["synthesize", str(EXAMPLES / "hand-drawn.toml"), "--out"],
+        ["slider-crank", "tolerances", "--out"],
+        ["build", "--dest"],
+        ["studio", "--out"],
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_computed(linkwork, tmp_path, command):
+    (tmp_path / "file").touch()
+    result = linkwork(*command, tmp_path / "file" / "new")
+    assert result.exit_code == 2
+    assert "is no folder" in " ".join(result.stderr.split())

@@ -94,7 +94,7 @@ def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
     assert rows.shape == (81, 3)
     assert set(rows[:, 2]) <= {-1.0, 0.0, 1.0, 2.0}
     axis = plot(picture, title="basins").axes[0]
-    assert axis.get_xlabel() == "slider.position [m]"
+    assert axis.get_xlabel() == "slider position at crank angle 0 [mm]"
     assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == ["stable motion", "unstable motion"]
     assert plot(picture.found).axes
 
@@ -259,7 +259,7 @@ def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
     )
     assert chart.beside is not None
     assert (chart.beside.stable == 2).all()
-    assert [axis.get_ylabel() for axis in plot(chart).axes][:3] == ["slider.damping [N.s/m]"] * 3
+    assert [axis.get_ylabel() for axis in plot(chart).axes][:3] == ["slider damping [N.s/m]"] * 3
     assert len(np.loadtxt(chart.beside.to_csv(tmp_path / "motions.csv"), delimiter=",", skiprows=1)) == 9
 
 

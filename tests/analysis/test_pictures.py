@@ -72,12 +72,12 @@ def test_arrows_go_where_the_machine_jumps(folded: Response, axes: list[Axes]) -
         for a in annotations(axes[0])
         if not a.get_text()
     }
-    # up from 1 m at 102 to 4 m, down from 3 m at 98 to 0; in centimetres
-    assert arrows == {(102.0, 100.0, 400.0), (98.0, 300.0, 0.0)}
+    # up from 1 m at 102 to 4 m, down from 3 m at 98 to 0; in millimetres
+    assert arrows == {(102.0, 1000.0, 4000.0), (98.0, 3000.0, 0.0)}
     texts = {a.get_text(): a.xy for a in annotations(axes[0]) if a.get_text()}
-    assert texts["100 cm only below 102;\nrising, it jumps to 400 cm"] == (102.0, 100.0)
-    assert any(text.startswith("300 cm only above 98;\nfalling, it jumps to ") for text in texts)
-    assert texts["doubling, 100"] == (100.0, 550.0)
+    assert texts["1000 mm only below 102;\nrising, it jumps to 4000 mm"] == (102.0, 1000.0)
+    assert any(text.startswith("3000 mm only above 98;\nfalling, it jumps to ") for text in texts)
+    assert texts["doubling, 100"] == (100.0, 5500.0)
 
 
 def test_stability_and_special_points_are_told_without_colours(folded: Response, axes: list[Axes]) -> None:
@@ -86,20 +86,20 @@ def test_stability_and_special_points_are_told_without_colours(folded: Response,
     unstable = curve.largest_multiplier > 1.0
     assert (solid.get_linestyle(), dashed.get_linestyle()) == ("-", "--")
     assert (np.isnan(solid.get_ydata()) == unstable).all()
-    assert dashed.get_ydata()[unstable] == pytest.approx(100.0 * curve.amplitude[unstable])
+    assert dashed.get_ydata()[unstable] == pytest.approx(1e3 * curve.amplitude[unstable])
     # the dashed line meets the solid one on both sides
     assert np.isfinite(dashed.get_ydata()).sum() == unstable.sum() + 2
     marks = {line.get_marker(): line.get_xydata().tolist() for line in axes[0].lines if line.get_marker() in "sD"}
-    assert marks == {"s": [[102.0, 100.0], [98.0, 300.0]], "D": [[100.0, 550.0]]}
+    assert marks == {"s": [[102.0, 1000.0], [98.0, 3000.0]], "D": [[100.0, 5500.0]]}
     assert next(line.get_label() for line in axes[0].lines if line.get_marker() == "$2$") == "period of 2 turns"
 
 
 def test_harmonics_have_their_numbers(folded: Response, axes: list[Axes]) -> None:
     harmonics = axes[1]
-    assert harmonics.get_ylabel() == "harmonics of u,\none turn [cm]"
+    assert harmonics.get_ylabel() == "harmonics of u,\none turn [mm]"
     assert harmonics.get_yscale() == "log"
     curve = folded.branches[0]
-    for order, share in ((1, 90.0), (2, 10.0)):
+    for order, share in ((1, 900.0), (2, 100.0)):
         (letters,) = (line for line in harmonics.lines if line.get_marker() == f"${order}$")
         x, y = letters.get_data()
         assert letters.get_label() == f"harmonic {order}"
@@ -122,12 +122,19 @@ def test_errors_have_gaps_where_no_motion_is_stable(folded: Response) -> None:
     assert np.isnan(y).sum() == 1
 
 
-def test_nothing_to_tell_apart_has_no_legend_and_nothing_shaded() -> None:
+def test_a_single_stable_motion_is_named_and_nothing_shaded() -> None:
     x = np.linspace(1.0, 2.0, 30)
     main, *_ = figures.plot(response(branch(x, 1.0 + 0.01 * x, 0.5))).axes
-    assert main.get_legend() is None
+    assert [text.get_text() for text in main.get_legend().get_texts()] == ["stable motion"]
     assert not shaded(main)
     assert not list(annotations(main))
+
+
+def test_peaks_that_stand_out_have_speed_and_amplitude() -> None:
+    x = np.linspace(-1.0, 1.0, 41)
+    for largest, expected in ((0.5, ["peak, 10.07: 2000 mm"]), (2.0, [])):
+        main, *_ = figures.plot(response(branch(10.07 + x, 2.0 - (x - 0.0) ** 2, largest))).axes
+        assert [a.get_text() for a in annotations(main) if a.get_text()] == expected
 
 
 @pytest.mark.parametrize("count", [1, 12])
@@ -166,7 +173,7 @@ def test_page_has_the_same_values_to_full_precision(folded: Response) -> None:
     at = main["x"].index(float(folded.branches[0].parameter[3]))
     names = [row.partition(":")[0] for row in main["hovertemplate"].removesuffix("<extra></extra>").split("<br>")]
     said = dict(zip(names[2:], main["customdata"][at]))
-    assert names[:2] == ["p", "amplitude of u [cm]"]
+    assert names[:2] == ["p", "amplitude of u [mm]"]
     torque = 2.0 * folded.branches[0].amplitude[3]
     assert said == {
         "branch": 1,
@@ -302,10 +309,16 @@ class _Motion(SimpleNamespace):
 
 
 def test_basins_name_the_motion_that_a_start_ends_in() -> None:
-    flow = SimpleNamespace(components=(("q", "m"), ("q'", "m/s")), size=2)
+    flow = SimpleNamespace(components=(("q", "m"), ("q'", "m/s")), size=2, period=2.0 * np.pi)
     motions = [
         _Motion(
-            start=np.array([0.1 * n, 0.0]), amplitude=0.01 * n, largest=0.5, swing=("q", "m"), flow=flow, turns=turns
+            start=np.array([0.1 * n, 0.0]),
+            amplitude=0.01 * n,
+            largest=0.5,
+            swing=("q", "m"),
+            flow=flow,
+            turns=turns,
+            turn=lambda samples, turns=turns: SimpleNamespace(period=turns / 7.0),
         )
         for n, turns in ((1, 1), (2, 1), (3, 4))
     ]
@@ -316,12 +329,14 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
         found=SimpleNamespace(orbits=tuple(motions), stable=(motions[0], motions[2])),  # type: ignore[arg-type]
         computed=0,
     )
-    (part,) = figures.picture(found).parts
+    picture = figures.picture(found, title="rig")
+    assert picture.title == "rig: basins at 420 rpm"
+    (part,) = picture.parts
     said = part.hover["it"]
-    assert said[0][0] == said[1][1] == "ends in motion 1, amplitude of q 1 cm"
-    assert said[0][1] == "ends in motion 2 of 4 turns, amplitude of q 3 cm"
+    assert said[0][0] == said[1][1] == "ends in motion 1, amplitude of q 10 mm"
+    assert said[0][1] == "ends in motion 2 of 4 turns, amplitude of q 30 mm"
     assert said[1][0] == "comes to the limit of assembly"
     assert list(part.classes) == [said[0][0], said[0][1], said[1][0]]
     assert part.values.tolist() == [[0, 1], [2, 0]]
     stable, unstable = part.panel.curves
-    assert (list(stable.x), list(unstable.x)) == ([pytest.approx(0.1), pytest.approx(0.3)], [pytest.approx(0.2)])
+    assert (list(stable.x), list(unstable.x)) == ([pytest.approx(100), pytest.approx(300)], [pytest.approx(200)])

@@ -145,7 +145,7 @@ def coexistence(
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
     code = row_code(kernels.solve_all)
-    data, computed = Keeping(folder, n_jobs, progress, "motions").rows(
+    data, computed = Keeping(folder, n_jobs, progress, "motions", kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
@@ -310,7 +310,7 @@ def basins(
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = motions[0].point, row_code(kernels.settle_starts)
-    ends, computed = Keeping(folder, n_jobs, progress, "starts").rows(
+    ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),
         up.tolist(),
         [row_name([point], known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
