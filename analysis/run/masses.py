@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import atan2, hypot, isclose
 from typing import Any, NamedTuple
@@ -162,7 +162,8 @@ def mass_origins(
             length, own = get(field_name(link.length)), getattr(base, field_name(link.length))
             kept = [n for n in (link.mass, *link.centre[:1], link.inertia) if n not in flat]
             if kept and not isclose(length, own):
-                stale = f"{link.length} is {millimetres(length)} where {source} has {millimetres(own)}, whose {', '.join(kept)} stay"
+                now, then = millimetres(length), millimetres(own)
+                stale = f"{link.length} is {now} where {source} has {then}, whose {', '.join(kept)} stay"
         found.append(Mass(name, get(field_name(name)), origin, stale))
     return tuple(found)
 
