@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import json
 import math
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from ctypes import byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint32, c_void_p
 from pathlib import Path
@@ -1085,6 +1087,48 @@ def test_nothing_asked_is_nothing_wrong(library: Library) -> None:
                 assert c(f"{verb}{kind}", references, n, values, c_size_t(2)) == ERROR
                 assert "2 numbers: it must be 1" in c.log[-1][1]
         assert c("GetOutputDerivatives", references, n, (c_int * 1)(1), values, c_size_t(2)) == ERROR
+
+
+TRAPPING = """
+import ctypes, math, sys
+from pathlib import Path
+from tests.fmu.native import Library
+c = Library(Path(sys.argv[1]), Path(sys.argv[2]))
+libm = ctypes.CDLL("libm.so.6")
+traps = 1 | 4 | 8  # invalid, division by zero, overflow
+beyond = (ctypes.c_double * 6)(0.0, 9.0, 1.0, 0.0, 0.0, 0.0)
+for kind in ("cs", "me"):
+    cases = dict(crank__length=math.nan, crank__mass=1e300, ground__length=9.0, drive__speed=math.inf, gravity=0.0)
+    for name, value in cases.items():
+        i = c.instance(kind)
+        i.set(**{name: value})
+        libm.feenableexcept(traps)
+        i.enter()
+        bad = i("ExitInitializationMode")
+        i.get("crank.acceleration", "assembly.margin_to_limit")
+        if not bad and kind == "cs":
+            i.set(drive__speed=1e200)
+            i.step(0.0, 1e-3)
+            i.step(math.nan, 1e-3)
+        elif not bad:
+            i("EnterContinuousTimeMode")
+            i("SetContinuousStates", beyond, ctypes.c_size_t(6))
+            i("GetDerivatives" if c.fmi == 2 else "GetContinuousStateDerivatives", beyond, ctypes.c_size_t(6))
+            i("GetEventIndicators", beyond, ctypes.c_size_t(1))
+            i.get("crank.acceleration")
+        assert libm.fegetexcept() == traps
+        libm.fedisableexcept(traps)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="traps are set by glibc")
+def test_a_host_that_traps_floating_point_exceptions_lives(five_bar: Library, tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-c", TRAPPING, five_bar.archive, tmp_path],
+        check=True,
+        timeout=60,
+        cwd=Path(__file__).parents[2],
+    )
 
 
 def test_versions(library: Library) -> None:
