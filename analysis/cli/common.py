@@ -409,7 +409,8 @@ def show_table(
     grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
         justify: Any = "left" if heading in words else "right"
-        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped)
+        # in a narrow terminal a long word is broken, not cut
+        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
     for row, style in zip(rows, styles):
         grid.add_row(*(plain(cell) for cell in row), style=style)
     console.print(grid)
