@@ -197,6 +197,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
         ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
         ("workers.md", 1, 1, ()),
+        ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
     ],
 )
 def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_path):

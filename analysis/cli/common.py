@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -106,9 +107,24 @@ def tolerance_option(*names: str, default: float | None = None, help: str) -> Ca
     )
 
 
+def check_place(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    """Check, as a callback of an option, that a folder or a file can be made, before anything is computed."""
+    if value is None:
+        return value
+    place = Path(value)
+    # a file is replaced by another one in its folder
+    there = next(path for path in ((place, *place.parents) if place.is_dir() else place.parents) if path.exists())
+    if not there.is_dir():
+        raise click.BadParameter(f"{value} cannot be made: {there} is no folder")
+    if not os.access(there, os.W_OK):
+        raise click.BadParameter(f"{value} cannot be written: {there} is read-only")
+    return value
+
+
 def out_option(default: str = "out", help: str = "Folder for CSV and plots.") -> Callable[..., Any]:
     """Return a decorator that adds the options --out and --force."""
-    out = click.option("--out", default=default, show_default=True, type=click.Path(file_okay=False), help=help)
+    kind = click.Path(file_okay=False)
+    out = click.option("--out", default=default, show_default=True, type=kind, callback=check_place, help=help)
     return lambda command: out(force_option(command))
 
 
@@ -278,10 +294,13 @@ _OTHERS = {
 
 def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return the kind of a case file, judged by the names of its tables; None if they do not show it."""
+    from ..linkages import described_in
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, acting_on
 
     names = set(tables)
+    if described_in(tables) and not names & {"tune", "task"}:
+        return RUN
     if "tune" in names:
         return TUNING
     if "task" in names:
@@ -390,7 +409,8 @@ def show_table(
     grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
         justify: Any = "left" if heading in words else "right"
-        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped)
+        # in a narrow terminal a long word is broken, not cut
+        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
     for row, style in zip(rows, styles):
         grid.add_row(*(plain(cell) for cell in row), style=style)
     console.print(grid)

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from ..libraries import MissingLibraryError
-from .common import console, handled, print_error, say
+from .common import check_place, console, handled, print_error, say
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The examples: beside the package in a checkout, inside it where Linkwork is installed as a wheel.
@@ -24,7 +24,12 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
 @click.command()
 @click.argument("models", nargs=-1, metavar="[MODEL]...")
 @click.option(
-    "--dest", default="build", show_default=True, type=click.Path(file_okay=False), help="Folder for the FMUs."
+    "--dest",
+    default="build",
+    show_default=True,
+    type=click.Path(file_okay=False),
+    callback=check_place,
+    help="Folder for the FMUs.",
 )
 @click.option(
     "--kinds",
@@ -45,22 +50,26 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
     "--publish",
     metavar="FOLDER",
     type=click.Path(file_okay=False),
+    callback=check_place,
     help="Write each FMU there too, with inputs, reference results and who imports it.",
 )
 @handled
 def build(
     models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str], publish: str | None
 ) -> None:
-    """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider.
+    """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider, or described in a file.
 
     \b
     Examples:
       linkwork build
       linkwork build FiveBarSlider --dest fmus --kinds python
       linkwork build --kinds native,native-fmi3 --platforms all
+      linkwork build press.toml
     """
     from ..export import KINDS, build_all, kinds_here
+    from ..linkages import load_linkage
 
+    models = [load_linkage(name).fmu if Path(name).suffix in (".toml", ".json") else name for name in models]
     with console.status("building"):
         for fmu, for_platforms in build_all(models, dest, kinds, platforms, publish_to=publish):
             made = f", {' '.join(for_platforms)}" if for_platforms else ""

@@ -11,7 +11,17 @@ import click
 from ..files import write_tables, write_text
 from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
 from ..probe import probe as probe_fmu
-from .common import CHECK_FAILED, console, force_option, handled, print_error, print_written, say, show_table
+from .common import (
+    CHECK_FAILED,
+    check_place,
+    console,
+    force_option,
+    handled,
+    print_error,
+    print_written,
+    say,
+    show_table,
+)
 
 
 @click.command()
@@ -35,7 +45,7 @@ from .common import CHECK_FAILED, console, force_option, handled, print_error, p
     "--hang", default=10.0, show_default=True, type=click.FloatRange(0.1), help="A call that takes so many s hangs."
 )
 @click.option("--check", "checks", multiple=True, metavar="CHECK", help="Only this check; can be given often.")
-@click.option("--out", type=click.Path(dir_okay=False), help="File for the report: .md or .json.")
+@click.option("--out", type=click.Path(dir_okay=False), callback=check_place, help="File for the report: .md or .json.")
 @force_option
 @click.option("--strict", is_flag=True, help="Fail on what is questionable, too.")
 @click.option(

@@ -76,7 +76,7 @@ def slider_motion(
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
-            print_error("note: the pivot is on a second crank, which the plant does not have: no forces are computed")
+            print_error("note: a five-bar whose second crank is geared cannot be simulated yet: no forces are computed")
         else:
             written += _dynamics(chosen, solution, folder, plots)
     elif isinstance(pivot, SliderMotion):

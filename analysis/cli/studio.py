@@ -19,6 +19,7 @@ from .common import (
     RUN,
     changes,
     check_kind,
+    check_place,
     force_option,
     handled,
     number_or_text,
@@ -33,7 +34,12 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 
 @click.command()
 @click.argument("what", required=False)
-@click.option("--out", type=click.Path(dir_okay=False), help="Write the page here as a file, and serve nothing.")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False),
+    callback=check_place,
+    help="Write the page here as a file, and serve nothing.",
+)
 @click.option("--browser/--no-browser", default=True, show_default=True, help="Whether to open a browser.")
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="On which the page is served; by default one that is free."

@@ -82,12 +82,13 @@ def _print(title: str, tuned: Any) -> None:
     from ..periodic import unit_of
 
     wish = tuned.wish
-    columns = (a.tolist() for a in (wish.present, tuned.values, tuned.x))
-    rows = [
-        (name, unit_of(mechanism_of(wish.parameters), name), f"{before:.7g}", f"{after:.7g}", f"{x:+.4g}")
-        for name, before, after, x in zip(wish.names, *columns)
-    ]
-    headings = ("parameter", "unit", "before", "after", "change in tolerances")
+    rows = []
+    for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
+        # a percent of nothing is nothing
+        change = f"{100.0 * (after / before - 1.0):+.4g} %" if before else f"{after:+.4g}"
+        unit = unit_of(mechanism_of(wish.parameters), name)
+        rows.append((name, unit, f"{before:.7g}", f"{after:.7g}", change if after != before else "none"))
+    headings = ("parameter", "unit", "before", "after", "change")
     show_table(f"{title}: the least change", headings, rows, words=headings[:2])
     headings = ("requirement", "wished", "before", "after", "")
     rows = [(r.name, r.wished, r.before.text, r.after.text, "met" if r.met else "not met") for r in tuned.requirements]

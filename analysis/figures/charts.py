@@ -13,12 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
-from ..units import display_of
+from ..units import RAD_S_PER_RPM, display_of
 from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, pictured
-from .style import COLOURS, LIGHT, legend_above
+from .style import COLOURS, LIGHT, legend_above, spoken, spoken_label
 
 #: Colour of points that have no value.
 EMPTY = "0.82"
@@ -136,7 +137,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     if not chart.classes:
         # the scale is part of the chart, and no axes of its own
         scale = axis.inset_axes((1.03, 0.0, 0.05, 1.0))
-        figure.colorbar(mesh, cax=scale, label=chart.label)
+        figure.colorbar(mesh, cax=scale, label=chart.label, ticks=_ticks(norm), format="%g")
         scale.grid(False)
     handles, labels = axis.get_legend_handles_labels()
     for colour, hatch, name in keys_of(chart):
@@ -145,11 +146,22 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     if not handles:
         return
     if chart.panel.legend_at == "above":
-        legend_above(axis, handles=handles, labels=labels, ncols=2)
+        legend_above(axis, handles=handles, labels=labels, ncols=3 if len(handles) > 4 else 2)
     else:
         # over the colours a legend needs a ground
         where: Any = chart.panel.legend_at if chart.panel.legend_at != "outside" else "best"
         axis.legend(handles, labels, loc=where, frameon=True, framealpha=0.9)
+
+
+def _ticks(norm: Normalize) -> list[float] | None:
+    """Return ticks on both sides of the middle of a scale, which has as much room for either; None if it has no middle."""
+    if not isinstance(norm, TwoSlopeNorm):
+        return None
+    least, middle, greatest = (float(value or 0.0) for value in (norm.vmin, norm.vcenter, norm.vmax))
+    sides = ((least, middle), (middle, greatest))
+    ticks = {tick for low, high in sides for tick in MaxNLocator(4).tick_values(low, high) if low <= tick <= high}
+    near = 0.1 * min(high - low for low, high in sides)
+    return sorted({tick for tick in ticks if abs(tick - middle) > near} | {middle})
 
 
 def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:
@@ -196,15 +208,18 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
                 x=[x.factor * run.x for run in those],
                 y=[y.factor * run.y for run in those],
                 colour="0.1",
+                hollow=True,
                 line="",
-                marker={Outcome.DECAYS: "o", Outcome.GROWS: "x", Outcome.BOUNDED: "s"}[outcome],
+                marker={Outcome.DECAYS: "o", Outcome.GROWS: "X", Outcome.BOUNDED: "s"}[outcome],
+                order=4.0,
+                cut=False,
                 label=f"long run {outcome.value}",
             )
         )
     low, high = (np.array([chart.box.x[i], chart.box.y[i]]) * [x.factor, y.factor] for i in (0, 1))
     panel = Panel(
-        x_label=x.label,
-        y_label=y.label,
+        x_label=spoken_label(x.label),
+        y_label=spoken_label(y.label),
         curves=curves,
         legend_at="above",
         x_range=(float(low[0]), float(high[0])),
@@ -262,7 +277,8 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
 @pictured
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
     """Plot each start in the colour of the motion in which it ends, and the motions at the crank angle 0."""
-    x_label, y_label = found.labels
+    name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
+    drawn, scale = display_of(position_unit)
     half = len(found.motions[0].start) // 2
     what, unit = found.motions[0].swing
     shown, factor = display_of(unit)
@@ -272,7 +288,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         if those:
             curves.append(
                 Curve(
-                    x=[orbit.start[0] for orbit in those],
+                    x=[scale * orbit.start[0] for orbit in those],
                     y=[orbit.start[half] for orbit in those],
                     line="",
                     marker=marker,
@@ -285,11 +301,11 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
                 )
             )
     panel = Panel(
-        x_label=x_label,
-        y_label=y_label,
+        x_label=f"{spoken(name)} at crank angle 0 [{drawn}]",
+        y_label=spoken_label(found.labels[1]),
         curves=curves,
         legend_at="above",
-        x_range=(float(found.position[0]), float(found.position[-1])),
+        x_range=(scale * float(found.position[0]), scale * float(found.position[-1])),
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
     names = [
@@ -303,9 +319,12 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
             numbers[found.ends == end] = len(names)
             names.append(words)
     colours = [*islice(cycle(LIGHT), len(found.motions)), EMPTY, "0.95"]
+    orbit = found.motions[0]
+    speed = orbit.flow.period * orbit.turns / orbit.turn(2).period / RAD_S_PER_RPM
+    title = f"{title}: basins at {speed:.4g} rpm".removeprefix(": ")
     map_ = HeatMap(
         panel=panel,
-        x=found.position,
+        x=scale * found.position,
         y=found.rate,
         values=np.ma.MaskedArray(numbers.astype(float)),
         label="where a start ends",

@@ -44,8 +44,8 @@ _Arguments = ParamSpec("_Arguments")
 class Curve:
     """One line of a panel: points (n,), what the legend calls it, and how it looks where that is not left to the panel.
 
-    A marker between dollars, such as "$2$", is the letters themselves. What ``hover`` has by its name with unit, each of
-    length n, is beside x and y under the pointer.
+    A marker between dollars, such as "$2$", is the letters themselves; without ``cut`` a marker is whole at the edge of the
+    axes. What ``hover`` has by its name with unit, each of length n, is beside x and y under the pointer.
     """
 
     x: ArrayLike
@@ -57,6 +57,7 @@ class Curve:
     hollow: bool = False
     width: float | None = None
     order: float | None = None
+    cut: bool = True
     hover: Mapping[str, ArrayLike] = field(default_factory=dict)
 
 
@@ -303,5 +304,6 @@ def _draw_curve(axis: Axes, curve: Curve, colour: str) -> None:
         markeredgewidth=0.3 if letters else THIN if curve.hollow else LINE,
         zorder=curve.order or (3 if curve.marker else 2),
         # letters on a line are read on a ground of their own
+        clip_on=curve.cut,
         path_effects=[withStroke(linewidth=3.0, foreground="white")] if letters else None,
     )

@@ -5,30 +5,33 @@ Lengths are shown in mm, angles in degrees.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, degrees
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from ..synthesis import Guidance, GuidanceMap, Solution
+from ..synthesis import Dyad, Guidance, GuidanceMap, Solution
 from .dispatch import plot
+from .marks import label_place, place_marks
 from .style import (
     COLOURS,
-    COUPLER,
     CRANK,
     DOT,
     GROUND,
-    LETTER,
-    LINE,
     ROCKER,
+    SLIDER,
     SMALL,
     TARGET,
     THIN,
+    TRACE,
     finish,
     styled,
+    write_notes,
     write_title,
 )
 
@@ -43,63 +46,81 @@ VIEW = 2.2
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
     """Plot the poses with every dyad, and beside them every four-bar with its defects."""
     count = len(found.solutions)
-    columns = min(4, max(1, count))
-    rows = max(1, ceil(count / columns)) if count else 0
+    columns = 3
+    rows = ceil(count / columns)
     with styled():
-        figure = Figure(figsize=(9.6, 4.4 + 2.7 * rows))
-        parts: Any = figure.subfigures(2, 1, height_ratios=(4.4, 2.7 * rows)) if rows else [figure]
-        axis = parts[0].subplots()
+        figure = Figure(figsize=(9.0, 4.0 + 3.2 * rows))
+        parts: Any = figure.subfigures(2, 1, height_ratios=(4.0, 3.2 * rows)) if rows else [figure]
+        poses, axis = parts[0].subplots(1, 2)
+        _draw_poses(poses, found, numbered=True)
+        poses.margins(0.15)
+        poses.set_title("the poses: a long arm along the body, a short one across")
+        _to_scale(poses)
         _draw_poses(axis, found)
-        for number, dyad in enumerate(found.dyads):
+        for dyad, colour in zip(found.dyads, COLOURS):
             x, y = _parts(MM_PER_METRE * np.array([dyad.pivot, dyad.point], dtype=complex))
-            colour = COLOURS[number % len(COLOURS)]
-            axis.plot(x, y, linewidth=LINE, zorder=4, color=colour, label=f"dyad {number + 1}")
+            axis.plot(x, y, linewidth=2.4, zorder=4, color=colour)
             axis.plot(x[0], y[0], "^", markersize=7.0, zorder=5, color=colour)
             axis.plot(x[1], y[1], "o", markersize=DOT, zorder=5, color=colour, markerfacecolor="white")
-        if found.dyads:
-            axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="pivot, point in pose 1")
-        axis.set_title(found.describe())
+        axis.set_title("links between a fixed pivot (triangle)\nand a point of the body (circle), in pose 1")
         _to_scale(axis)
         if rows:
             panels = parts[1].subplots(rows, columns, squeeze=False).ravel()
             for panel, (number, solution) in zip(panels, enumerate(found.solutions, start=1)):
-                _draw_four_bar(panel, solution, found)
+                _draw_poses(panel, found)
+                _draw_links(panel, solution, found.dyads)
+                panel.set_aspect("equal", adjustable="datalim")
                 panel.set_title(f"{number}: {_verdict(solution)}", fontsize=SMALL)
             for panel in panels[count:]:
                 panel.set_visible(False)
-        write_title(figure, title)
-        return finish(figure)
+        write_title(figure, f"{title}: {found.describe()}".removeprefix(": "))
+        write_notes(
+            figure, ["Thick: the crank, in the colour of its link above. Thin triangle: the body with its point."]
+        )
+        return place_marks(finish(figure))
 
 
 @plot.register
 def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
-    """Plot the poses with the curves of pivots and points, the best linkage, and the pairs of dyads that are sound."""
+    """Plot the poses with the curves of pivots and points and the best linkage, and how good each pivot of a crank can be."""
     with styled():
-        figure = Figure(figsize=(10.4, 4.8))
-        left, right = figure.subplots(1, 2)
-        _draw_poses(left, found)
+        figure = Figure(figsize=(10.4, 5.4))
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        _draw_poses(left, found, numbered=True)
         for curve, colour, label in (
-            (found.pivots, GROUND, "pivots"),
-            (found.points, COUPLER, "points of the body in pose 1"),
+            (found.pivots, GROUND, "where a fixed pivot can be"),
+            (found.points, TRACE, "where its point of the body is in pose 1"),
         ):
-            left.plot(*_parts(MM_PER_METRE * curve), ".", markersize=2.0, color=colour, zorder=2, label=label)
+            left.plot(*_parts(MM_PER_METRE * curve), ".", markersize=3.0, color=colour, zorder=2, label=label)
         if found.solutions:
             _draw_links(left, found.solutions[0])
-        _to_scale(left)
+        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        best = np.degrees(np.where(found.sound, found.transmission, 0.0).max(axis=1, initial=0.0))
+        x, y = _parts(MM_PER_METRE * found.pivots)
+        right.plot(x[best <= 0.0], y[best <= 0.0], ".", markersize=3.0, color="0.75", label="with a defect")
+        order = np.argsort(best)[np.count_nonzero(best <= 0.0) :]
+        dots = right.scatter(x[order], y[order], c=best[order], s=16.0, cmap="viridis", zorder=4)
+        if found.solutions:
+            a = MM_PER_METRE * np.array(found.solutions[0].linkage.pins(0.0)["A"])
+            right.plot(
+                *a, "o", markersize=13.0, markerfacecolor="none", color=CRANK, zorder=5, label="best, as on the left"
+            )
+        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        scale = right.inset_axes((1.03, 0.0, 0.05, 1.0))
+        figure.colorbar(
+            dots, cax=scale, label="pivot of the crank: least transmission angle\nwith the best rocker [deg]"
+        )
+        scale.grid(False)
         low, high = _view(found)
-        left.set_aspect("equal", adjustable="box")
-        left.set_xlim(low.real, high.real)
-        left.set_ylim(low.imag, high.imag)
-        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-        shown = np.ma.masked_where(~found.sound, np.degrees(found.transmission))
-        image = right.imshow(shown, origin="lower", aspect="auto", cmap="viridis", interpolation="nearest")
-        figure.colorbar(image, ax=right, label="least transmission angle on the way [deg]")
-        right.set_xlabel("dyad that is the rocker")
-        right.set_ylabel("dyad that is the crank")
-        right.set_title(f"{int(found.sound.sum())} of {found.sound.size - len(found.sound)} pairs are sound")
-        right.grid(False)
-        write_title(figure, title)
-        return finish(figure)
+        for axis in (left, right):
+            axis.set_aspect("equal", adjustable="box")
+            axis.set_xlabel("x [mm]")
+            axis.set_ylabel("y [mm]")
+            axis.set_xlim(low.real, high.real)
+            axis.set_ylim(low.imag, high.imag)
+        number = f"{int(found.sound.sum())} of {found.sound.size - len(found.sound)} pairs of links are sound four-bars"
+        write_title(figure, f"{title}: {number}".removeprefix(": "))
+        return place_marks(finish(figure))
 
 
 def _parts(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -112,41 +133,51 @@ def _poses(found: Guidance | GuidanceMap) -> tuple[NDArray[np.complex128], NDArr
     return points @ np.array([1.0, 1j]), np.asarray(found.task.angle), float(np.hypot(*np.ptp(points, axis=0)))
 
 
-def _view(found: Guidance | GuidanceMap) -> tuple[complex, complex]:
+def _view(found: GuidanceMap) -> tuple[complex, complex]:
+    """Return opposite corners of a square that holds the poses, what is near them, and the best linkage."""
     places, _, size = _poses(found)
     middle = complex(np.mean(places))
-    return middle - 0.5 * VIEW * size * (1 + 1j), middle + 0.5 * VIEW * size * (1 + 1j)
+    held = [middle - 0.5 * VIEW * size * (1 + 1j), middle + 0.5 * VIEW * size * (1 + 1j)]
+    if found.solutions:
+        held += _pins(found.solutions[0]).values()
+    low, high = (
+        complex(min(z.real for z in held), min(z.imag for z in held)),
+        complex(max(z.real for z in held), max(z.imag for z in held)),
+    )
+    half = 0.53 * max((high - low).real, (high - low).imag) * (1 + 1j)
+    return 0.5 * (low + high) - half, 0.5 * (low + high) + half
 
 
-def _draw_poses(axis: Axes, found: Guidance | GuidanceMap) -> None:
-    """Draw each pose as a mark with a long arm along the body and a short one across, with its number."""
+def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = False) -> None:
+    """Draw each pose as a mark with a long arm along the body and a short one across."""
     places, angles, size = _poses(found)
     for number, (place, angle) in enumerate(zip(places, angles), start=1):
         along = ARM * size * np.exp(1j * angle)
         mark = place + np.array([along, 0.0, 0.5j * along])
         axis.plot(*_parts(mark), color=TARGET, linewidth=2.2, zorder=3, solid_joinstyle="miter")
-        beside = place - 0.45 * (along + 1j * along)
-        axis.text(beside.real, beside.imag, str(number), ha="center", va="center", fontsize=LETTER, zorder=6)
+        if numbered:
+            label_place(axis, (place.real, place.imag), str(number))
 
 
-def _draw_links(axis: Axes, solution: Solution) -> None:
-    """Draw the links in the first pose."""
+def _pins(solution: Solution) -> dict[str, complex]:
+    """Return the pins in the first pose (mm)."""
     assert solution.evaluation.rotation is not None
-    pins = {
-        name: MM_PER_METRE * complex(*place)
-        for name, place in solution.linkage.pins(float(solution.evaluation.rotation[0])).items()
-    }
-    for ends, colour in (("AB", CRANK), ("BC", COUPLER), ("DC", ROCKER)):
-        axis.plot(*_parts(np.array([pins[n] for n in ends])), color=colour, linewidth=2.4, zorder=6)
-    axis.plot(*_parts(np.array([pins[n] for n in "BPC"])), color=COUPLER, linewidth=THIN, zorder=6)
+    pins = solution.linkage.pins(float(solution.evaluation.rotation[0]))
+    return {name: MM_PER_METRE * complex(*place) for name, place in pins.items()}
+
+
+def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = ()) -> None:
+    """Draw the links in the first pose; crank and rocker in the colours of the ``dyads`` that they are, the crank thick."""
+    pins = _pins(solution)
+    pivots = np.array([MM_PER_METRE * dyad.pivot for dyad in dyads])
+    for ends, colour, width in (("AB", CRANK, 4.0), ("DC", ROCKER, 2.0)):
+        if len(pivots):
+            colour = COLOURS[int(np.abs(pivots - pins[ends[0]]).argmin()) % len(COLOURS)]
+        axis.plot(*_parts(np.array([pins[n] for n in ends])), color=colour, linewidth=width, zorder=6)
+    body = Polygon(np.column_stack(_parts(np.array([pins[n] for n in "BPC"]))), facecolor="0.5", alpha=0.15, zorder=4)
+    axis.add_patch(body)
+    axis.plot(*_parts(np.array([pins[n] for n in "BPCB"])), color=SLIDER, linewidth=THIN, zorder=5)
     axis.plot(*_parts(np.array([pins[n] for n in "AD"])), "^", color=GROUND, markersize=6.0, zorder=7)
-
-
-def _draw_four_bar(axis: Axes, solution: Solution, found: Guidance) -> None:
-    _draw_poses(axis, found)
-    _draw_links(axis, solution)
-    axis.set_aspect("equal", adjustable="datalim")
-    axis.tick_params(labelsize=7.0)
 
 
 def _verdict(solution: Solution) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import find_peaks
 from shapely import LineString, distance
 from shapely import points as make_points
 
@@ -25,12 +26,11 @@ from ..periodic import (
     SpecialPoint,
     Stability,
     fold_jumps,
-    ranges_to_avoid,
 )
 from ..units import RAD_S_PER_RPM, display_of
 from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
-from .style import COLOURS, LINE, THIN
+from .style import COLOURS, LINE, THIN, spoken
 
 #: Lines of the approximations beside, of motions by their stability, and of the reader's figure that has all panels.
 _LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))
@@ -44,6 +44,8 @@ _COMPARED, _BESIDE = 240, 60
 _HIDDEN = 1.5 * LINE
 #: Relative error (%) that counts as none; harmonic, relative to the greatest, that does.
 _NONE, _SMALL = 1e-3, 2e-5
+#: Height above the valleys about it, relative to the axis, from which a peak has a text.
+_STANDS_OUT = 0.01
 #: Letters along a branch.
 _LETTERS = 7
 
@@ -67,7 +69,8 @@ class _Scale:
 
     @property
     def axis(self) -> str:
-        return f"{self.family.name} [{self.unit}]" if self.unit else self.family.name
+        name = spoken(self.family.name)
+        return f"{name} [{self.unit}]" if self.unit else name
 
     def place(self, value: float) -> str:
         """Return a value of the parameter in drawn units as text, to four digits or more to tell values apart."""
@@ -115,8 +118,9 @@ def describe_branches(
     rpm: bool = True,
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[Avoided] = (),
+    caution: str = "",
 ) -> Picture:
-    """Return the picture that `plot_branches` draws."""
+    """Return the picture that `plot_branches` draws, with a line above the legend on what the ranges do not know."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     rpm &= family.unit == "rad/s"
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
@@ -128,7 +132,8 @@ def describe_branches(
         for a in avoid
     ]
     bare = [Shade(low=shade.low, high=shade.high, label="", number=shade.number) for shade in shades]
-    panels = [_amplitudes(branches, look, others, shades), _harmonics(branches, look, bare)]
+    amplitudes = replace(_amplitudes(branches, look, others, shades), legend=caution)
+    panels = [amplitudes, _harmonics(branches, look, bare)]
     if others:
         panels.append(_errors(others, look, bare))
     panels += _loads(branches, look, bare)
@@ -169,6 +174,7 @@ def _amplitudes(
         Label(x=look.factor * special.parameter, y=look.scale * special.orbit.amplitude, text=text)
         for text, special in met.items()
     ]
+    labels += [label for branch in branches if branch.turns == 1 for label in _peaks(branch, look, top)]
     return Panel(
         x_label=look.axis,
         y_label=f"amplitude of {look.what} [{look.shown}]",
@@ -193,6 +199,20 @@ def _jump(jump: FoldJump, look: _Scale) -> str:
         return there + "ends here"
     sizes = " or ".join(look.size(after) for after in jump.after)
     return f"{there}jumps to {sizes} {look.shown}"
+
+
+def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
+    """Return the texts of the peaks of a branch that are stable and stand out, with speed and amplitude."""
+    x, y = branch.parameter, look.scale * branch.amplitude
+    found, _ = find_peaks(y, prominence=_STANDS_OUT * top)
+    labels = []
+    for n in (n for n in found if not _unstable(branch)[n]):
+        # the vertex of the parabola through three points
+        near = x[n - 1 : n + 2] - x[n]
+        bend, slope, height = np.polyfit(near, y[n - 1 : n + 2], 2)
+        place, tall = (x[n] - 0.5 * slope / bend, height - 0.25 * slope**2 / bend) if bend < 0.0 else (x[n], y[n])
+        labels.append(Label(x=look.factor * place, y=tall, text=f"peak, {look.place(place)}: {tall:.4g} {look.shown}"))
+    return labels
 
 
 def _is_met(branch: Branch, special: SpecialPoint) -> bool:
@@ -269,7 +289,7 @@ def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump
 
 
 def _keys(branches: Sequence[Branch]) -> list[Curve]:
-    """Return the entries of the legend; none for a single branch that is stable throughout."""
+    """Return the entries of the legend: turns of the period if there are several, and stability."""
     turns = sorted({branch.turns for branch in branches})
     words = {str(word) for branch in branches for word in _words(branch)}
     keys = []
@@ -284,12 +304,12 @@ def _keys(branches: Sequence[Branch]) -> list[Curve]:
             )
             for n in turns
         ]
-    if words != {Stability.STABLE.value}:
-        keys += [
-            Curve(x=[], y=[], colour="0.3", line=line, label=word.value)
-            for word, line in _STABLE.items()
-            if word.value in words
-        ]
+    colour = "0.3" if len(turns) > 1 else COLOURS[0]
+    keys += [
+        Curve(x=[], y=[], colour=colour, line=line, label=f"{word.value} motion")
+        for word, line in _STABLE.items()
+        if word.value in words
+    ]
     return keys
 
 
@@ -462,7 +482,8 @@ def plot_branch(branch: Branch, *, title: str = "") -> Picture:
     Ranges to avoid are shaded.
     """
     low, high = float(branch.parameter.min()), float(branch.parameter.max())
-    return describe_branches([branch], title=title, avoid=ranges_to_avoid([branch], low, high))
+    alone = Response(branches=(branch,), low=low, high=high, problems=())
+    return describe_branches([branch], title=title, avoid=alone.speeds_to_avoid, caution=alone.caution)
 
 
 @pictured
@@ -476,4 +497,5 @@ def plot_response(
         rpm=rpm,
         beside=None if beside is None else beside.at,
         avoid=response.speeds_to_avoid,
+        caution=response.caution,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,8 +25,10 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _STILL = 1e-9
 #: Share of the largest value by which two runs differ in nothing but rounding.
 _ROUNDING = 1e-12
-#: Inches: width of the mechanism's picture and of a panel, height of a panel.
-_PICTURE, _WIDTH, _HEIGHT = 4.2, 6.4, 1.55
+#: Inches: width of a panel beside the mechanism's picture, of a panel alone, and its height.
+_BESIDE, _WIDTH, _HEIGHT = 5.3, 6.4, 1.55
+#: What stands for the picture of the mechanism among the numbers of panels.
+_DRAWN = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,28 +75,49 @@ def plot_outputs(
         panels = [_output(run, table, name) for name in names]
     if run.status:
         notes.append(f"The run ended early: {run.message}.")
-    rows = ceil(len(panels) / columns)
     with styled():
-        left = _PICTURE if picture else 0.0
-        figure = Figure(figsize=(left + _WIDTH * columns, max(1.0 + _HEIGHT * rows, 3.6 if picture else 0.0)))
-        # a footnote is beneath both
-        wide = (left, _WIDTH * columns) if picture else (1.0,)
-        *drawing, curves = figure.subfigures(1, len(wide), width_ratios=wide, squeeze=False)[0]
-        axes = curves.subplots(rows, columns, sharex=True, squeeze=False)
-        for axis, panel in zip(axes.flat, panels):
-            _draw(axis, run.time, panel)
-        for axis in axes.flat[len(panels) :]:
-            axis.remove()
-        for axis in axes[-1]:
-            axis.set_xlabel("time [s]")
-        curves.align_ylabels()
-        for beside in drawing:
-            axis = beside.subplots()
-            axis.set_anchor("N")
+        grid = _with_picture(len(panels)) if picture else _in_columns(len(panels), columns)
+        width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if picture else (_WIDTH * columns, _HEIGHT)
+        figure = Figure(figsize=(width, 1.0 + height * len(grid)))
+        cells = figure.add_gridspec(*grid.shape)
+
+        def place(number: int, **options: Any) -> Axes:
+            rows, places = np.nonzero(grid == number)
+            made: Axes = figure.add_subplot(cells[rows.min() : rows.max() + 1, places[0]], **options)
+            return made
+
+        axes: list[Axes] = []
+        for number, panel in enumerate(panels):
+            axes.append(place(number, sharex=axes[0] if axes else None))
+            _draw(axes[-1], run.time, panel)
+        for column in grid.T.tolist():
+            of_panels = [axes[number] for number in dict.fromkeys(column) if number in range(len(panels))]
+            for axis in of_panels[:-1]:
+                axis.tick_params(labelbottom=False)
+            for axis in of_panels[-1:]:
+                axis.set_xlabel("time [s]")
+            figure.align_ylabels(of_panels)
+        if picture:
+            axis = place(_DRAWN)
             axis.set_title(draw_mechanism(run.parameters, axis, run), fontsize=SMALL, color=MARKED)
         write_title(figure, title)
         write_notes(figure, notes)
         return finish(figure)
+
+
+def _in_columns(count: int, columns: int) -> NDArray[np.int64]:
+    """Return the numbers of panels row by row; greater ones where there is none."""
+    rows = ceil(count / columns)
+    return np.arange(rows * columns).reshape(rows, columns)
+
+
+def _with_picture(count: int) -> NDArray[np.int64]:
+    """Return the numbers of panels in two columns, the left one with the picture of the mechanism above its panels."""
+    rows = max(2, ceil((count + 2) / 2))
+    right = [min(n, count - 1) for n in range(rows)]
+    below = list(range(rows, count))
+    left = [_DRAWN] * (rows - len(below)) + below
+    return np.array([left, right]).T
 
 
 def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:

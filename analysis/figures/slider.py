@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from ..slider import SliderDrive, TrackingResult
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
+from .style import ROUNDING
 
 
 @plot.register
@@ -34,12 +35,17 @@ def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
 def plot_tracking(run: TrackingResult, *, title: str = "") -> Figure:
     """Plot the errors of slider and coupler point, and the slider force, over the time of the run."""
     time = run.loop.time
+    rows = (
+        ("slider error [mm]", 1e3 * run.error),
+        ("coupler point error [mm]", 1e3 * run.point_error),
+        ("control force [N]", run.loop.force),
+    )
+    drawn = [label for label, values in rows if np.ptp(values) > ROUNDING]
     panels = [
         Panel(x_label="time [s]", y_label=label, curves=[Curve(x=time, y=values)])
-        for label, values in (
-            ("slider error [mm]", 1e3 * run.error),
-            ("coupler point error [mm]", 1e3 * run.point_error),
-            ("control force [N]", run.loop.force),
-        )
+        for label, values in rows
+        if label in drawn or not drawn
     ]
-    return plot_curves(panels, title=title or f"Tracking: {run.method}", size=(6.4, 2.2))
+    still = [label.partition(" [")[0] for label, _ in rows if drawn and label not in drawn]
+    notes = [f"Zero throughout, not drawn: {', '.join(still)}."] if still else []
+    return plot_curves(panels, title=title or f"Tracking: {run.method}", size=(6.4, 2.2), notes=notes)

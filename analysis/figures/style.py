@@ -61,11 +61,25 @@ STYLE: dict[Any, Any] = {
     "lines.markersize": 4.5,
 }
 
+#: Magnitude in drawn units (mm, deg, N) below which a result is rounding, and drawn as zero.
+ROUNDING = 1e-9
+
 #: A line at a value that means something, such as zero, and one at a place that is marked.
 REFERENCE: dict[str, Any] = {"color": "0.6", "linewidth": HAIR, "zorder": 1}
 MARK: dict[str, Any] = {"color": "0.35", "linewidth": THIN, "linestyle": ":", "zorder": 1}
 #: Letters to the inch of a figure's title, and of notes.
 _LETTERS, _NOTED = 11.6, 15.0
+
+
+def spoken(name: str) -> str:
+    """Return a variable's name as axes have it: "crank speed" of ``drive.speed``, "slider damping" of ``slider.damping``."""
+    return "crank speed" if name == "drive.speed" else name.replace(".", " ").replace("_", " ")
+
+
+def spoken_label(label: str) -> str:
+    """Return the label of an axis, a name and a unit in brackets, with the name as `spoken`."""
+    name, bracket, unit = label.partition(" [")
+    return spoken(name) + bracket + unit
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -53,7 +54,9 @@ from .style import (
     LETTER,
     LINE,
     ROCKER,
+    ROUNDING,
     SLIDER,
+    SMALL,
     TARGET,
     THIN,
     TINY,
@@ -284,14 +287,27 @@ def _errors(axis: Axes, scene: LinkageScene) -> None:
     x, words = _stations(scene)
     columns = scene.stations
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
+    names = [name for name in ("error [m]", "error of angle [rad]") if name in columns]
+    if all(np.nanmax(np.abs(columns[name]), initial=0.0) < 1e-3 * ROUNDING for name in names):
+        axis.text(
+            0.5,
+            0.5,
+            "every target is met: errors are rounding alone",
+            transform=axis.transAxes,
+            ha="center",
+            va="center",
+        )
+        axis.set_axis_off()
+        return
     if "error [m]" in columns:
-        axis.plot(x, MM_PER_METRE * columns["error [m]"], color=COLOURS[0], **few)
+        error = MM_PER_METRE * columns["error [m]"]
+        axis.plot(x, np.where(error > ROUNDING, error, 0.0), color=COLOURS[0], **few)
         axis.set_ylabel("error [mm]")
-        # points that are met exactly are not to show the last digits of a double
-        axis.set_ylim(0.0, max(axis.get_ylim()[1], 1e-6))
+        axis.set_ylim(0.0, max(axis.get_ylim()[1], 10.0 * ROUNDING))
     if "error of angle [rad]" in columns:
         beside = axis.twinx() if "error [m]" in columns else axis
         turned = np.degrees(columns["error of angle [rad]"])
+        turned = np.where(np.abs(turned) > ROUNDING, turned, 0.0)
         colour = COLOURS[2] if beside is not axis else COLOURS[0]
         beside.axhline(0.0, color="0.6", linewidth=HAIR)
         beside.plot(x, turned, color=colour, linestyle="-" if beside is axis else "--", **few)
@@ -460,11 +476,18 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
     columns = min(3, len(scenes))
     rows = ceil(len(scenes) / columns)
     with styled():
-        figure = Figure(figsize=(3.5 * columns, 3.5 * rows + (0.3 if title else 0.0)))
+        figure = Figure(figsize=(3.5 * columns, 3.8 * rows + 0.3 + (0.3 if title else 0.0)))
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
             _panel(axis, scene, size=1.8, letters=False)
-            axis.set_title(scene.title)
+            axis.set_title(scene.title, fontsize=SMALL)
+        names = [("crank", CRANK), ("coupler", COUPLER), ("rocker", ROCKER), ("target", TARGET), ("path", TRACE)]
+        if all(isinstance(scene.linkage, SliderCrank) for scene in scenes):
+            del names[2]
+        if scenes[0].target is None:
+            names = names[:-2]
+        handles = [Line2D([], [], color=colour, linewidth=2.4, label=name) for name, colour in names]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
         for axis in axes[len(scenes) :]:
             axis.set_visible(False)
         write_title(figure, title)

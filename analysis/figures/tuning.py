@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..periodic import unit_of
 from ..tuning import Survey, Tuned
 from ..units import RAD_S_PER_RPM, display_of
-from .curves import Curve, Panel, plot_curves
+from .curves import Curve, Panel, Shade, plot_curves
 from .dispatch import plot
-from .style import COLOURS
+from .style import COLOURS, LINE, spoken
+
+#: Multiplier at which the axis ends.
+_GREATEST = 2.0
 
 
 @plot.register
@@ -21,48 +25,60 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     what, si = orbit.swing
     unit, factor = display_of(si)
     family = tuned.after.response.family
-    name, scale, of_x = (
-        ("crank speed", RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (family.name, 1.0, family.unit)
-    )
+    scale, of_x = (RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (1.0, family.unit)
     low, high = (level / scale for level in tuned.wish.span)
     span = [level / scale for level in (tuned.after.response.low, tuned.after.response.high)]
-    top = 1.1 * max(factor * float(b.amplitude.max()) for s in (tuned.before, tuned.after) for b in s.response.branches)
-    greatest = max(1.05, min(2.0, 1.1 * max(tuned.before.largest[0], tuned.after.largest[0])))
     rows = (
-        (f"amplitude of {what} [{unit}]", top, lambda b: factor * b.amplitude),
-        ("largest Floquet multiplier", greatest, lambda b: b.largest_multiplier),
+        (f"amplitude of {what} [{unit}]", lambda b: factor * b.amplitude),
+        ("largest Floquet multiplier,\nunstable above 1", lambda b: np.minimum(b.largest_multiplier, _GREATEST)),
     )
     panels = []
-    for number, (label, highest, value) in enumerate(rows):
+    for number, (label, value) in enumerate(rows):
         curves: list[Curve] = []
-        for colour, when, survey in ((COLOURS[1], "before", tuned.before), (COLOURS[0], "after", tuned.after)):
-            curves += _curves(survey, value, colour, "" if number else when, scale)
+        # the curve after the change is seen on the one before where both are the same
+        for colour, width, when, survey in (
+            (COLOURS[1], 2.5 * LINE, "before", tuned.before),
+            (COLOURS[0], LINE, "after", tuned.after),
+        ):
+            curves += _curves(survey, value, colour, width, when, scale)
         if number:
             curves.append(Curve(x=span, y=[1.0, 1.0], colour="0.6", line=":"))
-        box = np.array([[low, 0.0], [high, 0.0], [high, highest], [low, highest]])
         panels.append(
             Panel(
-                x_label=f"{name} [{of_x}]",
+                x_label=f"{spoken(family.name)} [{of_x}]",
                 y_label=label,
                 curves=curves,
-                filled=[[box]],
+                shades=[Shade(low=low, high=high, label="range of the wish")],
                 x_range=(span[0], span[1]),
-                y_range=(0.0, highest),
+                y_range=_in_view(curves),
+                legend_at="above",
             )
         )
-    note = "Shaded: the range of the wish. Dashed: unstable."
-    return plot_curves(panels, title=title, notes=[note, *tuned.missed])
+    changed = [
+        f"{spoken(name)} {before:.6g} to {after:.6g} {quantity}"
+        for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
+        for quantity in [unit_of(tuned.wish.mechanism, name)]
+    ]
+    return plot_curves(panels, title=title, notes=[f"Changed: {', '.join(changed)}. Dashed: unstable.", *tuned.missed])
 
 
-def _curves(survey: Survey, value: object, colour: str, name: str, scale: float) -> Iterator[Curve]:
+def _in_view(curves: Sequence[Curve]) -> tuple[float, float]:
+    """Return the range of the curves with a rim; from zero if they come near it."""
+    y = np.concatenate([np.asarray(curve.y, dtype=float) for curve in curves])
+    low, high = float(np.nanmin(y)), float(np.nanmax(y))
+    rim = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
+    return (0.0 if 0.0 <= low < 0.3 * high else low - rim), high + rim
+
+
+def _curves(survey: Survey, value: object, colour: str, width: float, name: str, scale: float) -> Iterator[Curve]:
     """Plot branches of the response, stable parts solid; only the first has a name."""
     for branch in survey.response.branches:
         stable = branch.largest_multiplier <= 1.0
         for part, line in ((stable, "-"), (~stable, "--")):
             if not part.any():
                 continue
-            # a part reaches to the first point of the next
-            wide = part | np.append(part[1:], False) if line == "--" else part
+            # an unstable part reaches to the stable ones beside it
+            wide = part | np.append(part[1:], False) | np.insert(part[:-1], 0, False) if line == "--" else part
             y = np.where(wide, value(branch), np.nan)  # type: ignore[operator]
-            yield Curve(x=branch.parameter / scale, y=y, colour=colour, line=line, label=name)
+            yield Curve(x=branch.parameter / scale, y=y, colour=colour, line=line, label=name, width=width)
             name = ""

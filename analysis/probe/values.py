@@ -72,7 +72,7 @@ def _directional(
 
 def _difference(run: Run, unknown: Variable, known: Variable, step: float, declared: float) -> tuple[float, float]:
     """Return the distance of a central difference from the declared derivative, and the difference itself."""
-    here = run.get([known])[0]
+    here = _state(run, known)
     step *= max(abs(here), 0.01 * min(abs(known.nominal), 1.0))
     sides = []
     for side in (here + step, here - step):
@@ -83,6 +83,14 @@ def _difference(run: Run, unknown: Variable, known: Variable, step: float, decla
     rounding = 1e-14 * max(*map(abs, sides), abs(unknown.nominal)) / step
     error = max(0.0, abs(difference - declared) - rounding)
     return (error if math.isfinite(difference) else math.inf), difference
+
+
+def _state(run: Run, known: Variable) -> float:
+    """Return an input, or one of the continuous states, which may differ from the variable of its name between events."""
+    names = run.model.state_names
+    if known.is_state and run.model.interface == "me" and known.name in names:
+        return float(run.states("GetContinuousStates")[names.index(known.name)])
+    return float(run.get([known])[0])
 
 
 def _put(run: Run, known: Variable, value: float) -> None:

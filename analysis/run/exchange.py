@@ -37,8 +37,8 @@ class ExchangeError(Exception):
 class Exchange(CVodeSolver):  # type: ignore[misc]
     """An FMU in model exchange with its inputs, integrated by CVode.
 
-    Between the times at which inputs jump they are continuous functions of time and state: a commanded rate moves by its rate
-    of change. At those times the FMU is brought into event mode, where it takes commands.
+    Between the times at which inputs jump they are continuous functions of time and state, commanded rates and their rates of
+    change too. At those times the FMU is brought into event mode.
 
     Parameters
     ----------
@@ -95,7 +95,8 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         release(self.encoded, self.state, self.laws)
         self.laws[np.flatnonzero(released), 2] = 0.0
         self.ends = [end for end in self.ends if end > self.time]
-        self.still = self.encoded.steady and not self.laws[:, 2].any()
+        moving = self.encoded.source.coefficients[:, :, 1].any() or self.laws[:, 2].any()
+        self.still = self.encoded.steady and not moving
         ended = self.model.event(self.inputs(self.time, self.state))
         self.reset(self.time - self.origin)
         if np.isfinite(self.ends[0]):

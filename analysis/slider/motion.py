@@ -130,7 +130,9 @@ def motion_of_plant(linkage: Linkage) -> FourierSeries:
     if linkage.pivot is None:
         return FourierSeries.constant(0.0)
     if not isinstance(linkage.pivot, SliderMotion):
-        raise InputError("the rocker pivot is on a second crank: the plant has none")
+        raise InputError(
+            "the rocker pivot is on a second crank: a five-bar with a geared second crank cannot be simulated yet"
+        )
     series = linkage.pivot.series
     turned = (series.cos - 1j * series.sin) * np.exp(-1j * linkage.crank_phase * np.arange(series.order + 1))
     return FourierSeries(turned.real, -turned.imag)

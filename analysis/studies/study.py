@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,13 @@ class Source(NamedTuple):
 
     kind: str
     place: str = ""
+
+    @property
+    def words(self) -> str:
+        """The source as a reader without the documentation understands it."""
+        kinds = {TEXT: "the thesis", LISTING: "the thesis's program"}
+        place = re.sub(r"\bL(?=\d)", "line ", self.place)
+        return ", ".join(part for part in (kinds.get(self.kind, "our own check"), place) if part)
 
 
 #: Our own derivations and checks.
@@ -68,7 +76,7 @@ class Verdict:
     why: str = ""
 
     def __str__(self) -> str:
-        source = ", ".join(part for part in self.source if part)
+        source = self.source.words
         if self.computed is None:
             return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
         outcome = HOLDS if self.holds else f"{FAILS.upper()}{self.why and f': {self.why}'}"

@@ -52,6 +52,7 @@ void instance_free(Instance *c) {
 void instance_reset(Instance *c) {
     c->s = (Saved){.phase = INSTANTIATED};
     plant_reset(&c->s.plant);
+    c->s.plant.follows = c->interface == MODEL_EXCHANGE;
     c->stale = true;
 }
 
@@ -251,7 +252,7 @@ void instance_set(Instance *c, unsigned reference, double value) {
     c->stale = true;
     if (!(phase & RUNNING))
         a->begun = 0.0;
-    else if (c->interface == CO_SIMULATION)
+    else
         for (int k = 0; k < COMMANDS; k++)
             if (input_at[commands[k].input] == (int)reference) a->fresh[k] = 1.0;
 }
@@ -291,7 +292,7 @@ Status instance_output_slopes(Instance *c, const char *function, const unsigned 
         given[input_at[commands[k].input]] = 0.0;
     }
     if (!plant_derivative(a, derivative)) return instance_say(c, DISCARD, "%s: the derivatives are not finite", function);
-    plant_forward(a, false, false, given, derivative, rows);
+    plant_forward(a, false, given, derivative, rows);
     rows[TIME_ROW] = 1.0;
     for (size_t i = 0; i < count; i++) values[i] = rows[variables[references[i]].row];
     return OK;
@@ -351,6 +352,12 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch) 
 
 /* Model exchange */
 
+Status instance_check_commands(Instance *c) {
+    char sentence[SENTENCE];
+    bool moving = (int)c->s.phase & (EVENT | CONTINUOUS);
+    return moving && plant_contradicted(&c->s.plant, sentence) ? instance_say(c, WARNING, "%s", sentence) : OK;
+}
+
 void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed) {
     *values_changed = plant_jump(&c->s.plant);
     *terminate = !(plant_margin(&c->s.plant) >= 0.0);
@@ -399,7 +406,7 @@ Status instance_get_states(Instance *c, const char *function, What what, double 
         margin = plant_margin(&c->s.plant);
         found = &margin;
     }
-    if ((what == DERIVATIVES && !plant_derivative(&c->s.plant, derivative)) || (what == INDICATORS && isnan(margin)))
+    if ((what == DERIVATIVES && !plant_state_derivative(&c->s.plant, derivative)) || (what == INDICATORS && isnan(margin)))
         return instance_say(c, DISCARD, "%s: the equations are not defined at this state", function);
     memcpy(values, found, count * sizeof *values);
     return OK;
@@ -442,8 +449,7 @@ Status instance_directional(Instance *c, const char *function, bool adjoint, con
     if (adjoint) {
         for (size_t i = 0; i < unknown_count; i++) rows[variables[unknowns[i]].row] += seed[i];
         for (size_t i = 0; i < known_count; i++)
-            for (int k = 0; k < COMMANDS; k++)
-                commanded[k] |= c->interface == CO_SIMULATION && input_at[commands[k].input] == (int)knowns[i];
+            for (int k = 0; k < COMMANDS; k++) commanded[k] |= input_at[commands[k].input] == (int)knowns[i];
         plant_reverse(a, start, rows, commanded, given, x);
     } else {
         for (size_t i = 0; i < known_count; i++) {
@@ -453,7 +459,7 @@ Status instance_directional(Instance *c, const char *function, bool adjoint, con
             else
                 given[knowns[i]] += seed[i];
         }
-        plant_forward(a, start, c->interface == CO_SIMULATION, given, x, rows);
+        plant_forward(a, start, given, x, rows);
     }
     for (size_t i = 0; i < (adjoint ? known_count : unknown_count); i++) {
         int state = adjoint && !start ? instance_state(knowns[i]) : -1;

@@ -90,21 +90,41 @@ static bool apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[ST
     return true;
 }
 
+/* The commands that act on the state: in model exchange all of them. One that is not finite does not: the state stays good. */
+static void acting(const Plant *a, bool marked[ROOM(COMMANDS)]) {
+    for (int c = 0; c < COMMANDS; c++)
+        marked[c] = a->follows != 0.0 ? isfinite(a->given[input_at[commands[c].input]]) : a->fresh[c] != 0.0;
+}
+
 void plant_present(const Plant *a, double x[STATES]) {
     bool marked[ROOM(COMMANDS)];
     memcpy(x, a->x, sizeof a->x);
-    for (int c = 0; c < COMMANDS; c++) marked[c] = a->fresh[c] != 0.0;
+    acting(a, marked);
     apply(a, marked, x);
 }
 
 bool plant_jump(Plant *a) {
-    bool marked[ROOM(COMMANDS)];
+    double x[STATES];
+    for (int c = 0; c < COMMANDS; c++) a->applied[c] = a->given[input_at[commands[c].input]];
+    a->applied_time = a->time;
+    plant_present(a, x);
+    bool changed = memcmp(x, a->x, sizeof x) != 0;
+    memcpy(a->x, x, sizeof x);
+    return changed;
+}
+
+bool plant_contradicted(const Plant *a, char sentence[SENTENCE]) {
     for (int c = 0; c < COMMANDS; c++) {
-        double value = a->given[input_at[commands[c].input]];
-        marked[c] = isfinite(value) && value != a->applied[c]; /* the state stays good: solver.status tells of the input */
-        if (marked[c]) a->applied[c] = value;
+        Digits held, rate;
+        int speed = input_at[commands[c].input], acceleration = input_at[commands[c].acceleration];
+        double change = a->given[acceleration] * (a->time - a->applied_time);
+        if (!in_force(a, &commands[c]) || a->given[speed] != a->applied[c]) continue;
+        if (!(fabs(change) > 1e-3 * (1.0 + fabs(a->given[speed])))) continue;
+        snprintf(sentence, SENTENCE, "%s stayed at %s while %s is %s: in model exchange both must move", variables[speed].name,
+                 digits(held, a->given[speed]), variables[acceleration].name, digits(rate, a->given[acceleration]));
+        return true;
     }
-    return apply(a, marked, a->x);
+    return false;
 }
 
 /* The beginning */
@@ -232,6 +252,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
         a->fresh[c] = 0.0;
         a->applied[c] = u[commands[c].input];
     }
+    a->applied_time = a->time;
     a->begun = 1.0;
     return GOOD;
 }
@@ -446,6 +467,16 @@ bool plant_derivative(const Plant *a, double derivative[STATES]) {
     return all_finite(derivative, STATES);
 }
 
+bool plant_state_derivative(const Plant *a, double derivative[STATES]) {
+    double u[ROOM(INPUTS)], motion[STATES];
+    bool marked[ROOM(COMMANDS)];
+    acting(a, marked);
+    if (!inputs_of_jump(a, marked, a->x, u)) return plant_derivative(a, derivative);
+    if (!plant_derivative(a, motion)) return false;
+    call(equations_following, (const double *[]){a->x, a->modes, u, a->p, motion}, (double *[]){derivative});
+    return all_finite(derivative, STATES);
+}
+
 double plant_margin(const Plant *a) {
     double x[STATES];
     plant_present(a, x);
@@ -457,12 +488,12 @@ double plant_margin(const Plant *a) {
 /* The commands that a change of the inputs applies: those set since the last step, and those that change. */
 static bool commanded_state(const Plant *a, const bool changed[ROOM(COMMANDS)], double u[ROOM(INPUTS)],
                             bool marked[ROOM(COMMANDS)]) {
-    for (int c = 0; c < COMMANDS; c++) marked[c] = in_force(a, &commands[c]) && (changed[c] || a->fresh[c] != 0.0);
+    acting(a, marked);
+    for (int c = 0; c < COMMANDS; c++) marked[c] = in_force(a, &commands[c]) && (changed[c] || marked[c]);
     return inputs_of_jump(a, marked, a->x, u);
 }
 
-void plant_forward(const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES],
-                   double rows[ROWS]) {
+void plant_forward(const Plant *a, bool start, const double given[VARIABLES], const double x[STATES], double rows[ROWS]) {
     double u[ROOM(INPUTS)], du[ROOM(INPUTS)], dp[CONSTANTS] = {0}, dx[STATES], after[STATES], dafter[STATES];
     bool changed[ROOM(COMMANDS)], marked[ROOM(COMMANDS)];
     for (int i = 0; i < INPUTS; i++) du[i] = given[input_at[i]];
@@ -477,9 +508,8 @@ void plant_forward(const Plant *a, bool start, bool commanding, const double giv
             if (in_force(a, &commands[c])) dstate[commands[c].rate] = du[commands[c].input];
         call(equations_begin_forward, (const double *[]){a->modes, own, state, u, down, dstate, du}, (double *[]){dp, dx});
     } else {
-        for (int c = 0; c < COMMANDS; c++) changed[c] = commanding && du[commands[c].input] != 0.0;
+        for (int c = 0; c < COMMANDS; c++) changed[c] = du[commands[c].input] != 0.0;
         if (commanded_state(a, changed, u, marked)) {
-            /* no state is a known here: it is in model exchange alone, where events apply the commands */
             call(equations_jump, (const double *[]){a->x, a->modes, u, a->p}, (double *[]){after});
             call(equations_jump_forward, (const double *[]){a->x, a->modes, u, a->p, dx, du, dp}, (double *[]){dafter});
             memcpy(dx, dafter, sizeof dx);
@@ -509,8 +539,12 @@ void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bo
         double before[STATES], gjump[ROOM(INPUTS)], unused[CONSTANTS];
         call(equations_jump_reverse, (const double *[]){a->x, a->modes, before_jump, a->p, x},
              (double *[]){before, gjump, unused});
+        memcpy(x, before, sizeof before);
         for (int c = 0; c < COMMANDS; c++)
-            if (marked[c]) given[input_at[commands[c].input]] += gjump[commands[c].input];
+            if (marked[c])
+                given[input_at[commands[c].input]] += gjump[commands[c].input];
+            else if (in_force(a, &commands[c]))
+                x[commands[c].rate] += gjump[commands[c].input];
     }
     if (start) {
         double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], gown[ROOM(PARAMETERS)], gstate[2 * FREEDOMS];

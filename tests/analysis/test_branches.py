@@ -252,7 +252,7 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
     path = softened.to_csv(tmp_path / "branch.csv")  # type: ignore[operator]
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
     assert rows.shape == (len(softened), len(columns))
-    assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of u [cm]"
+    assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of u [mm]"
 
 
 def _drawn(axis: Axes, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -269,24 +269,24 @@ def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> N
     over_speed = follow(family, orbit, SPEED, low=0.95 * SPEED, high=1.05 * SPEED)
     forces = [f"greatest force in pin {pin} [N]" for pin in "ABCD"]
     for branch, label, factor in (
-        (softened, "slider.stiffness [N/m]", 1.0),
-        (over_speed, "drive.speed [rpm]", 1.0 / RPM),
+        (softened, "slider stiffness [N/m]", 1.0),
+        (over_speed, "crank speed [rpm]", 1.0 / RPM),
     ):
         columns = branch.columns()
         figure = figures.plot(branch)
         expected = {
-            "amplitude of u [cm]": 100.0 * branch.amplitude,
+            "amplitude of u [mm]": 1e3 * branch.amplitude,
             "greatest crank\ntorque [N.m]": columns["greatest crank torque [N.m]"],
             "greatest\npin force [N]": np.max([columns[name] for name in forces], axis=0),
         }
         assert figure.axes[-1].get_xlabel() == label
         main, harmonics, *loads = figure.axes
         assert [axis.get_ylabel() for axis in (main, *loads)] == list(expected)
-        assert harmonics.get_ylabel() == "harmonics of u\n[cm]"
+        assert harmonics.get_ylabel() == "harmonics of u\n[mm]"
         drawn = [line.get_ydata() for line in harmonics.lines if len(line.get_xdata()) == len(branch)]
         for order in (1, 2, 3):
             pair = np.array(drawn[2 * order - 2 : 2 * order])
-            assert np.nanmax(pair, axis=0) == pytest.approx(100.0 * columns[f"harmonic {order} of u [m]"])
+            assert np.nanmax(pair, axis=0) == pytest.approx(1e3 * columns[f"harmonic {order} of u [m]"])
         for axis, values in zip((main, *loads), expected.values()):
             x, y, solid = _drawn(axis, len(branch))
             assert x == pytest.approx(factor * branch.parameter)
@@ -294,7 +294,7 @@ def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> N
             assert (solid == (branch.columns()["stable (1), marginal (0), unstable (-1)"] > 0.0)).all()
     (fold,) = softened.special
     (mark,) = (line for line in figures.plot(softened).axes[0].lines if line.get_marker() == "s")
-    assert mark.get_xydata()[0] == pytest.approx((fold.parameter, 100.0 * fold.orbit.amplitude))
+    assert mark.get_xydata()[0] == pytest.approx((fold.parameter, 1e3 * fold.orbit.amplitude))
 
 
 def test_approximations_beside_are_in_the_same_units(softened: Branch) -> None:
@@ -308,10 +308,10 @@ def test_approximations_beside_are_in_the_same_units(softened: Branch) -> None:
     main, _, errors, *_ = figures.plot_branches([branch], beside=beside).axes
     (line,) = (line for line in main.lines if line.get_label() == "a tenth more")
     x, y = line.get_data()
-    assert y == pytest.approx(110.0 * np.interp(x * RPM, branch.parameter[order], branch.amplitude[order]))
+    assert y == pytest.approx(1100.0 * np.interp(x * RPM, branch.parameter[order], branch.amplitude[order]))
     assert errors.get_ylabel() == "relative error of\nthe amplitude [%]"
     assert errors.lines[0].get_ydata() == pytest.approx(10.0)
-    assert main.get_ylim()[1] == pytest.approx(115.0 * branch.amplitude.max())
+    assert main.get_ylim()[1] == pytest.approx(1150.0 * branch.amplitude.max())
 
 
 def test_watch_receives_every_point() -> None:

@@ -118,7 +118,7 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     traces = np.loadtxt(found.boundaries_to_csv(tmp_path / "boundaries.csv"), delimiter=",", skiprows=1)
     assert set(traces[:, 0]) == set(range(1, len(found.boundaries) + 1))
     figure = figures.plot(found, title="chart")
-    assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
+    assert figure.axes[0].get_xlabel() == "crank speed [rpm]"
 
 
 @pytest.mark.slow
@@ -222,3 +222,14 @@ def test_bad_charts_are_refused(
 ) -> None:
     with pytest.raises(LinkworkError):
         stability_chart(RIG_2, DRIVE, names, ranges, points=3)
+
+
+def test_the_grid_is_shown_before_its_boundaries() -> None:
+    seen: list[StabilityChart] = []
+    ranges = ((550.0 * RPM, 560.0 * RPM), (50.0, 60.0))
+    chart = stability_chart("rig-2-spring-c", ranges=ranges, points=3, first=seen.append)
+    (early,) = seen
+    assert early.grid is chart.grid
+    assert not early.boundaries
+    assert not early.runs
+    assert chart.runs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from math import pi, radians, sqrt
 from pathlib import Path
 
@@ -392,16 +393,25 @@ def test_pictures_show_every_dyad_and_linkage() -> None:
         (title,) = (t for t in titles if t.startswith(f"{number}: "))
         for defect in solution.verdicts.defects:
             assert defect.removesuffix(" defect") in title
-    dyads = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("dyad")]
-    for dyad, line in zip(found.dyads, dyads, strict=True):
-        ends = line.get_xydata() @ np.array([1.0, 1j])  # type: ignore[operator]
-        assert ends == pytest.approx(1e3 * np.array([dyad.pivot, dyad.point]))
+    drawn = [line.get_xydata() @ np.array([1.0, 1j]) for line in figure.axes[1].lines]  # type: ignore[operator]
+    for dyad in found.dyads:
+        ends = 1e3 * np.array([dyad.pivot, dyad.point])
+        assert any(len(line) == 2 and np.allclose(line, ends) for line in drawn)
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+    assert len(boxes) == 5
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
-def test_picture_of_four_poses_shows_which_pairs_are_sound() -> None:
+def test_picture_of_four_poses_shows_good_pivots_and_the_whole_of_the_best_linkage() -> None:
     found = syn.guidance(random_poses(3, 4), count=1)
     assert isinstance(found, syn.GuidanceMap)
-    figure = figures.plot(found)
-    shown = figure.axes[1].images[0].get_array()
+    left, right, *_ = figures.plot(found).axes
+    shown = right.collections[0].get_array()
     assert shown is not None
-    assert (np.ma.getmaskarray(shown) == ~found.sound).all()
+    assert len(shown) == np.count_nonzero(found.sound.any(axis=1))
+    best = found.solutions[0]
+    assert best.evaluation.rotation is not None
+    (x0, x1), (y0, y1) = left.get_xlim(), left.get_ylim()
+    for x, y in best.linkage.pins(float(best.evaluation.rotation[0])).values():
+        assert x0 < 1e3 * x < x1
+        assert y0 < 1e3 * y < y1

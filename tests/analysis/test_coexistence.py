@@ -94,7 +94,7 @@ def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
     assert rows.shape == (81, 3)
     assert set(rows[:, 2]) <= {-1.0, 0.0, 1.0, 2.0}
     axis = plot(picture, title="basins").axes[0]
-    assert axis.get_xlabel() == "slider.position [m]"
+    assert axis.get_xlabel() == "slider position at crank angle 0 [mm]"
     assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == ["stable motion", "unstable motion"]
     assert plot(picture.found).axes
 
@@ -169,6 +169,18 @@ def test_a_start_ends_in_a_motion_of_four_turns() -> None:
     last = run["slider.position"][1:]
     assert last[4] == pytest.approx(last[0], abs=1e-5)
     assert np.abs(last[1:4] - last[0]).min() > 1e-3
+
+
+def test_speeds_to_avoid_know_a_motion_that_no_branch_leads_to_or_say_that_none_was_sought() -> None:
+    """At 950 rpm a stable motion of 14.5 cm lies beside one of 1.28 cm, and no branch from an end of the range leads to it."""
+    damped, rpm = replace(LIGHT, slider_damping=12.0), RAD_S_PER_RPM
+    assert max(orbit.amplitude for orbit in find_orbits(damped, speed=950.0 * rpm).stable) > 0.14
+    response = frequency_response(damped, 900.0 * rpm, 1200.0 * rpm, doublings=0)
+    whole = with_isolas(response, places=2)
+    for found, known in ((response, False), (whole, True)):
+        assert known == any(a.low < 950.0 * rpm < a.high for a in found.speeds_to_avoid)
+        assert known != ("not sought" in repr(found))
+    assert "not sought" in plot(response).axes[0].get_legend().get_title().get_text()
 
 
 def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_they_are_stable() -> None:
@@ -259,7 +271,7 @@ def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
     )
     assert chart.beside is not None
     assert (chart.beside.stable == 2).all()
-    assert [axis.get_ylabel() for axis in plot(chart).axes][:3] == ["slider.damping [N.s/m]"] * 3
+    assert [axis.get_ylabel() for axis in plot(chart).axes][:3] == ["slider damping [N.s/m]"] * 3
     assert len(np.loadtxt(chart.beside.to_csv(tmp_path / "motions.csv"), delimiter=",", skiprows=1)) == 9
 
 

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from analysis import find_orbit, find_orbits
+from analysis import Function, InductionMotor, Inputs, find_orbit, find_orbits, natural_frequency, simulate
 from analysis.periodic import Drive, OrbitError, Stability, confirm, orbit_of, sweep
 from analysis.periodic.motion.drive import coordinate_ranges, starts_of
 from analysis.units import RAD_S_PER_RPM
@@ -72,6 +72,33 @@ def test_of_several_the_one_is_found_that_a_machine_meets_from_rest() -> None:
     assert met.start == pytest.approx(up.start, abs=1e-9)
     assert met.others == 2
     assert "2 other motions there: find_orbits" in repr(met)
+
+
+@pytest.mark.parametrize(
+    ("name", "damping", "torque", "amplitude"),
+    [
+        ("rig-2-spring-d", 3.0, 0.06, 0.02161),
+        ("rig-2-spring-c", 5.5, 0.05, 0.01698),
+        ("rig-1-spring-b", 9.0, 1.5, 0.05048),
+    ],
+)
+def test_under_a_motor_whose_frequency_rises_slowly_the_crank_is_captured_at_the_resonance(
+    name: str, damping: float, torque: float, amplitude: float
+) -> None:
+    """A run in time, from rest, with the field's speed rising over 60 s, ends on the motion that is found."""
+    parameters = replace(SETS[name].parameters, slider_damping=damping)
+    full = 1.3 * natural_frequency(parameters)
+    motor = InductionMotor(breakdown_torque=torque, breakdown_slip=0.3, synchronous_speed=full)
+    met = find_orbit(parameters, torque=motor)
+    assert met.amplitude == pytest.approx(amplitude, abs=1e-5)
+
+    def rising(t: float, angle: float, u: float, speed: float, v: float) -> float:
+        slip = 1.0 - speed / (full * (0.1 + 0.9 * min(t / 60.0, 1.0)))
+        return float(2.0 * torque * slip * 0.3 / (slip * slip + 0.3 * 0.3))
+
+    run = simulate(parameters, Inputs(torque=Function(rising)), stop_time=90.0, step=5e-3)
+    last = run["slider.position"][-1000:]
+    assert 0.5 * np.ptp(last) == pytest.approx(amplitude, rel=2e-3)
 
 
 def test_motions_far_from_the_zero_of_the_slider() -> None:

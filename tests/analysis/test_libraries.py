@@ -46,8 +46,9 @@ def imported(path: Path) -> Iterator[str]:
 def test_every_library_that_is_imported_is_declared_and_no_other() -> None:
     found = {name for folder in ("analysis", "fmu_src") for p in (ROOT / folder).rglob("*.py") for name in imported(p)}
     own = {"analysis", "linkwork", "slave"}
-    # Zig runs as a program, joblib imports dask, and Matplotlib writes animations by Pillow
-    assert found - sys.stdlib_module_names - own | {"ziglang", "dask", "PIL"} == CORE.union(*EXTRAS.values())
+    # the first three run as programs, joblib imports dask, and Matplotlib writes animations by Pillow
+    programs = {"ziglang", "nbconvert", "ipykernel"}
+    assert found - sys.stdlib_module_names - own | programs | {"dask", "PIL"} == CORE.union(*EXTRAS.values())
 
 
 def test_the_extra_all_has_the_others() -> None:

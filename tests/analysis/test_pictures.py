@@ -122,12 +122,19 @@ def test_errors_have_gaps_where_no_motion_is_stable(folded: Response) -> None:
     assert np.isnan(y).sum() == 1
 
 
-def test_nothing_to_tell_apart_has_no_legend_and_nothing_shaded() -> None:
+def test_a_single_stable_motion_is_named_and_nothing_shaded() -> None:
     x = np.linspace(1.0, 2.0, 30)
     main, *_ = figures.plot(response(branch(x, 1.0 + 0.01 * x, 0.5))).axes
-    assert main.get_legend() is None
+    assert [text.get_text() for text in main.get_legend().get_texts()] == ["stable motion"]
     assert not shaded(main)
     assert not list(annotations(main))
+
+
+def test_peaks_that_stand_out_have_speed_and_amplitude() -> None:
+    x = np.linspace(-1.0, 1.0, 41)
+    for largest, expected in ((0.5, ["peak, 10.07: 2000 mm"]), (2.0, [])):
+        main, *_ = figures.plot(response(branch(10.07 + x, 2.0 - (x - 0.0) ** 2, largest))).axes
+        assert [a.get_text() for a in annotations(main) if a.get_text()] == expected
 
 
 @pytest.mark.parametrize("count", [1, 12])
@@ -302,10 +309,16 @@ class _Motion(SimpleNamespace):
 
 
 def test_basins_name_the_motion_that_a_start_ends_in() -> None:
-    flow = SimpleNamespace(components=(("q", "m"), ("q'", "m/s")), size=2)
+    flow = SimpleNamespace(components=(("q", "m"), ("q'", "m/s")), size=2, period=2.0 * np.pi)
     motions = [
         _Motion(
-            start=np.array([0.1 * n, 0.0]), amplitude=0.01 * n, largest=0.5, swing=("q", "m"), flow=flow, turns=turns
+            start=np.array([0.1 * n, 0.0]),
+            amplitude=0.01 * n,
+            largest=0.5,
+            swing=("q", "m"),
+            flow=flow,
+            turns=turns,
+            turn=lambda samples, turns=turns: SimpleNamespace(period=turns / 7.0),
         )
         for n, turns in ((1, 1), (2, 1), (3, 4))
     ]
@@ -316,7 +329,9 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
         found=SimpleNamespace(orbits=tuple(motions), stable=(motions[0], motions[2])),  # type: ignore[arg-type]
         computed=0,
     )
-    (part,) = figures.picture(found).parts
+    picture = figures.picture(found, title="rig")
+    assert picture.title == "rig: basins at 420 rpm"
+    (part,) = picture.parts
     said = part.hover["it"]
     assert said[0][0] == said[1][1] == "ends in motion 1, amplitude of q 10 mm"
     assert said[0][1] == "ends in motion 2 of 4 turns, amplitude of q 30 mm"
@@ -324,4 +339,4 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
     assert list(part.classes) == [said[0][0], said[0][1], said[1][0]]
     assert part.values.tolist() == [[0, 1], [2, 0]]
     stable, unstable = part.panel.curves
-    assert (list(stable.x), list(unstable.x)) == ([pytest.approx(0.1), pytest.approx(0.3)], [pytest.approx(0.2)])
+    assert (list(stable.x), list(unstable.x)) == ([pytest.approx(100), pytest.approx(300)], [pytest.approx(200)])

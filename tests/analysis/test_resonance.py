@@ -132,7 +132,7 @@ def test_friction_removes_the_coexistence() -> None:
 def test_approximations_hidden_under_the_true_motion_are_drawn_by_their_errors() -> None:
     near = frequency_response(RIG["c"], 500.0 * RPM, 700.0 * RPM)
     main, _, errors, *rest = figures.plot(near, beside=approximations(near, points=5)).axes
-    assert rest[-1].get_xlabel() == "drive.speed [rpm]"
+    assert rest[-1].get_xlabel() == "crank speed [rpm]"
     assert [text.get_text() for text in main.get_legend().get_texts()] == ["avoid: resonance, above 0.71 of the peak"]
     drawn = {line.get_label(): line for line in errors.lines}
     assert list(drawn) == ["two harmonics", "ten harmonics"]

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
-from shapely.geometry import Point, Polygon
+from shapely.geometry import LineString, Point, Polygon
 
 import analysis.synthesis as syn
 from analysis import figures
@@ -183,7 +183,9 @@ def test_alternatives_have_a_panel_each_under_their_errors(tmp_path) -> None:
     figure = figures.plot(result, title="all")
     shown = [axis for axis in figure.axes if axis.get_visible()]
     assert [axis.get_title().split(":")[0] for axis in shown] == ["1", "2", "3", "4"]
-    assert f"{1e6 * solutions[0].error:.4g} mm²" in shown[0].get_title()
+    assert f"sum of squared errors {1e6 * solutions[0].error:.4g} mm²" in shown[0].get_title()
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["crank", "coupler", "rocker", "target", "path"]
     with pytest.raises(InputError, match="no linkages"):
         figures.plot(replace(result, solutions=()))
     rows = np.genfromtxt(result.to_csv(tmp_path / "all.csv"), delimiter=",", names=True, deletechars="")
@@ -241,6 +243,26 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
     assert sum(e.dxf.layer == "target" for e in document.modelspace()) == len(ELLIPSE)
     measured = sorted(e.get_measurement() for e in document.modelspace().query("DIMENSION"))
     assert measured == pytest.approx(sorted([300.0, 50.0, 215.0, 215.0, 210.0]))
+
+
+@pytest.mark.parametrize("point_angle", [-178.0, 0.0, 12.0])
+@pytest.mark.parametrize("rotation", [0.0, 1.0, 3.0])
+def test_numbers_of_dimensions_cover_neither_each_other_nor_other_dimensions(point_angle, rotation) -> None:
+    solution = syn.Solution.of(syn.TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=radians(point_angle)))
+    dimensions = syn.drawing(solution, rotation).dimensions
+    assert len(dimensions) == 5
+    for one in dimensions:
+        (x0, y0), (x1, y1) = one.line
+        # a circle as wide as half a number of five digits
+        number = Point(0.5 * (x0 + x1), 0.5 * (y0 + y1)).buffer(1.3 * one.height)
+        assert not any(number.intersects(LineString(other.line)) for other in dimensions if other is not one)
+
+
+def test_targets_that_are_met_have_no_curve_of_rounding() -> None:
+    task = syn.Motion(points=LINKAGE.path(PHI[:5]), angle=LINKAGE.coupler_angle(PHI[:5]), rotation=PHI[:5])
+    figure = figures.plot(syn.Solution.of(task, LINKAGE))
+    assert [axis for axis in figure.axes if "error" in axis.get_ylabel()] == []
+    assert any("rounding" in text.get_text() for axis in figure.axes for text in axis.texts)
 
 
 def test_the_drawing_of_moved_pivots_and_of_curves() -> None:

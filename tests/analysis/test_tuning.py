@@ -156,7 +156,11 @@ def test_least_damping_is_that_which_removes_the_region():
     assert tuned.values[0] == pytest.approx(removed.damping, rel=1e-6)
     assert find_orbit(replace(LIGHT, slider_damping=0.99 * removed.damping), speed=removed.x).largest > 1.0
     assert tuned.requirements[0].before.excess > 0.0
-    assert figures.plot(tuned).axes
+    figure = figures.plot(tuned)
+    low, high = figure.axes[1].get_ylim()
+    assert low > 0.5  # of the multipliers near one, not from zero
+    assert "slider damping 0.5 to" in figure.get_supxlabel()
+    assert high < 1.5
 
 
 @pytest.mark.parametrize(("margin", "end"), [(None, 612.0), (0.0, 600.0)])
@@ -200,7 +204,7 @@ def test_resonance_under_a_motor_is_led_out_of_a_range_of_its_frequency():
         tuned.parameters, 20.0, 29.0, drive=drive, vary=FIELD, doublings=0, greatest_step=5e-2
     ).maxima()
     assert top.parameter == pytest.approx(span[0], rel=1e-7)
-    assert figures.plot(tuned).axes[0].get_xlabel() == "crank speed [rpm]"
+    assert figures.plot(tuned).axes[0].get_xlabel() == "drive torque synchronous speed [rpm]"
 
 
 def test_swing_of_the_axial_shift_of_a_slider_crank_stays_below_its_limit():

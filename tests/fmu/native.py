@@ -54,7 +54,7 @@ class Library:
         listed = root.find("ModelVariables")
         assert listed is not None
         self.references = {str(v.get("name")): int(str(v.get("valueReference"))) for v in listed}
-        self.folder = folder
+        self.archive, self.folder = fmu, folder
         (path,) = (folder / "binaries").rglob("*.so")
         self.path = path
         self.dll = ctypes.CDLL(str(path))

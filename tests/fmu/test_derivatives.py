@@ -285,7 +285,8 @@ def test_in_model_exchange(library: Library, mode: str) -> None:
         assert put(instance, inputs) == OK
         if mode == "event":
             assert instance("EnterEventMode") == OK
-        rows, right = of.run(case, x, list(inputs.values()), p, [])
+        # commands that have moved since the last event are followed
+        rows, right = of.run(case, x, list(inputs.values()), p, list(case.commanded))
         knowns = [*of.states, *inputs]
         size = size_of(right, of.unknowns)
         close(np.array(instance.get(*of.unknowns)), rows - limit(of), np.abs(rows) + 1.0)

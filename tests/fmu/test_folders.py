@@ -32,6 +32,7 @@ uri = (fmu.folder / "resources").as_uri()
 #: Calls that are good or that the wrapper accepts, and those that end the process.
 LIVING = {
     "three slashes": "fmu.instantiate().start()",
+    "the pointer to a freed state stays": "i = fmu.instantiate().start(); s = i.save(); i.free_state(s); assert s.value",
     "wrong GUID": "fmu.instantiate(guid='wrong').start()",
 }
 CALLS = {

@@ -5,19 +5,27 @@ from __future__ import annotations
 import ctypes
 import json
 import math
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from ctypes import byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint32, c_void_p
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from build_fmu import FMUS
 from linkwork.five_bar import MECHANISM as FIVE_BAR
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.limits import JAMMING, LIMIT_SINE
+from linkwork.plant import Plant
 
 from .native import DISCARD, ERROR, OK, WARNING, Instance, Library
+
+Law = Callable[[float], float]
 
 #: A force that ends in the limit of assembly within a tenth of a second, by the model; modes that leave both freedoms free.
 TOO_MUCH = {
@@ -787,14 +795,107 @@ def test_model_exchange_by_hand(library: Library) -> None:
         assert c.set(crank__angle=x[0]) == OK
     assert c.set(crank__acceleration=1.0) == ERROR
     assert c("CompletedIntegratorStep", c_bool(True) if library.fmi == 3 else 1, byref(c_int(1)), byref(c_int(1))) == OK
-    # a command that changes is applied at the event, once
+    # a command that changes is followed at once; the state takes it at the event, once
     c.set(drive__speed=50.0)
-    assert c.get("crank.speed") == [x[2]]
+    assert c.get("crank.speed") == [50.0]
     assert c("EnterEventMode") == OK
     assert c.discrete() == (False, True)
     assert c.states()[2] == 50.0
     assert c.discrete() == (False, False)
     assert c("EnterContinuousTimeMode") == OK
+
+
+#: Commands that move between events: the FMU, its modes and start, and law and rate of each command.
+FOLLOWED: dict[str, tuple[str, dict[str, float], dict[str, tuple[Law, Law, str]]]] = {
+    "ramp": ("FiveBarSlider", {}, {"drive.speed": (lambda t: 40.0 + 50.0 * t, lambda t: 50.0, "drive.acceleration")}),
+    "shift": (
+        "SliderCrank",
+        {"drive__mode": 0, "axial__mode": 1, "initial__crank_speed": 9.0},
+        {"axial.speed": (lambda t: 0.3 * math.sin(30 * t), lambda t: 9.0 * math.cos(30 * t), "axial.acceleration")},
+    ),
+    "both": (
+        "SliderCrank",
+        {"drive__mode": 1, "axial__mode": 1},
+        {
+            "drive.speed": (lambda t: 5.0 + 40.0 * t * t, lambda t: 80.0 * t, "drive.acceleration"),
+            "axial.speed": (lambda t: 0.3 * math.sin(30 * t), lambda t: 9.0 * math.cos(30 * t), "axial.acceleration"),
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FOLLOWED)
+@pytest.mark.parametrize("kind", ["native", "native-fmi3"])
+def test_a_command_that_moves_is_followed_at_the_order_of_the_solver(
+    libraries: dict[str, Library], case: str, kind: str
+) -> None:
+    model, values, commands = FOLLOWED[case]
+    mechanism = FMUS[model]
+    start = values | {name.replace(".", "__"): law(0.0) for name, (law, _, _) in commands.items()}
+    plant = Plant.of_values(
+        mechanism,
+        {v.name: v.start for v in mechanism.variables}
+        | {name.replace("__", "."): value for name, value in start.items()},
+    )
+
+    def motion(t: float, x: Any) -> Any:
+        for name, (law, rate, channel) in commands.items():
+            plant.inputs |= {name: law(t), channel: rate(t)}
+        return mechanism.equations.derivative(tuple(x), plant._applied(), plant._p)
+
+    exact = solve_ivp(motion, (0.0, 0.2), plant.state, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    names = [part for f in mechanism.freedoms for part in (f.coordinate, f.rate)] + ["energy.supplied"]
+    n = len(mechanism.freedoms)
+    places = [place for i in range(n) for place in (i, n + i)] + [2 * n + 1]
+    library = libraries[f"{model}-{kind}"]
+
+    def error(steps: int) -> Any:
+        c = library.instance("me").start(**start)
+        c.discrete()
+        assert c("EnterContinuousTimeMode") == OK
+        x, h = np.array(c.states()), 0.2 / steps
+
+        def put(t: float, x: Any) -> None:
+            assert c("SetTime", t) == OK
+            assert c("SetContinuousStates", (c_double * 6)(*x), c_size_t(6)) == OK
+            c.set(**{name.replace(".", "__"): law(t) for name, (law, _, _) in commands.items()})
+
+        def slope(t: float, x: Any) -> Any:
+            put(t, x)
+            return np.array(c.states("Derivatives" if library.fmi == 2 else "ContinuousStateDerivatives"))
+
+        for i in range(steps):  # the classical method of fourth order
+            t = i * h
+            k1 = slope(t, x)
+            k2 = slope(t + h / 2, x + h / 2 * k1)
+            k3 = slope(t + h / 2, x + h / 2 * k2)
+            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + slope(t + h, x + h * k3))
+            if i == steps // 2:  # an event on the way changes nothing
+                put(t + h, x)
+                assert c("EnterEventMode") == OK
+                assert c.discrete()[1]
+                assert c("EnterContinuousTimeMode") == OK
+                x = np.array(c.states())
+        put(0.2, x)
+        for name, (law, _, _) in commands.items():
+            assert c.get({"drive.speed": "crank.speed", "axial.speed": "shift.velocity"}[name]) == [law(0.2)]
+        return np.abs(np.array(c.get(*names)) - exact[places])
+
+    coarse, fine = error(200), error(400)
+    assert (fine < 2e-5).all()
+    assert (fine < coarse / 12 + 1e-9).all(), (coarse, fine)
+
+
+@pytest.mark.parametrize(
+    ("moved", "said"), [(0.0, "drive.speed stayed at 40 while drive.acceleration is 50"), (1.0, "")]
+)
+def test_a_speed_that_contradicts_its_acceleration_is_named(five_bar: Library, moved: float, said: str) -> None:
+    c = five_bar.instance("me", logging=True).start(drive__speed=40.0, drive__acceleration=50.0)
+    assert c("EnterContinuousTimeMode") == OK
+    assert c("SetTime", 0.1) == OK
+    c.set(drive__speed=40.0 + moved)
+    assert c("Terminate") == (WARNING if said else OK)
+    assert [said in text for _, text in c.log] == [True] * bool(said)
 
 
 def test_model_exchange_beyond_the_limit(five_bar: Library) -> None:
@@ -986,6 +1087,48 @@ def test_nothing_asked_is_nothing_wrong(library: Library) -> None:
                 assert c(f"{verb}{kind}", references, n, values, c_size_t(2)) == ERROR
                 assert "2 numbers: it must be 1" in c.log[-1][1]
         assert c("GetOutputDerivatives", references, n, (c_int * 1)(1), values, c_size_t(2)) == ERROR
+
+
+TRAPPING = """
+import ctypes, math, sys
+from pathlib import Path
+from tests.fmu.native import Library
+c = Library(Path(sys.argv[1]), Path(sys.argv[2]))
+libm = ctypes.CDLL("libm.so.6")
+traps = 1 | 4 | 8  # invalid, division by zero, overflow
+beyond = (ctypes.c_double * 6)(0.0, 9.0, 1.0, 0.0, 0.0, 0.0)
+for kind in ("cs", "me"):
+    cases = dict(crank__length=math.nan, crank__mass=1e300, ground__length=9.0, drive__speed=math.inf, gravity=0.0)
+    for name, value in cases.items():
+        i = c.instance(kind)
+        i.set(**{name: value})
+        libm.feenableexcept(traps)
+        i.enter()
+        bad = i("ExitInitializationMode")
+        i.get("crank.acceleration", "assembly.margin_to_limit")
+        if not bad and kind == "cs":
+            i.set(drive__speed=1e200)
+            i.step(0.0, 1e-3)
+            i.step(math.nan, 1e-3)
+        elif not bad:
+            i("EnterContinuousTimeMode")
+            i("SetContinuousStates", beyond, ctypes.c_size_t(6))
+            i("GetDerivatives" if c.fmi == 2 else "GetContinuousStateDerivatives", beyond, ctypes.c_size_t(6))
+            i("GetEventIndicators", beyond, ctypes.c_size_t(1))
+            i.get("crank.acceleration")
+        assert libm.fegetexcept() == traps
+        libm.fedisableexcept(traps)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="traps are set by glibc")
+def test_a_host_that_traps_floating_point_exceptions_lives(five_bar: Library, tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-c", TRAPPING, five_bar.archive, tmp_path],
+        check=True,
+        timeout=60,
+        cwd=Path(__file__).parents[2],
+    )
 
 
 def test_versions(library: Library) -> None:

@@ -57,9 +57,11 @@ def test_the_linkage_is_animated(tmp_path: Path) -> None:
 
 def test_a_verdict_says_what_it_found() -> None:
     worse = near("length", text("L12"), 2.0, 2.5, 0.1, "m")
-    assert str(worse) == "length: 2 m (text, L12), computed 2.5 m: DOES NOT HOLD"
-    assert str(at_least("length", OURS, 2.0, 2.5)) == "length: at least 2 (ours), computed 2.5: holds"
-    assert str(unjudged("length", text("L12"), "no scale")) == "length (text, L12): cannot be judged: no scale"
+    assert str(worse) == "length: 2 m (the thesis, line 12), computed 2.5 m: DOES NOT HOLD"
+    assert str(at_least("length", OURS, 2.0, 2.5)) == "length: at least 2 (our own check), computed 2.5: holds"
+    assert (
+        str(unjudged("length", text("L12"), "no scale")) == "length (the thesis, line 12): cannot be judged: no scale"
+    )
     assert not at_most("length", OURS, 2.0, 2.5).holds
 
 

@@ -116,6 +116,7 @@ def coexistence(
     folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
+    what: str = "motions",
 ) -> Coexistence:
     """Find all periodic motions of one turn at every point of a grid.
 
@@ -130,7 +131,7 @@ def coexistence(
     x, y : array_like, shapes (nx,) and (ny,)
     start : array_like, shape (n,), optional
         A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
-    folder, n_jobs, progress
+    folder, n_jobs, progress, what
         See `grid`.
 
     Raises
@@ -145,7 +146,7 @@ def coexistence(
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
     code = row_code(kernels.solve_all)
-    data, computed = Keeping(folder, n_jobs, progress, "motions").rows(
+    data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
@@ -310,7 +311,7 @@ def basins(
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = motions[0].point, row_code(kernels.settle_starts)
-    ends, computed = Keeping(folder, n_jobs, progress, "starts").rows(
+    ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),
         up.tolist(),
         [row_name([point], known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],

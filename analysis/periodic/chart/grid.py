@@ -185,6 +185,7 @@ def grid(
     folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
+    what: str = "filling in the stability chart",
 ) -> Grid:
     """Compute the largest Floquet multiplier at every point of a grid.
 
@@ -207,6 +208,8 @@ def grid(
         Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
     progress : bool
         Show a progress bar.
+    what : str
+        Text before the progress bar.
 
     Raises
     ------
@@ -222,7 +225,7 @@ def grid(
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
     code = row_code(kernels.solve_row, multipliers)
-    data, computed = Keeping(folder, n_jobs, progress, "filling in the stability chart").rows(
+    data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_row).rows(
         partial(_compute_row, guesses, tolerance),
         rows,
         [row_name(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
@@ -309,12 +312,15 @@ class Keeping:
     progress : bool
     what : str
         Text before the progress bar.
+    kernel : Kernel
+        What the rows are computed with: it is compiled once, before several workers need it.
     """
 
     folder: str | Path | None
     n_jobs: int | None
     progress: bool
     what: str
+    kernel: Any
 
     def rows(
         self,
@@ -358,6 +364,8 @@ class Keeping:
                 rows[path] = kept
             else:
                 missing[path] = item
+        if missing:
+            _ = self.kernel.compiled
         unkept = 0
         with interruptible() as interrupted, shown(self.progress, float(len(paths)), self.what) as show:
             show(float(len(rows)))

@@ -112,8 +112,9 @@ def sweep(
 ) -> Sweep:
     """Go through crank speeds as a machine would, each begun from the steady motion of the last.
 
-    If that motion is lost or unstable at the new speed, the mechanism is followed for up to 5000 turns to the next steady
-    motion: a jump. Rising and falling speeds may meet different motions.
+    Under an induction motor they are the synchronous speeds of its field, as of a frequency converter. If that motion is
+    lost or unstable at the new speed, the mechanism is followed for up to 5000 turns to the next steady motion: a jump.
+    Rising and falling speeds may meet different motions.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def sweep(
     speeds : array_like, shape (m,)
         rad/s, increasing or decreasing.
     drive : Drive, optional
-        Other inputs; its own speed is replaced.
+        Other inputs; its own speed is replaced, or the synchronous speed of its motor if it has no speed.
     start : array_like, shape (n,), optional
         y at crank angle 0 at the first speed, of a five-bar u (m) and u' (m/s); zero without it.
     watch : callable, optional
@@ -142,15 +143,15 @@ def sweep(
     flags: list[str] = []
     jumps: list[Jump] = []
     drive = drive or Drive(speed=float(grid[0]))
-    first = _speed_drive(drive, float(grid[0]))
-    state = first_guess(first.flow(mechanism_of(parameters)), drive, start)
+    first = _paced(drive, float(grid[0]))
+    state = first_guess(first.flow(mechanism_of(parameters)), first, start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
         orbit = None if last is None else _continued(parameters, speed, last)
         flag = ""
         if orbit is None:
             try:
-                orbit = _settled(operating_point(parameters, _speed_drive(drive, speed)), state)
+                orbit = _settled(operating_point(parameters, _paced(drive, speed)), state)
             except OrbitError as error:
                 flag = str(error)
             if orbit is not None and last is not None:
@@ -173,9 +174,18 @@ def sweep(
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 
-def _speed_drive(drive: Drive, speed: float) -> Drive:
-    """Return the drive at a prescribed speed."""
+def _paced(drive: Drive, speed: float) -> Drive:
+    """Return the drive at a prescribed speed, or with a motor of this synchronous speed."""
+    if drive.speed is None and drive.motor is not None:
+        return replace(drive, motor=replace(drive.motor, synchronous_speed=speed))
     return replace(drive, speed=speed, torque=0.0, motor=None)
+
+
+def _pace(drive: Drive) -> float | None:
+    """Return the prescribed speed, or the synchronous speed of the motor; None under a mere torque."""
+    if drive.speed is None and drive.motor is not None:
+        return float(drive.motor.synchronous_speed)
+    return None if drive.speed is None else float(drive.speed)
 
 
 def _continued(
@@ -185,9 +195,10 @@ def _continued(
 
     A neighbour that differs much may be another motion, which Newton's method met by chance: half steps are taken then.
     """
-    assert last.drive.speed is not None
+    before = _pace(last.drive)
+    assert before is not None
     try:
-        orbit = orbit_of(parameters, _speed_drive(last.drive, speed), turns=last.turns, start=last.start, settle=False)
+        orbit = orbit_of(parameters, _paced(last.drive, speed), turns=last.turns, start=last.start, settle=False)
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -196,7 +207,7 @@ def _continued(
             return orbit
     if halvings == 0:
         return None
-    middle = _continued(parameters, 0.5 * (last.drive.speed + speed), last, halvings - 1)
+    middle = _continued(parameters, 0.5 * (before + speed), last, halvings - 1)
     return None if middle is None else _continued(parameters, speed, middle, halvings - 1)
 
 
@@ -293,7 +304,8 @@ def find_orbit(
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and
         u' (m/s), and under a torque the crank speed (rad/s), which is needed unless it follows from a motor's synchronous
-        speed. At prescribed speed the result is then the motion to which Newton's method leads from there.
+        speed. The result is then, at prescribed speed, the motion to which Newton's method leads from there; under a torque,
+        of several stable motions the one on which the mechanism settles from there.
     settle : bool
         Whether other motions are sought, and other starts are tried if Newton's method fails from the guess; without it the
         result is the motion to which Newton's method leads.
@@ -301,8 +313,9 @@ def find_orbit(
     Returns
     -------
     PeriodicOrbit
-        If several are stable, the one that a machine meets when it is run up slowly from rest; ``others`` is the number of
-        others: see `find_orbits`. It may be unstable: see ``verdict``.
+        If several are stable, the one that a machine meets when it is run up slowly from rest, under a motor by a slowly
+        rising frequency of its field; ``others`` is the number of others: see `find_orbits`. It may be unstable: see
+        ``verdict``.
 
     Raises
     ------
@@ -498,9 +511,9 @@ def _met(found: Orbits, first: PeriodicOrbit | None, start: ArrayLike | None) ->
         return first if first is not None else found.orbits[0]
     point, drive = stable[0].point, stable[0].drive
     guess = first_guess(point.flow, drive, start)
-    arrived = None
-    if drive.speed is not None and found.orbits[0].turns == 1:
-        speeds = np.geomspace(_FIRST_SPEED * drive.speed, drive.speed, _SPEEDS)
+    arrived, pace = None, None if drive.speed is None and start is not None else _pace(drive)
+    if pace is not None and pace > 0.0 and found.orbits[0].turns == 1:
+        speeds = np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS)
         last = sweep(point.parameters, speeds, drive=drive).orbits[-1]
         if last is not None and last.turns == 1:
             arrived = last.start

@@ -318,7 +318,9 @@ def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
     """Return why a branch is not followed beyond a point; empty if it is."""
     orbit = point.data
     if orbit.largest > largest:
-        return f"its largest multiplier passes {largest:g}"
+        return (
+            f"beyond, a disturbance grows more than {largest:g} times in each period (the largest Floquet multiplier)"
+        )
     sine = orbit.clearance(64) if orbit.nearest is None else orbit.nearest
     if sine < LEAST_SINE:
         return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"

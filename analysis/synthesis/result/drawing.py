@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from math import hypot, isfinite, pi
+from math import dist, hypot, isfinite, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import LineString
 
 from linkwork.errors import AssemblyError, ParameterError
 
@@ -257,12 +259,42 @@ def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterat
     named = [ends for _, ends in linkage.bars]
     names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
     names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
-    for name in names:
-        start, end = name[0], name[1]
-        if hypot(pins[end][0] - pins[start][0], pins[end][1] - pins[start][1]) > height:
-            # the ground link's on the other side: crank or second crank may lie over it
-            offset = -1.5 * height if name == "AE" else 1.5 * height
-            yield Dimension(layer="dimension", start=pins[start], end=pins[end], offset=offset, height=0.7 * height)
+    links = [LineString([pins[name[0]], pins[name[1]]]) for name in names]
+    links += [LineString([pins["C"], pins["P"]])] if "P" in pins and pins["P"] != pins["C"] else []
+    placed: list[Dimension] = []
+
+    def covered(one: Dimension) -> int:
+        """Count what a dimension's number covers, other dimensions thrice, and the numbers that its lines cross."""
+        room, strokes = _room(one), _strokes(one)
+        count = sum(room.intersects(link) for link in links)
+        count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_room, _strokes))
+        return int(count + 3 * sum(strokes.intersects(_room(other)) for other in placed))
+
+    # short links last: they have the fewest places
+    for start, end in sorted(((pins[n[0]], pins[n[1]]) for n in names), key=lambda ends: -dist(*ends)):
+        if dist(start, end) > height:
+            choices = [
+                Dimension(layer="dimension", start=start, end=end, offset=side * rank * height, height=0.7 * height)
+                for rank in (1.5, 3.0, 4.5, 6.0, 7.5)
+                for side in (1.0, -1.0)
+            ]
+            # the nearest of those that cover least
+            placed.append(min(choices, key=covered))
+    yield from placed
+
+
+def _strokes(dimension: Dimension) -> Any:
+    """Return the lines of a dimension: beside the link, and from its ends."""
+    return LineString([dimension.start, *dimension.line, dimension.end])
+
+
+def _room(dimension: Dimension) -> Any:
+    """Return the box of a dimension's number, with the gaps about it, on either side of its line."""
+    (x0, y0), (x1, y1) = dimension.line
+    middle, way = np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / hypot(x1 - x0, y1 - y0)
+    return LineString([middle - 2.2 * dimension.height * way, middle + 2.2 * dimension.height * way]).buffer(
+        1.3 * dimension.height, cap_style="flat"
+    )
 
 
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:

@@ -362,8 +362,9 @@ def headline(solution: Solution) -> str:
     v = solution.verdicts
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
     return (
-        f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
-        f"largest link {1e3 * solution.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
+        f"{quality_name(solution.task)} {factor * solution.error:.4g} {unit}\n"
+        f"worst error {scale * solution.evaluation.worst:.3g} {length}, largest link {1e3 * solution.largest_link:.4g} mm\n"
+        f"transmission angle {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")
         + (f"\n{', '.join(v.defects)}" if v.defects else "")
     )
