@@ -31,7 +31,7 @@ _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 
 
 @cache
-def experiments(mechanism: Mechanism) -> Mapping[str, bytes]:
+def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     """Return the files of a mechanism's experiments, by their places in the archive.
 
     An unregistered mechanism, or one without cases, has its default experiment alone.

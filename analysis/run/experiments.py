@@ -295,7 +295,7 @@ def _run(experiment: Experiment, description: Any, folder: str, allowed: float |
         except Exception as error:  # FMPy raises plain ones
             message = first_line(error)
         else:
-            end = experiment.stop if reference is None else float(reference[reference.dtype.names[0]][-1])
+            end = experiment.stop if reference is None else float(reference[-1][0])
             if end is not None and found["time"][-1] < end - 1e-9 * max(1.0, abs(end)):
                 message = f"the run ended early, at t = {found['time'][-1]:.9g} s"
             elif reference is not None:
