@@ -35,6 +35,8 @@ _PINT = {
     "m/s2": "m/s**2",
     "rad/s2": "rad/s**2",
     "N.s/m": "N*s/m",
+    "N.m/rad": "N*m/rad",
+    "N.m.s/rad": "N*m*s/rad",
 }
 
 

@@ -294,10 +294,13 @@ _OTHERS = {
 
 def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return the kind of a case file, judged by the names of its tables; None if they do not show it."""
+    from ..linkages import described_in
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, acting_on
 
     names = set(tables)
+    if described_in(tables) and not names & {"tune", "task"}:
+        return RUN
     if "tune" in names:
         return TUNING
     if "task" in names:
@@ -406,7 +409,8 @@ def show_table(
     grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
         justify: Any = "left" if heading in words else "right"
-        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped)
+        # in a narrow terminal a long word is broken, not cut
+        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped, overflow="fold")
     for row, style in zip(rows, styles):
         grid.add_row(*(plain(cell) for cell in row), style=style)
     console.print(grid)

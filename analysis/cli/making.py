@@ -57,16 +57,19 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
 def build(
     models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str], publish: str | None
 ) -> None:
-    """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider.
+    """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider, or described in a file.
 
     \b
     Examples:
       linkwork build
       linkwork build FiveBarSlider --dest fmus --kinds python
       linkwork build --kinds native,native-fmi3 --platforms all
+      linkwork build press.toml
     """
     from ..export import KINDS, build_all, kinds_here
+    from ..linkages import load_linkage
 
+    models = [load_linkage(name).fmu if Path(name).suffix in (".toml", ".json") else name for name in models]
     with console.status("building"):
         for fmu, for_platforms in build_all(models, dest, kinds, platforms, publish_to=publish):
             made = f", {' '.join(for_platforms)}" if for_platforms else ""

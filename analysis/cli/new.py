@@ -133,7 +133,7 @@ def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
 
 def _whose_masses(mechanism: Mechanism) -> str:
     """Say where the numbers of a new case come from."""
-    from ..run import SECTIONS
+    from ..linkages import SECTIONS
     from ..sections import DENSITIES
 
     own = {link.mass for link in mechanism.links}

@@ -18,6 +18,7 @@ from .common import (
     html_option,
     plot_option,
     print_error,
+    print_written,
     quantity,
     save_picture,
     say,
@@ -234,6 +235,8 @@ def _avoid(response: Any, factor: float, unit: str) -> None:
     """Print the ranges to avoid and the jumps at folds in words."""
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
+    if response.caution:
+        say(f"{response.caution}: --places seeks them")
     if not ranges:
         say(f"no {words} to avoid: no resonance inside the range, one stable motion throughout")
     else:
@@ -313,6 +316,13 @@ def stability(
         raise missing
     if not charted:
         return
+    stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
+
+    def picture_first(found: Any) -> None:
+        """Write the picture of the grid: its boundaries take longer."""
+        print_written(save_picture(figures.picture(found, title=chosen.case.title), stem, html=html))
+        say("its boundaries follow; after Ctrl-C the picture stays without them")
+
     found = stability_chart(
         parameters,
         drive,
@@ -324,10 +334,10 @@ def stability(
         coexisting=coexisting,
         n_jobs=jobs,
         progress=console.is_terminal,
+        first=picture_first,
     )
     _regions(found)
     _runs(found)
-    stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
     more = [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
     picture = figures.picture(found, title=chosen.case.title)
     written = [
@@ -400,15 +410,20 @@ def _regions(found: Any) -> None:
         ends = "; ".join(dict.fromkeys(map(str, traced.ends)))
         rows.append((traced.motion, traced.kind.value, *spans, ends))
     if rows:
-        headings = ("motion", "kind", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because")
+        headings = ("motion", "kind", *_headings(x, y), "ends because")
         show_table("boundaries of instability", headings, rows, words=headings)
     for removal in found.removals:
         console.print(removal, highlight=False, soft_wrap=True)
 
 
+def _headings(*axes: Any) -> list[str]:
+    """Return the names of axes with units, which a narrow terminal breaks between words."""
+    return [f"{axis.name.replace('.', ' ')} [{axis.unit}]" for axis in axes]
+
+
 def _runs(found: Any) -> None:
     x, y = found.axes
-    headings = (f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "verdict", "multiplier", "run", "growth a turn", "")
+    headings = (*_headings(x, y), "verdict", "multiplier", "run", "growth a turn", "")
     rows = [
         (
             f"{x.factor * run.x:.6g}",

@@ -19,6 +19,7 @@ from linkwork.parameters import field_name
 
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
+from ..linkages import with_linkage
 from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
 from ..units import with_unit
 from .arguments import driven, turn_durations
@@ -185,7 +186,8 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
 def case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
-    """Build a case from the tables of a case file; its CSV tables are read from ``folder``."""
+    """Build a case from the tables of a case file; its CSV tables, and a linkage of a file, are read from ``folder``."""
+    data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
     published = PUBLISHED[Choice(PUBLISHED)(named["published"], "published")] if "published" in named else None
     mechanism = _find_mechanism(named) if published is None else mechanism_of(published.parameters)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import atan2, hypot, isclose
 from typing import Any, NamedTuple
@@ -12,9 +12,10 @@ from linkwork.errors import ParameterError
 from linkwork.mechanism import Link, Mechanism
 from linkwork.parameters import field_name
 
-from ..files import Kinds, Many, Quantity, Reader, Table, unknown_name
+from ..files import Kinds, Quantity, unknown_name
+from ..linkages import SECTIONS, Made, millimetres
 from ..mechanisms import Parameters, mechanism_of
-from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
+from ..sections import Section
 
 
 class Mass(NamedTuple):
@@ -38,58 +39,7 @@ class Mass(NamedTuple):
     stale: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Made:
-    """What a link is made of: a section as long as the link and an ``overhang`` (m) beyond each pin, or a plate."""
-
-    section: Section | Plate
-    words: str
-    overhang: float = 0.0
-    corners: tuple[tuple[float, float], ...] = ()
-
-    def properties(self, length: float) -> MassProperties:
-        """Return mass, centre of mass from the first pin along and across the link, and moment of inertia about it."""
-        if isinstance(self.section, Plate):
-            return self.section.properties(self.corners)
-        body = length + 2.0 * self.overhang
-        return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
-
-
-def _mm(*lengths: float) -> str:
-    return " x ".join(f"{1e3 * length:g}" for length in lengths) + " mm"
-
-
-def _bar(width: float, thickness: float, material: float, overhang: float = 0.0) -> _Made:
-    return _Made(Bar(width, thickness, material), f"bar of {_mm(width, thickness)}, {material:g} kg/m3", overhang)
-
-
-def _rod(diameter: float, material: float, overhang: float = 0.0) -> _Made:
-    return _Made(Rod(diameter, material), f"rod of {_mm(diameter)}, {material:g} kg/m3", overhang)
-
-
-def _tube(outer: float, inner: float, material: float, overhang: float = 0.0) -> _Made:
-    return _Made(Tube(outer, inner, material), f"tube of {_mm(outer, inner)}, {material:g} kg/m3", overhang)
-
-
-def _plate(thickness: float, corners: tuple[Any, ...], material: float) -> _Made:
-    words = f"plate of {_mm(thickness)}, {len(corners)} corners, {material:g} kg/m3"
-    return _Made(Plate(thickness, material), words, corners=corners)
-
-
-_LENGTH = Quantity("m", above=0.0)
-_COMMON: Mapping[str, Reader] = {"material": density, "overhang": Quantity("m", least=0.0)}
-#: The kinds of a ``section`` with their entries.
-SECTIONS: Mapping[str, Table] = {
-    "bar": Table(_bar, {"width": _LENGTH, "thickness": _LENGTH, **_COMMON}),
-    "rod": Table(_rod, {"diameter": _LENGTH, **_COMMON}),
-    "tube": Table(_tube, {"outer": _LENGTH, "inner": _LENGTH, **_COMMON}),
-    "plate": Table(
-        _plate, {"thickness": _LENGTH, "corners": Many(Many(Quantity("m"), length=2), least=3), "material": density}
-    ),
-}
-
-
-def _values(link: Link, units: Mapping[str, str], made: _Made, length: float, mass: float | None) -> dict[str, float]:
+def _values(link: Link, units: Mapping[str, str], made: Made, length: float, mass: float | None) -> dict[str, float]:
     """Return mass, moment of inertia and centre of mass of a link by the names of the parameters, in SI."""
     own, (x, y), inertia = made.properties(length)
     if mass is not None:  # weighed: of the same shape, and so of the same radius of gyration
@@ -130,7 +80,7 @@ def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
         if name not in links:
             raise unknown_name(name, links, f"link {name!r} of the {mechanism.name}")
         length = getattr(parameters, field_name(links[name].length))
-        values = _values(links[name], units, _Made(section, ""), length, None)
+        values = _values(links[name], units, Made(section, ""), length, None)
         parameters = replace(parameters, **{field_name(key): value for key, value in values.items()})
     return parameters
 
@@ -166,7 +116,7 @@ def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parame
         made = Kinds(SECTIONS)(table, head)
         result = {name: value for name, value in result.items() if not name.startswith(f"{head}.")}
         if link.length in flat:
-            length = _LENGTH(flat[link.length], link.length)
+            length = Quantity("m", above=0.0)(flat[link.length], link.length)
         elif base is not None:
             length = getattr(base, field_name(link.length))
         else:
@@ -212,7 +162,8 @@ def mass_origins(
             length, own = get(field_name(link.length)), getattr(base, field_name(link.length))
             kept = [n for n in (link.mass, *link.centre[:1], link.inertia) if n not in flat]
             if kept and not isclose(length, own):
-                stale = f"{link.length} is {_mm(length)} where {source} has {_mm(own)}, whose {', '.join(kept)} stay"
+                now, then = millimetres(length), millimetres(own)
+                stale = f"{link.length} is {now} where {source} has {then}, whose {', '.join(kept)} stay"
         found.append(Mass(name, get(field_name(name)), origin, stale))
     return tuple(found)
 

@@ -36,6 +36,8 @@ UNITS = {
     "N.m": Unit(kg=1, m=2, s=-2),
     "N/m": Unit(kg=1, s=-2),
     "N.s/m": Unit(kg=1, s=-1),
+    "N.m/rad": Unit(kg=1, m=2, s=-2, rad=-1),
+    "N.m.s/rad": Unit(kg=1, m=2, s=-1, rad=-1),
     "J": Unit(kg=1, m=2, s=-2),
     "W": Unit(kg=1, m=2, s=-3),
 }

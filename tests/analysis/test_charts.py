@@ -222,3 +222,14 @@ def test_bad_charts_are_refused(
 ) -> None:
     with pytest.raises(LinkworkError):
         stability_chart(RIG_2, DRIVE, names, ranges, points=3)
+
+
+def test_the_grid_is_shown_before_its_boundaries() -> None:
+    seen: list[StabilityChart] = []
+    ranges = ((550.0 * RPM, 560.0 * RPM), (50.0, 60.0))
+    chart = stability_chart("rig-2-spring-c", ranges=ranges, points=3, first=seen.append)
+    (early,) = seen
+    assert early.grid is chart.grid
+    assert not early.boundaries
+    assert not early.runs
+    assert chart.runs

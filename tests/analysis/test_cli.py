@@ -9,13 +9,16 @@ import shlex
 import shutil
 import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from analysis import Inputs, cli, export
+from analysis.cli import common
 from analysis.export.description import KINDS, description
 from analysis.files import tables
 from analysis.mechanisms import FIVE_BAR
@@ -355,6 +358,7 @@ def test_resonance_says_what_moves_it(linkwork, tmp_path):
         "--no-plot", "--sensitivity", "--places", "0",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
+    assert "not sought: --places" in result.output
     # half a percent for a percent of the stiffness: w^2 = k / m; an amplitude that the damper alone limits
     assert re.search(r"maximum │ +586\.1\d │ slider\.stiffness \+0\.49\d* +│ +17\.153 ", result.output), result.output
     path = tmp_path / "out" / "rig-2-spring-c-resonance-sensitivity.csv"
@@ -539,3 +543,12 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_computed(l
     result = linkwork(*command, tmp_path / "file" / "new")
     assert result.exit_code == 2
     assert "is no folder" in " ".join(result.stderr.split())
+
+
+def test_headings_are_broken_and_not_cut_in_a_narrow_terminal(monkeypatch):
+    narrow = Console(width=30, file=StringIO())
+    monkeypatch.setattr(common, "console", narrow)
+    common.show_table("points", ["slider damping [N.s/m]", "supercalifragilistic"], [["1", "2"]])
+    text = narrow.file.getvalue()
+    assert "…" not in text
+    assert "damping" in text

@@ -6,9 +6,10 @@ mechanism and two parameters by their FMI names, the crank speed among them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
@@ -214,6 +215,7 @@ def stability_chart(
     coexisting: bool = False,
     n_jobs: int | None = None,
     progress: bool = False,
+    first: Callable[[StabilityChart], None] | None = None,
 ) -> StabilityChart:
     """Chart the stability of the periodic motion of one turn over two parameters.
 
@@ -239,6 +241,8 @@ def stability_chart(
         Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
     n_jobs, progress
         See `grid`.
+    first : callable, optional
+        Receives the chart without boundaries and long runs as soon as its grid is there, such as to show it: these take longer.
 
     Returns
     -------
@@ -270,12 +274,23 @@ def stability_chart(
     box = Box(x=spans[0], y=spans[1])
     operation = plane(parameters, drive, *names)
     x, y = (np.linspace(low, high, points) for low, high in spans)
-    found = grid(operation, x, y, start=start, n_jobs=n_jobs, progress=progress)
+    common: dict[str, Any] = {"start": start, "n_jobs": n_jobs, "progress": progress}
+    steps = _steps(coexisting)
+    found = grid(operation, x, y, what=next(steps), **common)
     survey = _Survey(
         operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
     )
-    around = coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None
-    return survey.chart({name: of(operation) for name, of in (beside or {}).items()}, around, progress)
+    around = coexistence(operation, x, y, what=next(steps), **common) if coexisting else None
+    survey.note_missing_orbits()
+    if first is not None:
+        first(survey.result(around))
+    return survey.chart({name: of(operation) for name, of in (beside or {}).items()}, around, progress, steps)
+
+
+def _steps(coexisting: bool) -> Iterator[str]:
+    """Yield the texts of the steps of a chart, numbered."""
+    names = ["grid", *(["all motions"] if coexisting else []), "boundaries", "branches of other motions", "long runs"]
+    yield from (f"step {number} of {len(names)}, {name}" for number, name in enumerate(names, start=1))
 
 
 @dataclass(slots=True)
@@ -295,27 +310,37 @@ class _Survey:
     lines: list[float] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
 
-    def chart(self, beside: Mapping[str, Monodromy], around: Coexistence | None, progress: bool) -> StabilityChart:
+    def chart(
+        self, beside: Mapping[str, Monodromy], around: Coexistence | None, progress: bool, steps: Iterator[str]
+    ) -> StabilityChart:
         """Find the boundaries of the true orbit, of the motions ``beside``, and of others; make the long runs."""
-        self.note_missing_orbits()
         true = orbit_monodromy(self.operation, start=self.start, near=self.grid)
         # at a fold the true orbit ends, and its test function with it: folds are found on branches
-        self.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
-        for motion, matrix in beside.items():
-            for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
-                self.trace(motion, matrix, kind)
-        self.follow_lines(np.linspace(*self.box.y, LINES[1]).tolist(), progress)
+        tests = [(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)]
+        tests += [(name, m, kind) for name, m in beside.items() for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD)]
+        with shown(progress, float(len(tests)), next(steps)) as show:
+            for number, test in enumerate(tests, start=1):
+                self.trace(*test)
+                show(float(number))
+        step = next(steps)
+        self.follow_lines(np.linspace(*self.box.y, LINES[1]).tolist(), progress, step)
         if around is not None:
             true_ones = [traced.points for traced in self.traced if traced.motion in _MOTION]
-            self.follow_lines(unmet_lines(around, self.lines, true_ones), progress)
+            self.follow_lines(unmet_lines(around, self.lines, true_ones), progress, step)
             self.most = max(self.most, int(around.stable.max()))
-        self.run_three_points()
+        with shown(progress, 1.0, next(steps)):
+            self.run_three_points()
+            removals = self.removals(true)
+        return self.result(around, removals)
+
+    def result(self, around: Coexistence | None, removals: tuple[str, ...] = ()) -> StabilityChart:
+        """Return the chart as far as it is computed."""
         return StabilityChart(
             axes=self.axes,
             box=self.box,
             grid=self.grid,
             boundaries=tuple(self.traced),
-            removals=self.removals(true),
+            removals=removals,
             runs=tuple(self.runs),
             most=self.most,
             beside=around,
@@ -347,10 +372,10 @@ class _Survey:
                 f"{self.place(*first.point)}: {first.message}"
             )
 
-    def follow_lines(self, ys: Sequence[float], progress: bool) -> None:
+    def follow_lines(self, ys: Sequence[float], progress: bool, what: str) -> None:
         """Follow the branches of all motions on the lines y = const, and the boundaries from their special points."""
         lost: list[str] = []
-        with shown(progress and bool(ys), float(len(ys)), "following branches") as show:
+        with shown(progress and bool(ys), float(len(ys)), what) as show:
             for number, y in enumerate(ys, start=1):
                 branches, found, failed = line_branches(
                     self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start

@@ -116,6 +116,7 @@ def coexistence(
     folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
+    what: str = "motions",
 ) -> Coexistence:
     """Find all periodic motions of one turn at every point of a grid.
 
@@ -130,7 +131,7 @@ def coexistence(
     x, y : array_like, shapes (nx,) and (ny,)
     start : array_like, shape (n,), optional
         A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
-    folder, n_jobs, progress
+    folder, n_jobs, progress, what
         See `grid`.
 
     Raises
@@ -145,7 +146,7 @@ def coexistence(
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
     code = row_code(kernels.solve_all)
-    data, computed = Keeping(folder, n_jobs, progress, "motions", kernels.solve_all).rows(
+    data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],

@@ -185,6 +185,7 @@ def grid(
     folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
+    what: str = "filling in the stability chart",
 ) -> Grid:
     """Compute the largest Floquet multiplier at every point of a grid.
 
@@ -207,6 +208,8 @@ def grid(
         Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
     progress : bool
         Show a progress bar.
+    what : str
+        Text before the progress bar.
 
     Raises
     ------
@@ -222,7 +225,7 @@ def grid(
     guess = first_guess(first.flow, first.drive, start)
     guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
     code = row_code(kernels.solve_row, multipliers)
-    data, computed = Keeping(folder, n_jobs, progress, "filling in the stability chart", kernels.solve_row).rows(
+    data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_row).rows(
         partial(_compute_row, guesses, tolerance),
         rows,
         [row_name(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],

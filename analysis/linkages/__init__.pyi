@@ -1,0 +1,13 @@
+from .builder import Builder as Builder
+from .builder import described as described
+from .builder import described_in as described_in
+from .builder import linkage as linkage
+from .builder import load_linkage as load_linkage
+from .builder import with_linkage as with_linkage
+from .description import Description as Description
+from .description import LinkageError as LinkageError
+from .package import Package as Package
+from .package import mechanism as mechanism
+from .sections import SECTIONS as SECTIONS
+from .sections import Made as Made
+from .sections import millimetres as millimetres

@@ -1,0 +1,90 @@
+"""Write the picture of a described linkage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from .description import GROUND, Description, given
+from .parameters import Interface, size
+from .structure import Freed, Pin, Structure, sliders
+from .variables import quoted
+
+
+class Marked(NamedTuple):
+    """A joint of the picture: its name, what it is, and the expression of its place."""
+
+    name: str
+    text: str
+    place: str
+
+
+class Picture:
+    """The picture of one linkage: its joints and parts."""
+
+    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
+        self.description, self.structure, self.interface = description, structure, interface
+
+    def drawn(self) -> tuple[list[Marked], list[str]]:
+        """Return the joints of the picture, and its parts from the back to the front."""
+        d, parts, length = self.description, [], size(self.interface)[0]
+        points = dict.fromkeys(own for of in self.interface.points.values() for own in of)
+        joints = [Marked(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)") for own in points]
+        lines = sliders(self.structure)
+        for name, joint in lines.items():
+            block, line, start, origin = (
+                joint.bodies[1],
+                f"b.{name}_line",
+                f"b.at_{joint.through}",
+                f"{joint.bodies[1]}_frame.origin",
+            )
+            end = f"*({start}.x + {length!r} * {line}.c, {start}.y + {length!r} * {line}.s, 0.0)"
+            joints.append(Marked(f"{name}Block", f"the {block}", f"*(b.{origin}.x, b.{origin}.y, 0.0)"))
+            joints.append(Marked(f"{name}End", f"direction of {name}", end))
+            along = f'("{name}Block", "{joint.through}", "{name}End")'
+            springs = [own for own, spring in d.springs.items() if spring.at == name and given(spring.stiffness)]
+            parts.append(f'Part("guide", ("{joint.through}", "{name}End"), "line of {name}")')
+            parts += [f'Part("spring", {along}, "{own}", "{own}.stiffness")' for own in springs]
+            parts.append(f'Part("slider", {along}, "{block}")')
+        parts += [f'Part("pivot", ("{own}",), "bearing {own}")' for own in d.ground if own in self.structure.joints]
+        parts += [f'Part("axis", {s.between!r}, "{name}")' for name, s in d.springs.items() if s.between]
+        for name, body in d.bodies.items():
+            blocks = [f"{own}Block" for own, joint in lines.items() if joint.bodies[1] == name]
+            through = (*body.all_points, *(blocks if len(body.all_points) < 2 else ()))
+            if len(through) > 1:
+                parts.append(f'Part("link", {through!r}, "{name}")')
+        return joints, parts
+
+    def positions(self) -> Iterator[str]:
+        """Write the function of the places of the picture's joints."""
+        joints, _ = self.drawn()
+        yield "def positions(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:"
+        yield '    """Compute the places of the points of the picture."""'
+        yield from ("    b = places(x, p)", "    return (", *(f"        {joint.place}," for joint in joints), "    )")
+
+    def moves(self, own: str) -> str:
+        """Return the parameters that change where a point of the picture is dragged."""
+        names = {p.name for p in self.interface.parameters}
+        for body, points in self.interface.points.items():
+            if own in points:
+                bar = self.description.bodies[body].bar if body != GROUND else ()
+                found = [f"{body}.length"] if bar and own == bar[1] else [f"{body}.{own}_{axis}" for axis in "xy"]
+                turned = [
+                    f"initial.{self.interface.drives[step.freedom].name}_angle"
+                    for step in self.structure.steps
+                    if isinstance(step, Freed)
+                    and step.body == body
+                    and isinstance(step.joint, Pin)
+                    and bar
+                    and own == bar[1]
+                ]
+                moves = [name for name in found if name in names] + turned
+                if moves:
+                    return f", ({''.join(f'{quoted(name)}, ' for name in moves[:2])})"
+        return ""
+
+    def paths(self) -> list[str]:
+        """Return the points whose paths are drawn: those that are no joint, or else the pins between bodies that move."""
+        moving = [own for body in self.description.bodies for own in self.interface.points[body]]
+        alone = [own for own in dict.fromkeys(moving) if own not in self.structure.joints]
+        return alone or [own for own in dict.fromkeys(moving) if own not in self.description.ground][-1:]

@@ -1,0 +1,416 @@
+"""Write what acts on a described linkage, its equations of motion, and the forces in its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from .description import GROUND, Description, Spring, given
+from .equations import indented
+from .parameters import Interface
+from .structure import Dyad, Freed, Geared, Joint, Pin, Side, Structure
+
+
+class Reaction(NamedTuple):
+    """A joint whose force is an output: its name there, the joint, the body that exerts the force and the one it acts on."""
+
+    name: str
+    joint: Joint
+    by: str
+    on: str
+
+
+def springs_at(description: Description, interface: Interface) -> dict[str, int]:
+    """Return the springs that act along a freedom, with its number."""
+    numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
+    return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
+
+
+class Motion:
+    """The dynamics of one linkage, function by function."""
+
+    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
+        self.description, self.structure, self.interface = description, structure, interface
+        self.n = len(interface.drives)
+        self.along = springs_at(description, interface)
+        self.bodies = tuple(description.bodies)
+        self.reactions: list[Reaction] = []
+
+    def owner(self, own: str) -> str:
+        """Return a body that has a point, one that moves if there is one."""
+        having = [body for body in self.bodies if own in self.interface.points[body]]
+        return having[0] if having else GROUND
+
+    def turn(self, body: str) -> str:
+        """Return the expression of the direction of a body."""
+        return f"b.{body}_frame.turn" if body != GROUND else f"held(1.0, 0.0, {self.n})"
+
+    # What acts
+
+    def springs(self) -> Iterator[str]:
+        """Write the function of the stretches of all springs and their rates."""
+        rows, fields = [], []
+        for name, spring in self.description.springs.items():
+            free = f" - p.{name}_free" if given(spring.free) else ""
+            stretch, rate = f"{name}_stretch", f"{name}_rate"
+            if name in self.along:
+                suffix = f"{free}_{self._kind(spring)}" if free else ""
+                rows.append(f"{stretch}, {rate} = x[{self.along[name]}]{suffix}, x[{self.n + self.along[name]}]")
+            elif spring.between:
+                p, q = spring.between
+                rows.append(f"{name}_length, {rate}, {name}_x, {name}_y = distance(b.at_{p}, b.at_{q})")
+                rows.append(f"{stretch} = {name}_length{f'{free}_length' if free else ''}")
+                fields += [f"{name}_x", f"{name}_y"]
+            else:
+                joint = self.structure.joints[spring.at]
+                first, second = joint.bodies
+                if isinstance(joint, Pin):
+                    angle = f"p.{name}_c, p.{name}_s" if free else "1.0, 0.0"
+                    one, other = self.turn(first), self.turn(second)
+                    rows.append(f"{stretch} = angle_between({one}, {other}, {angle})")
+                    rows.append(f"{rate} = {other}.w - {one}.w")
+                else:
+                    x, y = self.interface.points[first].get(joint.through, ("0.0", "0.0"))
+                    frame = f"b.{first}_frame" if first != GROUND else f"ground({self.n})"
+                    call = f"position_along({frame}, {x}, {y}, b.{joint.name}_line, b.{second}_frame)"
+                    rows.append(f"{name}_position, {rate} = {call}")
+                    rows.append(f"{stretch} = {name}_position{f'{free}_position' if free else ''}")
+            fields += [stretch, rate]
+        yield from (
+            "class Springs(NamedTuple):",
+            '    """Stretches of the springs, their rates, and the directions of those between points."""',
+            "",
+        )
+        yield from (f"    {field}: float" for field in fields)
+        yield from ("", "", "def springs(b: Places, x: tuple[float, ...], p: Constants) -> Springs:")
+        yield '    """Compute the stretches of all springs."""'
+        yield from indented([*rows, f"return Springs({', '.join(fields)})"])
+
+    def _kind(self, spring: Spring) -> str:
+        return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
+
+    def resistance(self, name: str, spring: Spring) -> str:
+        """Return the force of damper and friction of a spring; empty where it has neither."""
+        words = []
+        if given(spring.damping):
+            words.append(f"p.{name}_damping * s.{name}_rate")
+        if given(spring.friction):
+            about = not spring.between and isinstance(self.structure.joints[spring.at], Pin)
+            words.append(f"p.{name}_friction * tanh(s.{name}_rate / {'FRICTION_RATE' if about else 'FRICTION_SPEED'})")
+        if spring.law:
+            words.append(f"{name}_law(s.{name}_stretch, s.{name}_rate)")
+        return " + ".join(words)
+
+    def laws(self) -> Iterator[str]:
+        """Write the functions of the springs' own laws."""
+        for name, spring in self.description.springs.items():
+            if spring.law:
+                yield f"def {name}_law(x: float, v: float) -> float:"
+                yield f'    """Return the force of {name} at a stretch and its rate (N, N.m)."""'
+                yield from (f"    return {spring.law}", "", "")
+
+    def acting(self) -> Iterator[str]:
+        """Write the function of the forces on all bodies and along all freedoms."""
+        on: dict[str, list[str]] = {body: [] for body in self.bodies}
+        along: list[list[str]] = [[] for _ in range(self.n)]
+        rows, lost, gained = [], [], []
+        if self.description.gravity:
+            for body in self.interface.centres:
+                on[body].append(
+                    f"force(p.{body}_mass * p.gx, p.{body}_mass * p.gy, m[{self.bodies.index(body)}].centre)"
+                )
+        for name, spring in self.description.springs.items():
+            resists = self.resistance(name, spring)
+            pulls = f"p.{name}_stiffness * s.{name}_stretch" if given(spring.stiffness) else ""
+            if resists:
+                rows.append(f"{name}_resistance = {resists}")
+                lost.append(f"{name}_resistance * s.{name}_rate")
+            total = " + ".join(filter(None, (pulls, f"{name}_resistance" if resists else ""))) or "0.0"
+            if spring.driven:
+                load = next(load for load in self.interface.loads if load.name.partition(".")[0] == name)
+                total += f" - i.{load.field}"
+                gained.append(f"i.{load.field} * s.{name}_rate")
+            rows.append(f"{name}_force = {total}")
+            if name in self.along:
+                along[self.along[name]].append(f"- {name}_force")
+                continue
+            if spring.between:
+                p, q = spring.between
+                for own, sign in ((p, ""), (q, "-")):
+                    if self.owner(own) != GROUND:
+                        f = f"{sign}{name}_force * s."
+                        on[self.owner(own)].append(f"force({f}{name}_x, {f}{name}_y, b.at_{own})")
+                continue
+            joint = self.structure.joints[spring.at]
+            first, second = joint.bodies
+            for body, sign in ((second, "-"), (first, "")):
+                if body == GROUND or body not in on:
+                    continue
+                if isinstance(joint, Pin):
+                    on[body].append(f"torque({sign}{name}_force)")
+                else:
+                    line, f = f"b.{joint.name}_line", f"{sign}{name}_force"
+                    on[body].append(f"force({f} * {line}.c, {f} * {line}.s, b.{second}_frame.origin)")
+        for own in self.description.loads:
+            on[self.owner(own)].append(f"force(i.{own}_load_x, i.{own}_load_y, b.at_{own})")
+            gained += [f"i.{own}_load_x * b.at_{own}.vx", f"i.{own}_load_y * b.at_{own}.vy"]
+        for body in self.description.torques:
+            on[body].append(f"torque(i.{body}_torque)")
+            gained.append(f"i.{body}_torque * b.{body}_frame.turn.w")
+        nothing = "Wrench(0.0, 0.0, 0.0)"
+        rows.append("wrenches = (")
+        for terms in on.values():
+            only = terms[0] if len(terms) == 1 else f"added({', '.join(terms)})" if terms else nothing
+            rows.append(f"    {only},")
+        rows.append(")")
+        freedoms = [" ".join(terms) or "0.0" for terms in along]
+        rows.append(f"along = ({', '.join(freedoms)},)")
+        rows.append(f"return Acting(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})")
+        yield from self.laws()
+        yield from (
+            "class Acting(NamedTuple):",
+            '    """Forces on the bodies and along the freedoms, power lost in dampers and friction, and of the loads (W)."""',
+            "",
+        )
+        yield from (
+            "    wrenches: tuple[Wrench, ...]",
+            "    along: tuple[float, ...]",
+            "    lost: float",
+            "    gained: float",
+            "",
+            "",
+        )
+        s = "s: Springs, " if self.description.springs else ""
+        yield f"def acting(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> Acting:"
+        yield '    """Compute what acts on the bodies and along the freedoms, but for the drives."""'
+        yield from indented(rows)
+
+    def masses(self) -> Iterator[str]:
+        """Write the function of the bodies' masses."""
+        names = {parameter.name for parameter in self.interface.parameters}
+        yield "def masses(b: Places, p: Constants) -> tuple[Mass, ...]:"
+        yield '    """Compute the masses of the bodies at their places."""'
+        yield "    return ("
+        for body in self.bodies:
+            frame = f"b.{body}_frame"
+            if body not in self.interface.centres:
+                yield f"        Mass(0.0, 0.0, {frame}.origin, {frame}),"
+                continue
+            x, y = self.interface.centres[body]
+            centre = f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
+            inertia = f"p.{body}_inertia" if f"{body}.inertia" in names else "0.0"
+            yield f"        Mass(p.{body}_mass, {inertia}, {centre}, {frame}),"
+        yield "    )"
+
+    # Forces in the joints
+
+    def forces(self) -> Iterator[str]:
+        """Write the function of the forces in all joints, from the last dyad back to the ground."""
+        rows = [
+            f"on_{body} = needed(m.masses[{n}], m.accelerations, m.wrenches[{n}])" for n, body in enumerate(self.bodies)
+        ]
+        rows += [f"on_{body} = Wrench(0.0, 0.0, 0.0)" for body in self.structure.bodies if body not in self.bodies]
+        rows.insert(0, "b = m.places")
+        taken: dict[str, int] = {}
+
+        def reaction(joint: Joint, by: str, on: str, force: str) -> None:
+            taken[joint.name] = taken.get(joint.name, 0) + 1
+            name = joint.name if taken[joint.name] == 1 else f"{joint.name}{taken[joint.name]}"
+            self.reactions.append(Reaction(name, joint, by, on))
+            rows.append(f"in_{name} = {force}")
+
+        def supported(joint: Joint, by: str, on: str) -> None:
+            reaction(joint, by, on, f"on_{on}")
+            if by != GROUND:
+                rows.append(f"on_{by} = added(on_{by}, on_{on})")
+
+        for step in reversed(self.structure.steps):
+            if isinstance(step, Freed):
+                supported(step.joint, step.parent, step.body)
+            elif isinstance(step, Geared):
+                rows.append(f"on_teeth = {self._mesh(step)}")
+                rows.append(f"on_{step.body} = less(on_{step.body}, on_teeth)")
+                if step.mate != GROUND:
+                    rows.append(f"on_{step.mate} = added(on_{step.mate}, on_teeth)")
+                supported(step.pin, step.parent, step.body)
+            else:
+                first, second = step.ends
+                reaction(step.inner, second, first, self._inner(step))
+                inner = f"in_{self.reactions[-1].name}"
+                rows.append(f"on_{first} = less(on_{first}, {inner})")
+                rows.append(f"on_{second} = added(on_{second}, {inner})")
+                for side in step.sides:
+                    for inside in reversed(side.inside):
+                        supported(inside.joint, inside.parent, inside.body)
+                    supported(side.joint, side.parent, side.body)
+        names = [f"in_{r.name}" for r in self.reactions]
+        yield from (
+            "class Forces(NamedTuple):",
+            '    """Forces in the joints, each of one body on another, and their moments about the ground\'s origin."""',
+            "",
+        )
+        yield from (f"    {name}: Wrench" for name in names)
+        yield from ("", "", "def forces(m: Motion, p: Constants) -> Forces:")
+        yield '    """Compute the forces in all joints, from the last dyad back to the ground."""'
+        yield from indented([*rows, f"return Forces({', '.join(names)})"])
+
+    def _mesh(self, step: Geared) -> str:
+        pins = [
+            j
+            for j in self.structure.joints.values()
+            if isinstance(j, Pin) and {step.mate, step.carrier} <= set(j.bodies)
+        ]
+        ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
+        return f"mesh(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
+
+    def _inner(self, step: Dyad) -> str:
+        def total(side: Side) -> str:
+            names = [f"on_{body}" for body in side.bodies]
+            return names[0] if len(names) == 1 else f"added({', '.join(names)})"
+
+        one, other = (total(side) for side in step.sides)
+        outer = [f"b.at_{s.joint.name}" if isinstance(s.joint, Pin) else f"b.{s.joint.name}_line" for s in step.sides]
+        inner = f"b.at_{step.inner.name}" if isinstance(step.inner, Pin) else f"b.{step.inner.name}_line"
+        p, q = outer
+        return {
+            "RRR": f"pin_between_pins({p}, {inner}, {q}, {one}, {other})",
+            "RRP": f"pin_to_block({p}, {inner}, {q}, {one}, {other})",
+            "PRP": f"pin_of_blocks({inner}, {p}, {q}, {one}, {other})",
+            "RPR": f"slide_between_pins({p}, {q}, {inner}, {one}, {other})",
+            "RPP": f"slide_to_block({p}, {q}, {inner}, {one}, {other})",
+        }[step.kind]
+
+    # Equations of motion
+
+    def applied(self) -> Iterator[str]:
+        """Write the record of the inputs in force, and the function that makes it."""
+        fields, values, names = [], [], []
+        modes = [f"{drive.name}_mode" for drive in self.interface.drives if drive.table]
+        for drive in self.interface.drives:
+            fields.append(f"{drive.name}_load")
+            names.append(f"{drive.name}_load")
+            if drive.table:
+                names += [f"_{drive.name}_speed", f"{drive.name}_rate"]
+                fields += [f"{drive.name}_held", f"{drive.name}_given"]
+                mode = f"{drive.name}_mode"
+                values += [f"(1.0 - {mode}) * {drive.name}_load", mode, f"{mode} * {drive.name}_rate"]
+            else:
+                values.append(f"{drive.name}_load")
+        loads = [load.field for load in self.interface.loads]
+        yield from (
+            "class Applied(NamedTuple):",
+            '    """Loads along the freedoms, whether their rates are commanded, their accelerations then; other loads."""',
+            "",
+        )
+        yield from (f"    {field}: float" for field in (*fields, *loads))
+        yield from ("", "", "def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:")
+        yield '    """Return what acts on the linkage from the values of the modes and the inputs."""'
+        rows = [f"({', '.join(modes)},) = modes"] if modes else []
+        rows.append(f"({', '.join((*names, *loads))},) = u")
+        rows.append(f"return Applied({', '.join((*values, *loads))})")
+        yield from indented(rows)
+
+    def _held(self) -> tuple[str, str]:
+        """Return the tuples of which rates are commanded and of their accelerations."""
+        held = ", ".join(f"i.{d.name}_held" if d.table else "0.0" for d in self.interface.drives)
+        known = ", ".join(f"i.{d.name}_given" if d.table else "0.0" for d in self.interface.drives)
+        return f"({held},)", f"({known},)"
+
+    def motion(self) -> Iterator[str]:
+        """Write the functions of accelerations, energies, jumps and derivatives."""
+        n, drives = range(self.n), self.interface.drives
+        held, known = self._held()
+        s = "s, " if self.description.springs else ""
+        rows = ["b = places(x, p)", "m = masses(b, p)"]
+        if s:
+            rows.append("s = springs(b, x, p)")
+        rows += [f"a = acting(b, m, {s}i, p)", f"f = generalised_forces(m, a.wrenches, {self.n})"]
+        right = [f"f[{k}] + a.along[{k}] + i.{drives[k].name}_load" for k in n]
+        rows += [f"right = ({', '.join(right)},)", f"matrix = mass_matrix(m, {self.n})"]
+        rows += [
+            f"held_ones = {held}",
+            f"e = accelerations(matrix, right, held_ones, {known})",
+            "inertial = multiplied(matrix, e)",
+        ]
+        loads = [
+            f"i.{d.name}_load{f' + held_ones[{k}] * (inertial[{k}] - right[{k}])' if d.table else ''}"
+            for k, d in enumerate(drives)
+        ]
+        rows.append(f"loads = ({', '.join(loads)},)")
+        power = " + ".join(f"loads[{k}] * x[{self.n + k}]" for k in n)
+        rows.append(f"return Motion(b, m, a.wrenches, e, loads, a.lost, {power} + a.gained)")
+        yield from (
+            "class Motion(NamedTuple):",
+            '    """The bodies, forces on them, accelerations of the freedoms and loads on them, power lost and supplied."""',
+            "",
+        )
+        yield from ("    places: Places", "    masses: tuple[Mass, ...]", "    wrenches: tuple[Wrench, ...]")
+        yield from (
+            "    accelerations: tuple[float, ...]",
+            "    loads: tuple[float, ...]",
+            "    lost: float",
+            "    supplied: float",
+            "",
+            "",
+        )
+        yield from (
+            "def motion(x: tuple[float, ...], i: Applied, p: Constants) -> Motion:",
+            '    """Compute the accelerations, and the loads that hold the commanded rates."""',
+        )
+        yield from indented(rows)
+        yield from ("", "", "def derivative(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:")
+        yield '    """Compute the time derivative of the state."""'
+        rates = ", ".join(f"x[{self.n + k}]" for k in n)
+        yield from indented(["m = motion(x, i, p)", f"return ({rates}, *m.accelerations, m.lost, m.supplied)"])
+        yield from self._energies()
+        yield from self._jump(held)
+        yield from ("", "", "def start(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:")
+        yield from ('    """Return the state at the start as it is."""', "    return x")
+        yield from ("", "", "def clearance(x: tuple[float, ...], i: Applied, p: Constants) -> float:")
+        yield from (
+            '    """Compute the least sine of all dyads, negative in the wrong assembly."""',
+            "    return places(x, p).clearance",
+        )
+
+    def _energies(self) -> Iterator[str]:
+        terms = []
+        if self.description.gravity:
+            for n, body in enumerate(self.bodies):
+                if body in self.interface.centres:
+                    terms.append(f"- p.{body}_mass * (p.gx * m[{n}].centre.x + p.gy * m[{n}].centre.y)")
+        for name, spring in self.description.springs.items():
+            if given(spring.stiffness):
+                terms.append(f"+ 0.5 * p.{name}_stiffness * s.{name}_stretch * s.{name}_stretch")
+        s = "s: Springs, " if self.description.springs else ""
+        yield from ("", "", f"def potential_energy(m: tuple[Mass, ...], {s}p: Constants) -> float:")
+        yield '    """Compute the energy of the springs, and of gravity with zero at the ground\'s origin (J)."""'
+        yield f"    return {' '.join(terms).removeprefix('+ ') or '0.0'}"
+        yield from ("", "", "def energy(x: tuple[float, ...], p: Constants) -> float:")
+        yield '    """Compute the mechanical energy (J)."""'
+        s = "springs(b, x, p), " if self.description.springs else ""
+        yield from indented(
+            ["b = places(x, p)", "m = masses(b, p)", f"return kinetic_energy(m) + potential_energy(m, {s}p)"]
+        )
+
+    def _jump(self, held: str) -> Iterator[str]:
+        n = range(self.n)
+        yield from (
+            "",
+            "",
+            "def jump(x: tuple[float, ...], i: Applied, u: tuple[float, ...], p: Constants) -> tuple[float, ...]:",
+        )
+        yield '    """Return the state after a jump of the commanded rates: the momenta of the other freedoms are conserved."""'
+        place, changes = 0, []
+        for k, drive in enumerate(self.interface.drives):
+            changes.append(f"u[{place + 1}] - x[{self.n + k}]" if drive.table else "0.0")
+            place += 3 if drive.table else 1
+        rows = [
+            f"matrix = mass_matrix(masses(places(x, p), p), {self.n})",
+            f"change = accelerations(matrix, ({'0.0, ' * self.n}), {held}, ({', '.join(changes)},))",
+            f"before = ({', '.join(f'x[{self.n + k}]' for k in n)},)",
+            "after = tuple(a + b for a, b in zip(before, change))",
+            "gained = zip(after, multiplied(matrix, after), before, multiplied(matrix, before))",
+            "work = 0.5 * sum(a * b - c * d for a, b, c, d in gained)",
+            f"return ({', '.join(f'x[{k}]' for k in n)}, *after, x[{2 * self.n}], x[{2 * self.n + 1}] + work)",
+        ]
+        yield from indented(rows)

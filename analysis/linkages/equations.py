@@ -1,0 +1,298 @@
+"""Write the equations of a described linkage as a module of Python, in terms of `linkwork.planar`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from .description import GROUND, Description
+from .parameters import Interface
+from .structure import Dyad, Freed, Geared, Pin, Side, Slider, Structure
+
+
+class Places:
+    """The function of the places of all bodies of one linkage, line by line."""
+
+    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
+        self.description, self.structure, self.interface = description, structure, interface
+        self.n = len(interface.drives)
+        self.lines: list[str] = []
+        #: variables of points of the ground or of known bodies
+        self.places: dict[str, str] = {}
+        #: of bodies whose angles are linear: coefficients of the coordinates, and the constant terms
+        self.angles: dict[str, tuple[dict[int, str], list[str]]] = {GROUND: ({}, [])}
+        self.margins: list[str] = []
+
+    # Places
+
+    def point(self, body: str, own: str, frame: str = "") -> str:
+        """Return the expression of a point of a body; ``frame`` is the body's place where it is not that in the ground."""
+        x, y = self.interface.points[body].get(own, ("0.0", "0.0"))
+        if body == GROUND or frame == "own":
+            return f"fixed({x}, {y}, {self.n})"
+        frame = frame or f"{body}_frame"
+        return f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
+
+    def at(self, body: str, own: str) -> str:
+        """Return the variable of a point of a known body, written where it is first used."""
+        if own not in self.places:
+            self.lines.append(f"at_{own} = {self.point(body, own)}")
+            self.places[own] = f"at_{own}"
+        return self.places[own]
+
+    def hung(self, pin: str, turn: str, body: str, own: str) -> str:
+        """Return the expression of the place of a body whose point ``own`` is at a place."""
+        x, y = self.interface.points[body].get(own, ("0.0", "0.0"))
+        if (x, y) == ("0.0", "0.0"):
+            return f"Frame({pin}, {turn})"
+        return f"Frame(minus({pin}, arm({turn}, {x}, {y})), {turn})"
+
+    def inclined(self, turn: str, joint: Slider, sign: int = 1) -> str:
+        """Return the direction of a line from that of its body, or with sign -1 of the body from that of its line."""
+        if not joint.inclined:
+            return turn
+        return f"inclined({turn}, p.{joint.name}_c, {'-' if sign < 0 else ''}p.{joint.name}_s)"
+
+    def freed(self, step: Freed, lead: str = "") -> None:
+        """Write the place of a body that follows through a freedom, in the ground or in the body ``lead``."""
+        suffix = f"in_{lead}" if lead else "frame"
+        parent = "" if step.parent in (GROUND, lead) else f"{step.parent}_{suffix}"
+        own = "own" if lead and step.parent == lead else parent
+        parent_turn = f"{parent}.turn" if parent else f"held(1.0, 0.0, {self.n})"
+        turn = f"{step.body}_turn"
+        joint, drive = step.joint, self.interface.drives[step.freedom]
+        terms, constants = (dict(self.angles[step.parent][0]), list(self.angles[step.parent][1]))
+        sign = "-" if step.sign < 0 else ""
+        if isinstance(joint, Pin):
+            terms[step.freedom] = f"{sign}1.0"
+            self.lines.append(f"{turn} = {self.angled(terms, constants)}")
+            pin = self.point(step.parent, joint.name, own)
+            if not lead:
+                pin = self.at(step.parent, joint.name)
+            frame = self.hung(pin, turn, step.body, joint.name)
+        else:
+            travel = f"travelled({drive.variable}, {self.share({step.freedom: '1.0'})}, v)"
+            if joint.inclined:
+                constants.append(f"{sign}p.{joint.name}_direction")
+            if step.sign > 0:
+                self.lines.append(f"{turn} = {self.inclined(parent_turn, joint)}")
+                frame = f"Frame(plus({self.point(step.parent, joint.through, own)}, turned({turn}, {travel})), {turn})"
+            else:
+                self.lines.append(f"{turn} = {self.inclined(parent_turn, joint, -1)}")
+                origin = self.point(step.parent, "", own)
+                through = f"minus({origin}, turned({parent_turn}, {travel}))"
+                frame = self.hung(through, turn, step.body, joint.through)
+        self.angles[step.body] = terms, constants
+        self.lines.append(f"{step.body}_{suffix} = {frame}")
+
+    def share(self, terms: dict[int, str]) -> str:
+        """Return the derivatives of an angle by the coordinates, as a tuple."""
+        return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
+
+    def angled(self, terms: dict[int, str], constants: Iterable[str]) -> str:
+        """Return the expression of the direction at an angle that is linear in the coordinates."""
+        words = []
+        for number, factor in terms.items():
+            name = self.interface.drives[number].variable
+            words.append({"1.0": name, "-1.0": f"-{name}"}.get(factor, f"{factor} * {name}"))
+        angle = " + ".join((*words, *constants)) or "0.0"
+        return f"angled({angle.replace('+ -', '- ')}, {self.share(terms)}, v)"
+
+    def geared(self, step: Geared) -> None:
+        """Write the place of a gear from the angle of its mate."""
+        ratio, phase = f"p.{step.gear}_ratio", f"p.{step.gear}_phase"
+        (mate, mate_constants), (carrier, carrier_constants) = self.angles[step.mate], self.angles[step.carrier]
+        terms: dict[int, str] = {}
+        factor = f"1.0 / {ratio}" if step.inverse else ratio
+        for number in mate.keys() | carrier.keys():
+            seen = f"({mate.get(number, '0.0')} - {carrier.get(number, '0.0')})"
+            terms[number] = f"({carrier.get(number, '0.0')} + {factor} * {seen})"
+        seen = " + ".join(mate_constants) or "0.0"
+        back = " + ".join(carrier_constants) or "0.0"
+        angle = f"{back} + {factor} * ({seen} - ({back}){f' - {phase}' if step.inverse else ''})"
+        constants = [angle if step.inverse else f"{angle} + {phase}"]
+        self.angles[step.body] = terms, constants
+        turn = f"{step.body}_turn"
+        self.lines.append(f"{turn} = {self.angled(terms, constants)}")
+        self.lines.append(
+            f"{step.body}_frame = {self.hung(self.at(step.parent, step.pin.name), turn, step.body, step.pin.name)}"
+        )
+
+    # Dyads
+
+    def end(self, side: Side, body: str, joint: Pin) -> str:
+        """Return the arm of a side from its outer joint to the pin on ``body``, in the axes of the side's body or its line."""
+        if isinstance(side.joint, Pin):
+            start, axes = side.joint.name, ""
+        elif side.joint.bodies[1] == side.body:
+            start, axes = "", ""
+        else:
+            start, axes = side.joint.through, side.joint.name if side.joint.inclined else ""
+        return self.own_arm(side, body, joint.name, start, axes)
+
+    def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
+        """Return an arm in a side's body from its point ``start`` to the point ``to`` of one of the side's bodies."""
+        sx, sy = self.interface.points[side.body].get(start, ("0.0", "0.0"))
+        if body == side.body:
+            x, y = self.interface.points[body].get(to, ("0.0", "0.0"))
+            result = f"fixed({_difference(x, sx)}, {_difference(y, sy)}, {self.n})"
+        else:
+            result = self.point(body, to, f"{body}_in_{side.body}")
+            if (sx, sy) != ("0.0", "0.0"):
+                result = f"minus({result}, fixed({sx}, {sy}, {self.n}))"
+        return f"turned(held(p.{axes}_c, -p.{axes}_s, {self.n}), {result})" if axes else result
+
+    def line(self, side: Side) -> tuple[str, str]:
+        """Write the line along which a side slides: variables of its origin and direction."""
+        joint = side.joint
+        assert isinstance(joint, Slider)
+        parent = f"{side.parent}_frame.turn" if side.parent != GROUND else f"held(1.0, 0.0, {self.n})"
+        name = f"{joint.name}_line"
+        if joint.bodies[1] == side.body:
+            self.lines.append(f"{name} = {self.inclined(parent, joint)}")
+            return self.at(side.parent, joint.through), name
+        self.lines.append(f"{name} = {parent}")
+        return f"{side.parent}_frame.origin", name
+
+    def placed(self, side: Side, turn: str, along: str = "", origin: str = "", line: str = "") -> None:
+        """Write the places of a side's bodies from the direction of the first, or from its position along a line."""
+        joint, body = side.joint, side.body
+        if isinstance(joint, Pin):
+            frame = self.hung(self.at(side.parent, joint.name), turn, body, joint.name)
+        else:
+            place = f"plus({origin}, turned({line}, {along}))"
+            if joint.bodies[1] == body:
+                frame = f"Frame({place}, {line})"
+            else:
+                self.lines.append(f"{body}_turn = {self.inclined(line, joint, -1)}")
+                frame = self.hung(place, f"{body}_turn", body, joint.through)
+        self.lines.append(f"{body}_frame = {frame}")
+        for step in side.inside:
+            self.lines.append(f"{step.body}_frame = within({body}_frame, {step.body}_in_{body})")
+
+    def dyad(self, step: Dyad) -> None:
+        """Write the places of the bodies of a dyad."""
+        name = step.inner.name
+        self.lines.append(f"# dyad {step.kind}: {' and '.join(s.body for s in step.sides)}, joined at {name}")
+        for side in step.sides:
+            kept = dict(self.angles)
+            self.angles[side.body] = {}, []
+            for inside in side.inside:
+                self.freed(inside, side.body)
+            self.angles = kept
+        branch, margin = f"p.{name}_assembly", f"margin_{name}"
+        turns = [f"{side.body}_turn" for side in step.sides]
+        pins = [self.at(s.parent, s.joint.name) if isinstance(s.joint, Pin) else "" for s in step.sides]
+        lines = [self.line(s) if isinstance(s.joint, Slider) else ("", "") for s in step.sides]
+        along = [f"{s.joint.name}_along" for s in step.sides]
+        if isinstance(step.inner, Pin):
+            arms = [self.end(side, end, step.inner) for side, end in zip(step.sides, step.ends)]
+            if step.kind == "RRR":
+                call = f"pin_pin_pin({pins[0]}, {pins[1]}, {arms[0]}, {arms[1]}, {branch}, v)"
+                self.lines.append(f"{turns[0]}, {turns[1]}, {margin} = {call}")
+            elif step.kind == "RRP":
+                (origin, line) = lines[1]
+                call = f"pin_pin_slide({pins[0]}, {origin}, {line}, {arms[0]}, {arms[1]}, {branch}, v)"
+                self.lines.append(f"{turns[0]}, {along[1]}, {margin} = {call}")
+            else:
+                ends = ", ".join(f"{origin}, {line}, {arm}" for (origin, line), arm in zip(lines, arms))
+                self.lines.append(f"{along[0]}, {along[1]}, {margin} = slide_pin_slide({ends}, v)")
+        elif step.kind == "RPR":
+            self._between_pins(step, step.inner, pins, branch, margin)
+        else:
+            self._to_block(step, step.inner, pins[0], lines[1], margin)
+        self.margins.append(margin)
+        for side, turn, way, (origin, line) in zip(step.sides, turns, along, lines):
+            self.placed(side, turn, way, origin, line)
+        if isinstance(step.inner, Pin):
+            self.at(step.ends[0], name)
+
+    def _between_pins(self, step: Dyad, inner: Slider, pins: list[str], branch: str, margin: str) -> None:
+        holder, block = (0, 1) if step.sides[0].body == inner.bodies[0] else (1, 0)
+        first, second = step.sides[holder], step.sides[block]
+        a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.name if inner.inclined else "")
+        b = self.own_arm(second, second.body, second.joint.name, "", "")
+        call = f"pin_slide_pin({pins[holder]}, {pins[block]}, {a}, {b}, {branch}, v)"
+        self.lines.append(f"{inner.name}_line, {inner.name}_along, {margin} = {call}")
+        self.lines.append(f"{first.body}_turn = {self.inclined(f'{inner.name}_line', inner, -1)}")
+        self.lines.append(f"{second.body}_turn = {inner.name}_line")
+
+    def _to_block(self, step: Dyad, inner: Slider, pin: str, line: tuple[str, str], margin: str) -> None:
+        first, second = step.sides
+        origin, direction = line
+        outer = second.joint
+        assert isinstance(outer, Slider)
+        own = outer.bodies[1] == second.body
+        turn = direction if own else self.inclined(direction, outer, -1)
+        start, axes = ("", "") if own else (outer.through, outer.name if outer.inclined else "")
+        across = f"{inner.name}_line"
+        holds = inner.bodies[0] == second.body
+        self.lines.append(f"{across} = {self.inclined(turn, inner) if holds else turn}")
+        if holds:
+            a = self.own_arm(first, first.body, first.joint.name, "", "")
+            b = self.own_arm(second, second.body, inner.through, start, axes)
+            body_turn = across
+        else:
+            a = self.own_arm(first, first.body, first.joint.name, inner.through, inner.name if inner.inclined else "")
+            b = self.own_arm(second, second.body, "", start, axes)
+            body_turn = self.inclined(across, inner, -1)
+        call = f"pin_slide_slide({pin}, {origin}, {direction}, {across}, {a}, {b}, v)"
+        self.lines.append(f"{outer.name}_along, {inner.name}_along, {margin} = {call}")
+        self.lines.append(f"{first.body}_turn = {body_turn}")
+
+    # Functions of the module
+
+    def function(self) -> list[str]:
+        """Return the function of the places of all bodies, and the record that it returns."""
+        for n, drive in enumerate(self.interface.drives):
+            self.lines.append(f"{drive.variable} = x[{n}]")
+        self.lines.append(f"v = ({', '.join(f'x[{self.n + n}]' for n in range(self.n))},)")
+        for step in self.structure.steps:
+            if isinstance(step, Freed):
+                self.lines.append(
+                    f"# the freedom {self.interface.drives[step.freedom].name}: {step.body} from {step.parent}"
+                )
+                self.freed(step)
+            elif isinstance(step, Geared):
+                self.lines.append(f"# {step.body}, geared to {step.mate}")
+                self.geared(step)
+            else:
+                self.dyad(step)
+        margin = "1.0"
+        for name in self.margins:
+            margin = name if margin == "1.0" else f"lesser({margin}, {name})"
+        for body in (GROUND, *self.structure.bodies):
+            for own in self.interface.points[body]:
+                self.at(body, own)
+        fields = [f"{body}_frame" for body in self.structure.bodies] + list(self.places.values())
+        fields += [f"{name}_line" for name, joint in self.structure.joints.items() if isinstance(joint, Slider)]
+        for name, joint in self.structure.joints.items():
+            if isinstance(joint, Slider) and not any(line.startswith(f"{name}_line") for line in self.lines):
+                holder = joint.bodies[0]
+                turn = f"{holder}_frame.turn" if holder != GROUND else f"held(1.0, 0.0, {self.n})"
+                self.lines.append(f"{name}_line = {self.inclined(turn, joint)}")
+        self.lines += [f"clearance = {margin}", f"return Places({', '.join(fields)}, clearance)"]
+        record = [
+            "class Places(NamedTuple):",
+            '    """The bodies, the points, the lines of slides, and the clearance to the limit of assembly."""',
+            "",
+        ]
+        kinds = {"frame": "Frame", "line": "Turn"}
+        record += [f"    {name}: {kinds.get(name.rpartition('_')[2], 'Vector')}" for name in fields] + [
+            "    clearance: float"
+        ]
+        head = [
+            "def places(x: tuple[float, ...], p: Constants) -> Places:",
+            '    """Compute the places of all bodies, freedom after freedom and dyad after dyad."""',
+        ]
+        return [*record, "", "", *head, *indented(self.lines)]
+
+
+def _difference(a: str, b: str) -> str:
+    """Return the expression a - b, simplified where one of them is zero."""
+    if b == "0.0":
+        return a
+    return f"-{b}" if a == "0.0" else f"{a} - {b}"
+
+
+def indented(lines: Iterable[str]) -> Iterator[str]:
+    return (f"    {line}" for line in lines)

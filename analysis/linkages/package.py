@@ -1,0 +1,309 @@
+"""Write a described linkage as a package of Python, in the form that a hand-written mechanism has, and import it."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from linkwork import planar
+from linkwork.errors import AssemblyError
+from linkwork.mechanism import Mechanism
+
+from ..mechanisms import MECHANISMS, register
+from ..numerics.cache import code_folder
+from .description import Description, LinkageError
+from .drawing import Picture
+from .dynamics import Motion
+from .equations import Places
+from .laws import FUNCTIONS
+from .outputs import Outputs
+from .parameters import Drive, interface, size
+from .structure import Structure, analyse
+from .variables import Variables, quoted
+
+_FRICTION = ("FRICTION_RATE", "FRICTION_SPEED", "lesser")
+
+_EQUATIONS = '''"""Equations of the {name}, written from its description: one freedom, one dyad after the other.
+
+The state is {state},
+then the work dissipated and supplied. `linkwork.planar` explains the functions.
+"""
+
+from __future__ import annotations
+
+{imports}
+
+
+class Constants(NamedTuple):
+    """The parameters, and what follows from them."""
+
+{constants}
+
+
+{body}
+'''
+
+_MECHANISM = '''"""The linkage {name}: {title}. Written from its description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi, sin
+from typing import ClassVar
+
+from linkwork import friction, planar
+from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Link, Mechanism, Mode, Part, PublishedSet
+from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.variables import POSITION, RATE, Variable, energy_outputs, output, status_variables, tolerance_parameter
+
+from . import equations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """SI units."""
+
+    RULES: ClassVar[Rules] = Rules({rules})
+
+{fields}
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+
+    def constants(self) -> equations.Constants:
+        """Return what the equations use."""
+        return equations.Constants(
+{values}
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Initial:
+    """State at the start."""
+
+{initial}
+
+    def __post_init__(self) -> None:
+        check_initial(self)
+
+
+VARIABLES = (
+{variables}
+    *status_variables(),
+)
+
+
+def check_assembly(parameters: Parameters, x: tuple[float, ...]) -> None:
+    """Make sure that the bodies can be joined."""
+    planar.check_clearance(equations.places, x, parameters.constants(), MECHANISM.where(x))
+
+
+MECHANISM = Mechanism(
+    name={quoted_name},
+    fmu={fmu},
+    title={quoted_title},
+    description={quoted_title},
+    notes=({notes},),
+    parameters=Parameters,
+    initial=Initial,
+    published={{{quoted_name}: PublishedSet(Parameters(), Initial({started}), {{{driven}}}, {source})}},
+    freedoms=(
+{freedoms}
+    ),
+    channels=(
+{channels}
+    ),
+    variables=VARIABLES,
+    position_parameters=(
+{positions}
+    ),
+    experiment=(0.0, 1.0, 1e-3, 1e-9),
+    modules=(friction, planar, equations),
+    equations=Equations(*(getattr(equations, name) for name in Equations._fields)),
+    check_assembly=check_assembly,
+    error_scale=equations.error_scale,
+    drawing=Drawing(
+        (
+{joints}
+        ),
+        equations.positions,
+        (
+{parts}
+        ),
+        ({paths}),
+    ),
+    links=(
+{links}
+    ),
+)
+'''
+
+
+def _lines(texts: Iterable[str], indent: int = 4, end: str = ",") -> str:
+    return "\n".join(f"{' ' * indent}{text}{end}" for text in texts)
+
+
+class Package:
+    """The texts of the package of one linkage.
+
+    Attributes
+    ----------
+    description : Description
+    structure : Structure
+    motion : Motion
+    name : str
+        Name of the linkage, as Python spells it, with a hash of the texts.
+    files : dict of str to str
+        Texts by file name.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        If the description is wrong.
+    """
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.structure: Structure = analyse(description)
+        self.interface = interface(description, self.structure)
+        self.motion = Motion(description, self.structure, self.interface)
+        self.picture = Picture(description, self.structure, self.interface)
+        self.variables = Variables(description, self.structure, self.interface)
+        equations = self._equations()
+        self.files = {"equations.py": equations, "__init__.py": self._mechanism()}
+        library = Path(str(planar.__file__)).read_text(encoding="utf-8")
+        digest = hashlib.sha256("\0".join((*self.files.values(), library)).encode()).hexdigest()
+        self.name = f"{re.sub(r'[^a-z0-9]', '_', description.name.lower())}_{digest[:12]}"
+
+    def _equations(self) -> str:
+        motion = self.motion
+        sections = [
+            motion.applied(),
+            Places(self.description, self.structure, self.interface).function(),
+            motion.masses(),
+        ]
+        sections += [motion.springs()] if self.description.springs else []
+        sections += [motion.acting(), motion.motion(), motion.forces()]
+        # of the forces it is only known now which joints have one
+        self.outputs = Outputs(motion)
+        sections += [
+            self.outputs.function(),
+            _error_scale(self.interface.drives, *size(self.interface)),
+            self.picture.positions(),
+        ]
+        body = "\n\n\n".join("\n".join(section) for section in sections)
+        return _EQUATIONS.format(
+            name=self.description.name,
+            state=", ".join((*(d.coordinate for d in self.interface.drives), *(d.rate for d in self.interface.drives))),
+            imports=_imports(body),
+            constants=_lines((f"{name}: float" for name in self.variables.constants()), end=""),
+            body=body,
+        )
+
+    def _mechanism(self) -> str:
+        d, v = self.description, self.variables
+        joints, parts = self.picture.drawn()
+        title = d.title or d.name
+        return _MECHANISM.format(
+            name=d.name,
+            title=title.replace('"', "'").replace("\\", "/"),
+            rules=v.rules(),
+            fields=_lines(v.fields(), end=""),
+            values=_lines(v.constants().values(), 12),
+            initial=_lines((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
+            variables=_lines([*v.parameters(), *v.inputs(), *(o.variable for o in self.outputs.all() if o.variable)]),
+            quoted_name=quoted(d.name),
+            quoted_title=quoted(title),
+            fmu=quoted("".join(part[:1].upper() + part[1:] for part in re.split(r"[^A-Za-z0-9]+", d.name))),
+            notes=quoted(f"Source: {d.source}."),
+            started=", ".join(f"{start.name}={start.value!r}" for start in v.starts),
+            driven=v.driven(),
+            source=quoted(d.source),
+            freedoms=_lines(v.freedoms(), 8),
+            channels=_lines(v.channels(), 8),
+            positions=_lines(map(quoted, v.placing()), 8),
+            joints=_lines(
+                (f"Joint({quoted(j.name)}, {quoted(j.text)}{self.picture.moves(j.name)})" for j in joints), 12
+            ),
+            parts=_lines(parts, 12),
+            paths="".join(f"{quoted(name)}, " for name in self.picture.paths()),
+            links=_lines(v.links(), 8),
+        )
+
+
+def _imports(body: str) -> str:
+    """Return the imports that a text needs, of all that the equations of a linkage may use."""
+    library = [name for name, value in vars(planar).items() if getattr(value, "__module__", "") == planar.__name__]
+    wanted = {"math": FUNCTIONS, "typing": ("NamedTuple",), "linkwork.friction": _FRICTION, "linkwork.planar": library}
+    found = []
+    for module, names in wanted.items():
+        used = [name for name in names if re.search(rf"\b{name}\b", body)]
+        if used:
+            found.append(
+                f"from {module} import (\n{_lines(used)}\n)"
+                if len(used) > 4
+                else f"from {module} import {', '.join(used)}"
+            )
+    return "\n".join(found)
+
+
+def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> Iterable[str]:
+    """Write the function of the magnitudes below which errors are absolute, of a linkage of that size and mass."""
+    yield "def error_scale(parameters: object, x: tuple[float, ...]) -> tuple[float, ...]:"
+    yield '    """Return magnitudes below which errors are absolute, from the size, the mass and the speed at the start."""'
+    squares = " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns)
+    yield f"    speed = sqrt(1.0 + {squares or '0.0'})"
+    yield f"    energy = {0.5 * mass * length * length!r} * speed * speed"
+    coordinates = ", ".join("1.0" if d.turns else repr(length) for d in drives)
+    rates = ", ".join("speed" if d.turns else f"{length!r} * speed" for d in drives)
+    yield f"    return ({coordinates}, {rates}, energy, energy)"
+
+
+def mechanism(description: Description, folder: Path | None = None) -> Mechanism:
+    """Return the mechanism of a description, registered.
+
+    Parameters
+    ----------
+    description : Description
+    folder : path, optional
+        Where its package is kept; by default below the user's cache.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        If the description is wrong, or another mechanism has the name.
+    """
+    package = Package(description)
+    known = MECHANISMS.get(description.name)
+    if known is not None and known.modules[-1].__package__ == package.name:
+        return known
+    if known is not None and not hasattr(sys.modules[str(known.modules[-1].__package__)], "equations"):
+        raise LinkageError(f"linkage.name is {description.name}: it must not be that of a mechanism of Linkwork")
+    place = code_folder("linkages") if folder is None else Path(folder)
+    own = place / package.name
+    own.mkdir(parents=True, exist_ok=True)
+    for name, text in package.files.items():
+        if not (own / name).is_file() or (own / name).read_text(encoding="utf-8") != text:
+            (own / name).write_text(text, encoding="utf-8")
+    if str(place) not in sys.path:
+        sys.path.append(str(place))
+    importlib.invalidate_caches()
+    made: Mechanism = importlib.import_module(package.name).MECHANISM
+    start = made.published[description.name]
+    try:
+        made.check_assembly(start.parameters, made.state(start.initial))
+    except AssemblyError as error:
+        signs = "" if package.structure.dyads else ", another assembly"
+        raise LinkageError(f"{error}: the start must be another{signs}, or the lengths") from None
+    MECHANISMS.pop(description.name, None)
+    try:
+        register(made)
+    except LinkageError:
+        if known is not None:
+            MECHANISMS[known.name] = known
+        raise
+    return made

@@ -1,0 +1,331 @@
+"""The parameters of a described linkage: their names in the interface, their values, and how its equations refer to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from linkwork.errors import ParameterError
+from linkwork.parameters import field_name
+
+from ..files import Quantity, unknown_name
+from .description import GROUND, Body, Description, LinkageError, Spring, given
+from .structure import Pin, Slider, Structure
+
+
+class Parameter(NamedTuple):
+    """A parameter: FMI name, unit, meaning, value, and its rule: ``positive``, ``free`` (in sign), ``sign`` or none."""
+
+    name: str
+    unit: str
+    text: str
+    value: float
+    rule: str = ""
+    role: str = ""
+    of: str = ""
+
+    @property
+    def field(self) -> str:
+        """Its name in the dataclass of the parameters."""
+        return field_name(self.name)
+
+
+class Drive(NamedTuple):
+    """A freedom: its name, unit and place in the interface, its start, and the table of its inputs if it can be driven."""
+
+    name: str
+    joint: str
+    turns: bool
+    coordinate: str
+    rate: str
+    start: float
+    speed: float
+    table: str
+
+    @property
+    def variable(self) -> str:
+        """The coordinate's name in the equations."""
+        return f"q_{self.name}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of the coordinate."""
+        return "rad" if self.turns else "m"
+
+    @property
+    def load(self) -> str:
+        """Name of the input that drives it, in its table."""
+        return "torque" if self.turns else "force"
+
+    @property
+    def load_unit(self) -> str:
+        """Unit of that input."""
+        return "N.m" if self.turns else "N"
+
+
+class Load(NamedTuple):
+    """An input that drives no freedom: its FMI name, unit and meaning, and the output along which it acts."""
+
+    name: str
+    unit: str
+    text: str
+    displacement: str
+
+    @property
+    def field(self) -> str:
+        """Its name among the inputs of the equations."""
+        return field_name(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """What the interface of a described linkage consists of.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+    drives : tuple of Drive
+        The freedoms in their order.
+    loads : tuple of Load
+    points : mapping
+        Own coordinates of each point of each body, as expressions of the equations.
+    centres : mapping
+        The same of the centres of mass; bodies without a mass are left out.
+    """
+
+    parameters: tuple[Parameter, ...]
+    drives: tuple[Drive, ...]
+    loads: tuple[Load, ...]
+    points: Mapping[str, Mapping[str, tuple[str, str]]]
+    centres: Mapping[str, tuple[str, str]]
+
+
+def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...]:
+    """Return the freedoms with their names in the interface."""
+    tables = structure.freedoms
+    driven = [
+        name for n, (name, table) in enumerate(tables.items()) if (n == 0 if table.driven is None else table.driven)
+    ]
+    found = []
+    for name, table in tables.items():
+        turns = isinstance(structure.joints[table.joint], Pin)
+        unit, rate_unit = ("rad", "rad/s") if turns else ("m", "m/s")
+        where = f"linkage.freedoms.{name}"
+        inputs = "" if name not in driven else "drive" if len(driven) == 1 else f"{name}Drive"
+        found.append(
+            Drive(
+                name,
+                table.joint,
+                turns,
+                f"{name}.{'angle' if turns else 'position'}",
+                f"{name}.{'speed' if turns else 'velocity'}",
+                Quantity(unit)(table.start, f"{where}.start"),
+                Quantity(rate_unit)(table.speed, f"{where}.speed"),
+                inputs,
+            )
+        )
+    return tuple(found)
+
+
+def interface(description: Description, structure: Structure) -> Interface:
+    """Return the parameters of a linkage and the expressions of its points.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        If a value is missing or of the wrong kind.
+    """
+    drives = freedoms(description, structure)
+    found: list[Parameter] = []
+    points: dict[str, dict[str, tuple[str, str]]] = {GROUND: {}}
+    centres: dict[str, tuple[str, str]] = {}
+
+    def expression(name: str, value: float, text: str, rule: str = "free") -> str:
+        if value == 0 and isinstance(value, int):
+            return "0.0"
+        found.append(Parameter(name, "m", text, float(value), rule))
+        return f"p.{found[-1].field}"
+
+    def place(body: str, own: str, at: tuple[float, float]) -> tuple[str, str]:
+        x, y = (
+            expression(f"{body}.{own}_{axis}", value, f"Point {own} of the {body}, {axis}")
+            for axis, value in zip("xy", at)
+        )
+        return x, y
+
+    for own, at in description.ground.items():
+        points[GROUND][own] = place(GROUND, own, at)
+    for name, body in description.bodies.items():
+        points[name] = {}
+        if body.bar:
+            if body.length <= 0.0:
+                raise LinkageError(
+                    f"linkage.bodies.{name} is a bar from {body.bar[0]} to {body.bar[1]}: it must have a length"
+                )
+            length = expression(
+                f"{name}.length", body.length, f"Length of the {name}, {' to '.join(body.bar)}", "positive"
+            )
+            points[name] = {body.bar[0]: ("0.0", "0.0"), body.bar[1]: (length, "0.0")}
+        for own, at in body.points.items():
+            points[name][own] = place(name, own, at)
+        mass = _mass(name, body)
+        if mass is not None:
+            found.append(Parameter(f"{name}.mass", "kg", f"Mass of the {name}", mass.mass))
+            if mass.inertia is not None:
+                text = f"Moment of inertia of the {name} about its centre of mass"
+                found.append(Parameter(f"{name}.inertia", "kg.m2", text, mass.inertia))
+            x, y = (
+                expression(f"{name}.cog_{axis}", value, f"Centre of mass of the {name}, {axis}")
+                for axis, value in zip("xy", mass.centre)
+            )
+            centres[name] = (x, y)
+    for name in description.slots:
+        points[name] = {description.slots[name].pin: ("0.0", "0.0")}
+    for joint in structure.joints.values():
+        if isinstance(joint, Slider) and joint.inclined:
+            table = (description.slides | description.slots)[joint.name]  # type: ignore[operator]
+            text = f"Direction of the line of {joint.name} in the {joint.bodies[0]}"
+            found.append(Parameter(f"{joint.name}.direction", "rad", text, table.direction, "free"))
+    for name, gear in description.gears.items():
+        first, second = gear.bodies
+        if gear.ratio == 0.0:
+            raise ParameterError(f"linkage.gears.{name}.ratio", 0.0, "not be zero")
+        found.append(
+            Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
+        )
+        found.append(
+            Parameter(
+                f"{name}.phase", "rad", f"Angle of the {second} where that of the {first} is zero", gear.phase, "free"
+            )
+        )
+    by_joint = {drive.joint: drive for drive in drives}
+    for name, spring in description.springs.items():
+        found += _spring(name, spring, structure, by_joint.get(spring.at))
+    if description.gravity:
+        found.append(Parameter("gravity", "m/s2", "Acceleration of gravity", description.gravity))
+        found.append(
+            Parameter("ground.gravity_direction", "rad", "Direction of gravity", description.gravity_direction, "free")
+        )
+    for dyad in structure.dyads:
+        if dyad.assembled:
+            sign = description.assembly.get(dyad.inner.name, 1)
+            if sign not in (1, -1):
+                raise ParameterError(f"linkage.assembly.{dyad.inner.name}", sign, "be +1 or -1")
+            one, other = (side.body for side in dyad.sides)
+            found.append(Parameter(f"{dyad.inner.name}.assembly", "", f"Assembly of {one} and {other}", sign, "sign"))
+    unused = set(description.assembly) - {dyad.inner.name for dyad in structure.dyads if dyad.assembled}
+    if unused:
+        joints = ", ".join(dyad.inner.name for dyad in structure.dyads if dyad.assembled) or "none here"
+        raise LinkageError(
+            f"linkage.assembly has {', '.join(sorted(unused))}: the joints with two assemblies are {joints}"
+        )
+    _check_names(found)
+    return Interface(tuple(found), drives, tuple(_loads(description, structure, points)), points, centres)
+
+
+def _loads(
+    description: Description, structure: Structure, points: Mapping[str, Mapping[str, tuple[str, str]]]
+) -> Iterator[Load]:
+    """Yield the inputs that drive no freedom."""
+    moving = {own for body in description.bodies for own in points[body]}
+    for own in description.loads:
+        if own not in moving:
+            raise unknown_name(own, sorted(moving), f"point {own}, of linkage.loads")
+        fixed = own in description.ground
+        yield from (Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}", "" if fixed else f"{own}.{c}") for c in "xy")
+    for body in description.torques:
+        if body not in description.bodies:
+            raise unknown_name(body, description.bodies, f"body {body}, of linkage.torques")
+        yield Load(f"{body}.torque", "N.m", f"Torque on the {body}", "")
+    for name, spring in description.springs.items():
+        for own in spring.between:
+            if own not in moving | set(description.ground):
+                raise unknown_name(own, sorted(moving), f"point {own}, of linkage.springs.{name}.between")
+        if spring.driven and spring.between:
+            yield Load(f"{name}.force", "N", f"Force that lengthens {name}", f"{name}.length")
+        elif spring.driven:
+            about = isinstance(structure.joints[spring.at], Pin)
+            yield Load(f"{name}.{'torque' if about else 'force'}", "N.m" if about else "N", f"Drive of {name}", "")
+
+
+class _Mass(NamedTuple):
+    """Mass, centre of mass and moment of inertia of a body, the last None where it has none."""
+
+    mass: float
+    centre: tuple[float, float]
+    inertia: float | None
+
+
+def _mass(name: str, body: Body) -> _Mass | None:
+    """Return the mass of a body, as given or of its section; None where it has none."""
+    where = f"linkage.bodies.{name}"
+    if body.section is not None:
+        if body.inertia is not None or body.cog is not None:
+            raise LinkageError(
+                f"{where} has a section: its centre of mass and inertia follow from it, and must not be given"
+            )
+        if not body.bar and not body.section.corners:
+            raise LinkageError(f"{where}.section is none of a plate: the body must have a bar and its length")
+        mass, centre, inertia = body.section.properties(body.length)
+        x, y = (0 if abs(c) < 1e-12 else float(c) for c in centre)
+        # a mass beside a section is weighed: the radius of gyration stays
+        own = mass if body.mass is None else body.mass
+        return _Mass(float(own), (x, y), float(inertia * own / mass))
+    if body.mass is None:
+        if body.inertia is not None or body.cog is not None:
+            raise LinkageError(f"{where} has an inertia or a centre of mass: it must have a mass, too")
+        return None
+    centre = body.cog if body.cog is not None else (0.5 * body.length, 0) if body.bar else (0, 0)
+    return _Mass(body.mass, (centre[0], centre[1]), body.inertia)
+
+
+def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
+    """Yield the parameters of a spring, those that are given."""
+    where = f"linkage.springs.{name}"
+    if bool(spring.between) == bool(spring.at):
+        raise LinkageError(
+            f"{where} is between {spring.between or 'nothing'} and at {spring.at or 'nothing'}: it must have one"
+        )
+    joint = structure.joints.get(spring.at)
+    if spring.at and (joint is None or len(joint.bodies) != 2):
+        names = ", ".join(n for n, j in structure.joints.items() if len(j.bodies) == 2)
+        raise LinkageError(f"{where} is at {spring.at}: it must be at a joint of two bodies, {names}")
+    about = isinstance(joint, Pin)
+    kind, unit = ("angle", "rad") if about else ("length" if spring.between else "position", "m")
+    of = (
+        f"{name}.length"
+        if spring.between
+        else drive.coordinate
+        if drive
+        else f"{spring.at}.{'turn' if about else 'position'}"
+    )
+    rows = (
+        ("stiffness", spring.stiffness, "N.m/rad" if about else "N/m", f"Stiffness of {name}", "", "stiffness"),
+        ("damping", spring.damping, "N.m.s/rad" if about else "N.s/m", f"Viscous damping of {name}", "", "damping"),
+        ("friction", spring.friction, "N.m" if about else "N", f"Level of Coulomb friction of {name}", "", "friction"),
+        (f"free_{kind}", spring.free, unit, f"The {kind} at which {name} is free", "free", ""),
+    )
+    for own, value, in_unit, text, rule, role in rows:
+        if given(value):
+            number = (Quantity(in_unit) if rule else Quantity(in_unit, least=0.0))(value, f"{where}.{own}")
+            yield Parameter(
+                f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else ""
+            )
+
+
+def _check_names(found: list[Parameter]) -> None:
+    """Raise LinkageError where two parameters have one name."""
+    names = [parameter.name for parameter in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise LinkageError(
+                f"two parameters are called {name}: bodies, joints and springs must have names of their own"
+            )
+
+
+def size(found: Interface) -> tuple[float, float]:
+    """Return a length (m), the greatest coordinate of a point, and the mass of all bodies (kg); 1 where there is none."""
+    lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and "free" not in p.name]
+    masses = [p.value for p in found.parameters if p.unit == "kg"]
+    return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

@@ -1,0 +1,64 @@
+"""Sections of links in files: tables with a kind, dimensions and a material."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..files import Many, Quantity, Reader, Table
+from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What a link is made of: a section as long as the link and an ``overhang`` (m) beyond each pin, or a plate."""
+
+    section: Section | Plate
+    words: str
+    overhang: float = 0.0
+    corners: tuple[tuple[float, float], ...] = ()
+
+    def properties(self, length: float) -> MassProperties:
+        """Return mass, centre of mass from the first pin along and across the link, and moment of inertia about it."""
+        if isinstance(self.section, Plate):
+            return self.section.properties(self.corners)
+        body = length + 2.0 * self.overhang
+        return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
+
+
+def millimetres(*lengths: float) -> str:
+    """Return lengths in SI as text in millimetres."""
+    return " x ".join(f"{1e3 * length:g}" for length in lengths) + " mm"
+
+
+def _bar(width: float, thickness: float, material: float, overhang: float = 0.0) -> Made:
+    return Made(
+        Bar(width, thickness, material), f"bar of {millimetres(width, thickness)}, {material:g} kg/m3", overhang
+    )
+
+
+def _rod(diameter: float, material: float, overhang: float = 0.0) -> Made:
+    return Made(Rod(diameter, material), f"rod of {millimetres(diameter)}, {material:g} kg/m3", overhang)
+
+
+def _tube(outer: float, inner: float, material: float, overhang: float = 0.0) -> Made:
+    return Made(Tube(outer, inner, material), f"tube of {millimetres(outer, inner)}, {material:g} kg/m3", overhang)
+
+
+def _plate(thickness: float, corners: tuple[Any, ...], material: float) -> Made:
+    words = f"plate of {millimetres(thickness)}, {len(corners)} corners, {material:g} kg/m3"
+    return Made(Plate(thickness, material), words, corners=corners)
+
+
+_LENGTH = Quantity("m", above=0.0)
+_COMMON: Mapping[str, Reader] = {"material": density, "overhang": Quantity("m", least=0.0)}
+#: The kinds of a ``section`` with their entries.
+SECTIONS: Mapping[str, Table] = {
+    "bar": Table(_bar, {"width": _LENGTH, "thickness": _LENGTH, **_COMMON}),
+    "rod": Table(_rod, {"diameter": _LENGTH, **_COMMON}),
+    "tube": Table(_tube, {"outer": _LENGTH, "inner": _LENGTH, **_COMMON}),
+    "plate": Table(
+        _plate, {"thickness": _LENGTH, "corners": Many(Many(Quantity("m"), length=2), least=3), "material": density}
+    ),
+}

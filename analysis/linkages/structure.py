@@ -1,0 +1,334 @@
+"""The structure of a described linkage: its joints, its freedoms, and the dyads through which all bodies follow from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+from ..files import unknown_name
+from .description import GROUND, Description, FreedomTable, LinkageError
+
+MOST_FREEDOMS = 4
+
+
+class Pin(NamedTuple):
+    """Bodies pinned to each other at a point that all of them have."""
+
+    name: str
+    bodies: tuple[str, ...]
+
+
+class Slider(NamedTuple):
+    """A block on a line of another body, through one of its points; ``inclined`` where it is not parallel to its x axis."""
+
+    name: str
+    bodies: tuple[str, str]
+    through: str
+    inclined: bool
+
+
+Joint = Pin | Slider
+
+
+class Freed(NamedTuple):
+    """A body that follows through a freedom, its joint with ``parent``; ``sign`` is -1 where it is the joint's first body."""
+
+    body: str
+    parent: str
+    joint: Joint
+    freedom: int
+    sign: int
+
+
+class Geared(NamedTuple):
+    """A gear that follows from its mate's angle, pinned to ``parent``; ``inverse`` where the mate is the second of the pair."""
+
+    body: str
+    parent: str
+    pin: Pin
+    gear: str
+    mate: str
+    carrier: str
+    inverse: bool
+
+
+class Side(NamedTuple):
+    """A body of a dyad with those that freedoms join to it: its joint with ``parent``, whose place is known."""
+
+    body: str
+    parent: str
+    joint: Joint
+    inside: tuple[Freed, ...]
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies, the joined one first."""
+        return (self.body, *(step.body for step in self.inside))
+
+
+class Dyad(NamedTuple):
+    """Two bodies that follow from the places of others; ``ends`` are the bodies of each side that the inner joint joins.
+
+    ``kind`` is RRR, RRP, PRP, RPR or RPP; where one side is pinned and the other slides the pinned one is the first.
+    """
+
+    kind: str
+    sides: tuple[Side, Side]
+    inner: Joint
+    ends: tuple[str, str]
+
+    @property
+    def assembled(self) -> bool:
+        """Whether there are two assemblies to choose from."""
+        return self.kind in ("RRR", "RRP", "RPR")
+
+
+Step = Freed | Geared | Dyad
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """How a linkage is solved.
+
+    Attributes
+    ----------
+    bodies : tuple of str
+        All bodies that move, the massless pins of slots included.
+    joints : mapping of str to Joint
+    freedoms : mapping of str to FreedomTable
+    steps : tuple of Step
+        In the order in which the places of the bodies follow.
+    """
+
+    bodies: tuple[str, ...]
+    joints: Mapping[str, Joint]
+    freedoms: Mapping[str, FreedomTable]
+    steps: tuple[Step, ...]
+
+    @property
+    def dyads(self) -> tuple[Dyad, ...]:
+        """The dyads in their order."""
+        return tuple(step for step in self.steps if isinstance(step, Dyad))
+
+
+def joints(description: Description) -> dict[str, Joint]:
+    """Return the joints of a description by name.
+
+    Raises
+    ------
+    LinkageError
+        If a joint names what is not there, or a body is joined to nothing.
+    """
+    owners: dict[str, list[str]] = {name: [GROUND] for name in description.ground}
+    for name, body in description.bodies.items():
+        for own in body.all_points:
+            owners.setdefault(own, []).append(name)
+    known = (GROUND, *description.bodies)
+    for name, slide in description.slides.items():
+        _check_line(f"linkage.slides.{name}", (slide.on, slide.body), slide.through, owners, known)
+        if slide.body in (GROUND, slide.on):
+            raise LinkageError(
+                f"linkage.slides.{name}.body is {slide.body}: it must be a moving body other than that of the line"
+            )
+    for name, slot in description.slots.items():
+        _check_line(f"linkage.slots.{name}", (slot.on,), slot.through, owners, known)
+    for name, slot in description.slots.items():
+        if slot.pin not in owners:
+            raise unknown_name(slot.pin, owners, f"point {slot.pin}, of linkage.slots.{name}")
+        owners[slot.pin].append(name)
+    found: dict[str, Joint] = {name: Pin(name, tuple(of)) for name, of in owners.items() if len(of) > 1}
+    lines = {name: Slider(name, (s.on, s.body), s.through, s.direction != 0) for name, s in description.slides.items()}
+    lines |= {name: Slider(name, (s.on, name), s.through, s.direction != 0) for name, s in description.slots.items()}
+    for name in lines.keys() & found.keys():
+        raise LinkageError(f"{name} is a point and a slide: each joint must have a name of its own")
+    found |= lines
+    for name, gear in description.gears.items():
+        for part in gear.bodies:
+            if part not in known:
+                raise unknown_name(part, known, f"body {part}, of linkage.gears.{name}")
+    for own in description.bodies:
+        if not any(own in joint.bodies for joint in found.values()):
+            raise LinkageError(
+                f"the body {own} is joined to nothing: it must share a point with another, or slide on one"
+            )
+    return found
+
+
+def _check_line(
+    where: str, bodies: tuple[str, ...], through: str, owners: Mapping[str, list[str]], known: tuple[str, ...]
+) -> None:
+    """Raise an error if a line is on a body that is not there, or through a point that the body has not."""
+    for body in bodies:
+        if body not in known:
+            raise unknown_name(body, known, f"body {body}, of {where}")
+    if bodies[0] not in owners.get(through, ()):
+        raise LinkageError(f"{where}.through is {through!r}: it must be a point of {bodies[0]}")
+
+
+def sliders(structure: Structure) -> dict[str, Slider]:
+    """Return the slides and slots by name."""
+    return {name: joint for name, joint in structure.joints.items() if isinstance(joint, Slider)}
+
+
+def mobility(description: Description, found: Mapping[str, Joint]) -> int:
+    """Count the freedoms by Gruebler's formula."""
+    moving = len(description.bodies) + len(description.slots)
+    lost = sum(2 * (len(joint.bodies) - 1) for joint in found.values()) + len(description.gears)
+    return 3 * moving - lost
+
+
+def analyse(description: Description) -> Structure:
+    """Find the order in which the bodies of a linkage follow from its freedoms, in closed form.
+
+    Raises
+    ------
+    LinkageError
+        If the number of freedoms is not the linkage's, or the bodies are no chain of dyads from these freedoms; the error
+        names the bodies that are left, and other choices of freedoms that would do.
+    """
+    found = joints(description)
+    count = mobility(description, found)
+    freedoms = dict(description.freedoms)
+    if not 1 <= count <= MOST_FREEDOMS:
+        raise LinkageError(
+            f"{description.name} has {count} freedoms by Gruebler's count, three of each body less what the joints take away: "
+            f"it must have 1 to {MOST_FREEDOMS}"
+        )
+    if not freedoms:
+        freedoms = _proposed(description, found, count)
+    if len(freedoms) != count:
+        raise LinkageError(
+            f"{description.name} has {count} freedoms by Gruebler's count, but {len(freedoms)} are given "
+            f"({', '.join(freedoms)}): they must be as many"
+        )
+    for name, freedom in freedoms.items():
+        if freedom.joint not in found:
+            raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, of linkage.freedoms.{name}")
+        if len(found[freedom.joint].bodies) != 2:
+            raise LinkageError(
+                f"the freedom {name} is of the pin {freedom.joint} of {', '.join(found[freedom.joint].bodies)}: it must be of "
+                "one of two bodies; give the others a point of another name there"
+            )
+    steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
+    if left:
+        others = _choices(description, found, count)
+        hint = (
+            "; these joints as freedoms would do: " + " or ".join(" and ".join(o) for o in others[:3]) if others else ""
+        )
+        raise LinkageError(
+            f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: they "
+            f"do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"
+        )
+    names = (*description.bodies, *description.slots)
+    return Structure(names, found, freedoms, tuple(steps))
+
+
+def _choices(description: Description, found: Mapping[str, Joint], count: int) -> list[tuple[str, ...]]:
+    """Return the sets of joints from whose coordinates all bodies follow, those with most joints of the ground first."""
+    simple = [name for name, joint in found.items() if len(joint.bodies) == 2 and name not in description.slots]
+    simple.sort(key=lambda name: GROUND not in found[name].bodies)
+    return [some for some in combinations(simple, count) if not _solve(description, found, list(some))[1]]
+
+
+def _proposed(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
+    """Return the first set of freedoms that does, each named after its body."""
+    for some in _choices(description, found, count):
+        return {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
+    raise LinkageError(f"{description.name} is no chain of dyads, whatever joints are taken as freedoms")
+
+
+def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed]:
+    """Return the bodies that freedoms join to one body, each after its parent."""
+    steps: list[Freed] = []
+    there = {root}
+    growing = True
+    while growing:
+        growing = False
+        for number, name in enumerate(freed):
+            first, second = found[name].bodies
+            for parent, body, sign in ((first, second, 1), (second, first, -1)):
+                if parent in there and body not in there:
+                    steps.append(Freed(body, parent, found[name], number, sign))
+                    there.add(body)
+                    growing = True
+    return steps
+
+
+def _solve(description: Description, found: Mapping[str, Joint], freed: list[str]) -> tuple[list[Step], list[str]]:
+    """Return the steps from the ground on, and the bodies that do not follow."""
+    steps: list[Step] = list(_tree(GROUND, found, freed))
+    #: bodies whose places are known, in order, and those whose angles are linear in the coordinates
+    known = dict.fromkeys((GROUND, *(step.body for step in _freed(steps))))
+    linear = set(known)
+    moving = [*description.bodies, *description.slots]
+    fixed = [joint for name, joint in found.items() if name not in freed]
+    step: Step | None
+    while unknown := [body for body in moving if body not in known]:
+        if step := next(_geared(description, fixed, known, linear, unknown), None):
+            new = [step.body]
+            linear.add(step.body)
+        elif step := next(_dyads(fixed, {body: _tree(body, found, freed) for body in unknown}, known), None):
+            new = [body for side in step.sides for body in side.bodies]
+        else:
+            return steps, unknown
+        steps.append(step)
+        known |= dict.fromkeys(new)
+    return steps, []
+
+
+def _freed(steps: list[Step]) -> Iterator[Freed]:
+    return (step for step in steps if isinstance(step, Freed))
+
+
+def _geared(
+    description: Description, fixed: list[Joint], known: Mapping[str, None], linear: set[str], unknown: list[str]
+) -> Iterator[Geared]:
+    """Yield the gears whose mates' angles are known."""
+    pins = [joint for joint in fixed if isinstance(joint, Pin)]
+    for name, gear in description.gears.items():
+        for (mate, body), inverse in ((gear.bodies, False), (gear.bodies[::-1], True)):
+            if mate not in linear or body not in unknown:
+                continue
+            for pin in pins:
+                carriers = [c for c in pin.bodies if body in pin.bodies and c in linear and c != mate]
+                if carriers:
+                    yield Geared(body, carriers[0], pin, name, mate, carriers[0], inverse)
+
+
+def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tuple[Joint, str, str]]:
+    """Yield the joints between two sets of bodies, with the body of each that it joins."""
+    for joint in fixed:
+        ends = [next((body for body in joint.bodies if body in some), "") for some in (first, second)]
+        if all(ends):
+            yield joint, ends[0], ends[1]
+
+
+def _dyads(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Iterator[Dyad]:
+    """Yield the pairs of groups that follow from known bodies; ``trees`` are the freedoms from each body on."""
+    base = set(known)
+    sides = [
+        Side(body, parent, joint, tuple(inside))
+        for body, inside in trees.items()
+        for joint, parent, _ in _links(fixed, base, {body})
+    ]
+    for one, other in combinations(sides, 2):
+        if set(one.bodies) & set(other.bodies) or one.joint.name == other.joint.name:
+            continue
+        pair = (one, other) if isinstance(one.joint, Pin) else (other, one)
+        for inner, first, second in _links(fixed, set(pair[0].bodies), set(pair[1].bodies)):
+            if inner.name in (one.joint.name, other.joint.name):
+                continue
+            kind = _kind(pair, inner)
+            # a slide between the two has no part beyond the bodies that are joined to the known ones
+            if kind and (isinstance(inner, Pin) or (first, second) == (pair[0].body, pair[1].body)):
+                yield Dyad(kind, pair, inner, (first, second))
+
+
+def _kind(sides: tuple[Side, Side], inner: Joint) -> str:
+    """Return the kind of a dyad whose first side is pinned if one is; empty where its three joints do not determine it."""
+    pinned = sum(isinstance(side.joint, Pin) for side in sides)
+    if isinstance(inner, Pin):
+        return ("PRP", "RRP", "RRR")[pinned]
+    return ("", "RPP", "RPR")[pinned]

@@ -1,0 +1,157 @@
+"""Write the parameters, the inputs and the freedoms of a described linkage, as its package has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from .description import Description, given
+from .parameters import Drive, Interface
+from .structure import Pin, Structure, sliders
+
+
+class Start(NamedTuple):
+    """A field of the state at the start: its name and unit, its value in the description, and its default."""
+
+    name: str
+    unit: str
+    value: float
+    rest: float
+
+
+def quoted(text: str) -> str:
+    """Return a text as a literal of Python."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'
+
+
+def display(unit: str) -> str:
+    """Return the argument of a variable that names the unit people think in; empty for the unit itself."""
+    shown = {"rad": "deg", "rad/s": "rpm"}.get(unit)
+    return f', display="{shown}"' if shown else ""
+
+
+class Variables:
+    """The variables of one linkage, but for its outputs."""
+
+    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
+        self.description, self.structure, self.interface = description, structure, interface
+        drives = interface.drives
+        self.starts = [Start(_last(d, d.coordinate), d.unit, d.start, d.start) for d in drives]
+        self.starts += [Start(_last(d, d.rate), f"{d.unit}/s", d.speed, 0.0) for d in drives]
+        self.several = sum(bool(d.table) for d in drives) > 1
+
+    # Parameters
+
+    def constants(self) -> dict[str, str]:
+        """Return the constants of the equations, as expressions in the parameters."""
+        found = {p.field: f"self.{p.field}" for p in self.interface.parameters}
+        for name, joint in sliders(self.structure).items():
+            if joint.inclined:
+                found |= {f"{name}_c": f"cos(self.{name}_direction)", f"{name}_s": f"sin(self.{name}_direction)"}
+        freed = {drive.joint for drive in self.interface.drives}
+        for name, spring in self.description.springs.items():
+            about = spring.at and spring.at not in freed and isinstance(self.structure.joints[spring.at], Pin)
+            if about and given(spring.free):
+                found |= {f"{name}_c": f"cos(self.{name}_free_angle)", f"{name}_s": f"sin(self.{name}_free_angle)"}
+        if self.description.gravity:
+            direction = "self.ground_gravity_direction"
+            found |= {"gx": f"self.gravity * cos({direction})", "gy": f"self.gravity * sin({direction})"}
+        return found or {"nothing": "0.0"}
+
+    def rules(self) -> str:
+        """Return the arguments of the parameters' rules."""
+
+        def names(rule: str) -> str:
+            return "".join(f'"{p.field}", ' for p in self.interface.parameters if p.rule == rule)
+
+        signs = ", ".join(
+            f'"{p.field}": "the sign of the assembly"' for p in self.interface.parameters if p.rule == "sign"
+        )
+        return f"positive=({names('positive')}), free_sign=({names('free')}), signs={{{signs}}}"
+
+    def fields(self) -> Iterator[str]:
+        """Yield the fields of the parameters, with their values in the description."""
+        for p in self.interface.parameters:
+            yield f"{p.field}: {'int' if p.rule == 'sign' else 'float'} = {p.value!r}"
+
+    def parameters(self) -> Iterator[str]:
+        """Yield the variables of parameters, modes and start."""
+        for p in self.interface.parameters:
+            if p.rule == "sign":
+                yield f'Variable("{p.name}", "parameter", "", "{p.text}: +1 or -1", "", {p.value}, "Integer", -1, 1)'
+                continue
+            least = "" if p.rule == "free" else ", minimum=0.0"
+            role = f', role="{p.role}"' if p.role else ""
+            of = f', of="{p.of}"' if p.of else ""
+            rest = f"{least}{display(p.unit)}{role}{of}"
+            yield f'Variable("{p.name}", "parameter", "{p.unit}", {quoted(p.text)}, "", {p.value!r}{rest})'
+        for d in self.interface.drives:
+            if d.table:
+                text = f"0: {d.table}.{d.load} acts; 1: the rate is {d.table}.speed"
+                yield f'Variable("{d.table}.mode", "parameter", "", "{text}", "", {int(d.speed != 0.0)}, "Integer", 0, 1)'
+        for s in self.starts:
+            yield f'Variable("initial.{s.name}", "parameter", "{s.unit}", "At the start", "", {s.value!r}{display(s.unit)})'
+        yield "tolerance_parameter()"
+
+    def placing(self) -> list[str]:
+        """Return the parameters that set the places of the bodies at the start."""
+        placing = (".direction", ".ratio", ".phase", ".radius", ".offset")
+        names = [p.name for p in self.interface.parameters if p.unit in ("m", "") or p.name.endswith(placing)]
+        names = [name for name in names if not any(part in name for part in (".cog_", ".free_"))]
+        return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
+
+    def links(self) -> Iterator[str]:
+        """Yield the bars whose masses may follow from a section."""
+        names = {p.name for p in self.interface.parameters}
+        for name, body in self.description.bodies.items():
+            if body.bar and {f"{name}.mass", f"{name}.inertia", f"{name}.cog_x"} <= names:
+                centre = "".join(f'"{name}.cog_{axis}", ' for axis in "xy" if f"{name}.cog_{axis}" in names)
+                yield f'Link("{name}", "{name}.length", "{name}.mass", "{name}.inertia", ({centre}))'
+
+    # Inputs
+
+    def _argument(self, drive: Drive, name: str) -> str:
+        return f"{drive.name}_{name}" if self.several or not drive.table else name
+
+    def driven(self) -> str:
+        """Return the entries of what the linkage is run at."""
+        driven = [d for d in self.interface.drives if d.table and d.speed != 0.0]
+        return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
+
+    def freedoms(self) -> Iterator[str]:
+        """Yield the freedoms."""
+        for d in self.interface.drives:
+            mode, period = "None", "0.0"
+            if d.table:
+                arguments = f'("{self._argument(d, d.load)}", "{self._argument(d, "speed")}")'
+                mode = f'Mode("{d.table}.mode", ("{d.load}", "speed"), {arguments}, {int(d.speed != 0.0)})'
+                period = "2.0 * pi" if d.turns else "0.0"
+            start = f'("{_last(d, d.coordinate)}", "{_last(d, d.rate)}")'
+            yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period})'
+
+    def channels(self) -> Iterator[str]:
+        """Yield the channels."""
+        for number, d in enumerate(self.interface.drives):
+            table = d.table or d.name
+            yield f'Channel("{table}.{d.load}", "{self._argument(d, d.load)}", "force", {number})'
+            if d.table:
+                yield f'Channel("{table}.speed", "{self._argument(d, "speed")}", "command", {number})'
+                yield f'Channel("{table}.acceleration", "{self._argument(d, "acceleration")}", "rate", {number})'
+        for load in self.interface.loads:
+            yield f'Channel("{load.name}", "{load.field}", displacement="{load.displacement}")'
+
+    def inputs(self) -> Iterator[str]:
+        """Yield the variables of the inputs."""
+        for d in self.interface.drives:
+            table, what = d.table or d.name, "Torque" if d.turns else "Force"
+            yield f'Variable("{table}.{d.load}", "input", "{d.load_unit}", "{what} along the freedom {d.name}")'
+            if d.table:
+                rate, text = f"{d.unit}/s", f"Commanded rate of {d.name}"
+                yield f'Variable("{table}.speed", "input", "{rate}", "{text}", "", {d.speed!r}{display(rate)})'
+                yield f'Variable("{table}.acceleration", "input", "{rate}2", "Rate of the commanded rate over a step")'
+        for load in self.interface.loads:
+            yield f'Variable("{load.name}", "input", "{load.unit}", {quoted(load.text)})'
+
+
+def _last(drive: Drive, name: str) -> str:
+    return f"{drive.name}_{name.rpartition('.')[2]}"

@@ -1,0 +1,562 @@
+"""Kinematics and forces of planar linkages built of dyads: what the equations of every described linkage consist of.
+
+Every vector and every turn carries its velocity coefficients: one column for each freedom, the change with that coordinate,
+and as last column the bias acceleration, which is left when no coordinate accelerates. With coordinates q and rates v the
+velocity is the sum of column times v, the acceleration the sum of column times q'' plus the bias.
+
+A dyad is a pair of bodies, joined to each other and each to a body whose motion is known; its two unknowns follow in closed
+form (the groups of the second class of Assur and Artobolevskii). R is a pin, P a slide; the middle letter is the joint
+between the two bodies. The functions are straight lines of arithmetic.
+
+Throughout u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90 degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import asin, atan2, cos, degrees, fabs, sin, sqrt
+from typing import Any, NamedTuple
+
+from .errors import AssemblyError
+from .limits import LIMIT_SINE
+
+
+class Vector(NamedTuple):
+    """A place or an arm: components, their rates, and (x, y) of each column."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    columns: tuple[tuple[float, float], ...]
+
+
+class Turn(NamedTuple):
+    """A direction: its cosine and sine, its angular velocity, and the columns of its angle."""
+
+    c: float
+    s: float
+    w: float
+    columns: tuple[float, ...]
+
+
+class Frame(NamedTuple):
+    """The place of a body: that of its own origin, and its direction."""
+
+    origin: Vector
+    turn: Turn
+
+
+class Wrench(NamedTuple):
+    """Forces on a body: their sum (N) and their moment about the ground's origin (N.m)."""
+
+    x: float
+    y: float
+    moment: float
+
+
+class Mass(NamedTuple):
+    """A body that moves: mass (kg), moment of inertia about the centre of mass (kg.m2), that centre, and the body's place."""
+
+    mass: float
+    inertia: float
+    centre: Vector
+    frame: Frame
+
+
+Rates = tuple[float, ...]
+Matrix = tuple[tuple[float, ...], ...]
+
+
+# Vectors and turns
+
+
+def fixed(x: float, y: float, n: int) -> Vector:
+    """Return a vector that does not change, of a mechanism of n freedoms."""
+    return Vector(x, y, 0.0, 0.0, ((0.0, 0.0),) * (n + 1))
+
+
+def held(c: float, s: float, n: int) -> Turn:
+    """Return a direction that does not change."""
+    return Turn(c, s, 0.0, (0.0,) * (n + 1))
+
+
+def ground(n: int) -> Frame:
+    """Return the place of the ground."""
+    return Frame(fixed(0.0, 0.0, n), held(1.0, 0.0, n))
+
+
+def angled(angle: float, share: tuple[float, ...], v: Rates) -> Turn:
+    """Return the direction at an angle that is linear in the coordinates; ``share`` are its derivatives by them."""
+    return Turn(cos(angle), sin(angle), _dot(share, v), (*share, 0.0))
+
+
+def travelled(distance: float, share: tuple[float, ...], v: Rates) -> Vector:
+    """Return the arm along x of a length that is linear in the coordinates."""
+    return Vector(distance, 0.0, _dot(share, v), 0.0, (*((d, 0.0) for d in share), (0.0, 0.0)))
+
+
+def _dot(columns: tuple[float, ...], v: Rates) -> float:
+    """Return the rate: the sum over the freedoms, not the bias."""
+    return sum(g * w for g, w in zip(columns, v))
+
+
+def plus(a: Vector, b: Vector) -> Vector:
+    """Add two vectors."""
+    columns = tuple((g[0] + h[0], g[1] + h[1]) for g, h in zip(a.columns, b.columns))
+    return Vector(a.x + b.x, a.y + b.y, a.vx + b.vx, a.vy + b.vy, columns)
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """Subtract a vector from another."""
+    columns = tuple((g[0] - h[0], g[1] - h[1]) for g, h in zip(a.columns, b.columns))
+    return Vector(a.x - b.x, a.y - b.y, a.vx - b.vx, a.vy - b.vy, columns)
+
+
+def arm(t: Turn, x: float, y: float) -> Vector:
+    """Return an arm that is fixed in a body of direction ``t``, with components x and y there."""
+    rx, ry, ww = t.c * x - t.s * y, t.s * x + t.c * y, t.w * t.w
+    *share, bias = ((-ry * g, rx * g) for g in t.columns)
+    return Vector(rx, ry, -ry * t.w, rx * t.w, (*share, (bias[0] - rx * ww, bias[1] - ry * ww)))
+
+
+def turned(t: Turn, a: Vector) -> Vector:
+    """Return an arm that moves in a body of direction ``t``; the bias has its centripetal and Coriolis terms."""
+    rx, ry = t.c * a.x - t.s * a.y, t.s * a.x + t.c * a.y
+    ux, uy = t.c * a.vx - t.s * a.vy, t.s * a.vx + t.c * a.vy
+    *share, bias = (
+        (t.c * h[0] - t.s * h[1] - ry * g, t.s * h[0] + t.c * h[1] + rx * g) for g, h in zip(t.columns, a.columns)
+    )
+    ww, w2 = t.w * t.w, 2.0 * t.w
+    last = (bias[0] - rx * ww - w2 * uy, bias[1] - ry * ww + w2 * ux)
+    return Vector(rx, ry, ux - ry * t.w, uy + rx * t.w, (*share, last))
+
+
+def both(t: Turn, r: Turn) -> Turn:
+    """Return the direction of a body whose direction in another is ``r``, where that other's is ``t``."""
+    columns = tuple(g + h for g, h in zip(t.columns, r.columns))
+    return Turn(t.c * r.c - t.s * r.s, t.s * r.c + t.c * r.s, t.w + r.w, columns)
+
+
+def inclined(t: Turn, c: float, s: float) -> Turn:
+    """Return a direction at a fixed angle, of cosine c and sine s, from another."""
+    return Turn(t.c * c - t.s * s, t.s * c + t.c * s, t.w, t.columns)
+
+
+def point(f: Frame, x: float, y: float) -> Vector:
+    """Return a point of a body from its own coordinates."""
+    return plus(f.origin, arm(f.turn, x, y))
+
+
+def within(f: Frame, inner: Frame) -> Frame:
+    """Return the place of a body that is known in the frame of another."""
+    return Frame(plus(f.origin, turned(f.turn, inner.origin)), both(f.turn, inner.turn))
+
+
+def hung(pin: Vector, t: Turn, own: Vector) -> Frame:
+    """Return the place of a body of direction ``t`` whose point ``own`` is at ``pin``."""
+    return Frame(minus(pin, turned(t, own)), t)
+
+
+# Dyads
+
+
+def _angle(x: float, y: float, a: Vector) -> tuple[float, float]:
+    """Return cosine and sine of the direction in which the arm ``a`` of a body points along (x, y), of the same length."""
+    square = a.x * a.x + a.y * a.y
+    return (x * a.x + y * a.y) / square, (y * a.x - x * a.y) / square
+
+
+def _spun(w: float, c: float, s: float, a: Vector, x: float, y: float) -> tuple[float, float]:
+    """Return the bias of the arm ``a`` at (x, y) of a body that turns at w, but for that of its angle."""
+    ux, uy = c * a.vx - s * a.vy, s * a.vx + c * a.vy
+    bx, by = a.columns[-1]
+    return c * bx - s * by - w * w * x - 2.0 * w * uy, s * bx + c * by - w * w * y + 2.0 * w * ux
+
+
+def _shares(c: float, s: float, a: Vector) -> tuple[tuple[float, float], ...]:
+    """Return the columns of an arm, but the bias, in the axes outside its body."""
+    return tuple((c * g[0] - s * g[1], s * g[0] + c * g[1]) for g in a.columns[:-1])
+
+
+def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Rates) -> tuple[Turn, Turn, float]:
+    """Solve the dyad RRR: body 1 is pinned at p, body 2 at q, and they at each other at the ends of their arms a and b.
+
+    ``branch`` is the sign of (C - p) x (C - q), C the pin between them. Returns both directions and the sine of the
+    transmission angle, positive in the branch.
+    """
+    dx, dy = q.x - p.x, q.y - p.y
+    dd, aa, bb = dx * dx + dy * dy, a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y
+    along = 0.5 * (dd + aa - bb)
+    across = branch * sqrt(aa * dd - along * along)
+    x1, y1 = (along * dx - across * dy) / dd, (along * dy + across * dx) / dd
+    x2, y2 = x1 - dx, y1 - dy
+    (c1, s1), (c2, s2) = _angle(x1, y1, a), _angle(x2, y2, b)
+    # J r1 w1 - J r2 w2 = e in every column; the determinant is r1 x r2 = across
+    start = zip(p.columns, q.columns, _shares(c1, s1, a), _shares(c2, s2, b))
+    rows = [(h[0] + k[0] - g[0] - f[0], h[1] + k[1] - g[1] - f[1]) for g, h, f, k in start]
+    g1 = [(ex * x2 + ey * y2) / across for ex, ey in rows]
+    g2 = [(ex * x1 + ey * y1) / across for ex, ey in rows]
+    w1, w2 = _dot(tuple(g1), v), _dot(tuple(g2), v)
+    (ax, ay), (bx, by) = _spun(w1, c1, s1, a, x1, y1), _spun(w2, c2, s2, b, x2, y2)
+    ex, ey = q.columns[-1][0] + bx - p.columns[-1][0] - ax, q.columns[-1][1] + by - p.columns[-1][1] - ay
+    return (
+        Turn(c1, s1, w1, (*g1, (ex * x2 + ey * y2) / across)),
+        Turn(c2, s2, w2, (*g2, (ex * x1 + ey * y1) / across)),
+        branch * across / sqrt(aa * bb),
+    )
+
+
+def _on_line(o: Vector, t: Turn, b: Vector) -> tuple[float, float, list[tuple[float, float]], tuple[float, float]]:
+    """Return the arm b of a block that stands at the origin of its line: place less that of the line, and columns there."""
+    r = turned(t, b)
+    *share, bias = ((g[0] + h[0], g[1] + h[1]) for g, h in zip(o.columns, r.columns))
+    return r.x, r.y, share, bias
+
+
+def pin_pin_slide(
+    p: Vector, o: Vector, t: Turn, a: Vector, b: Vector, branch: float, v: Rates
+) -> tuple[Turn, Vector, float]:
+    """Solve the dyad RRP: body 1 is pinned at p, body 2, a block, slides on the line through o of direction t.
+
+    ``a`` and ``b`` are their arms to the pin C between them, ``b`` from the block's origin, which is on the line.
+    ``branch`` is the sign of the component of C - p along the line. Returns the direction of body 1, the position of the
+    block as an arm along the line, and the sine of the angle between body 1 and the normal of the line.
+    """
+    x0, y0, share, bias = _on_line(o, t, b)
+    fx, fy = o.x + x0 - p.x, o.y + y0 - p.y
+    off = t.c * fy - t.s * fx
+    root = branch * sqrt(a.x * a.x + a.y * a.y - off * off)
+    z = root - (t.c * fx + t.s * fy)
+    x1, y1 = fx + z * t.c, fy + z * t.s
+    c1, s1 = _angle(x1, y1, a)
+    # J r1 w1 - t z' = e in every column; J r1 . n = r1 . t = root
+    start = zip(share, t.columns, p.columns, _shares(c1, s1, a))
+    rows = [(h[0] - z * t.s * w - g[0] - f[0], h[1] + z * t.c * w - g[1] - f[1]) for h, w, g, f in start]
+    g1 = [(t.c * ey - t.s * ex) / root for ex, ey in rows]
+    gz = [-off * w - t.c * ex - t.s * ey for w, (ex, ey) in zip(g1, rows)]
+    w1, vz = _dot(tuple(g1), v), _dot(tuple(gz), v)
+    ax, ay = _spun(w1, c1, s1, a, x1, y1)
+    beta, ww, w2 = t.columns[-1], t.w * t.w, 2.0 * t.w * vz
+    ex = bias[0] - z * t.s * beta - z * t.c * ww - w2 * t.s - p.columns[-1][0] - ax
+    ey = bias[1] + z * t.c * beta - z * t.s * ww + w2 * t.c - p.columns[-1][1] - ay
+    b1 = (t.c * ey - t.s * ex) / root
+    columns = (*((g, 0.0) for g in gz), (-off * b1 - t.c * ex - t.s * ey, 0.0))
+    return (
+        Turn(c1, s1, w1, (*g1, b1)),
+        Vector(z, 0.0, vz, 0.0, columns),
+        branch * root / sqrt(a.x * a.x + a.y * a.y),
+    )
+
+
+def slide_pin_slide(
+    o: Vector, t: Turn, a: Vector, p: Vector, r: Turn, b: Vector, v: Rates
+) -> tuple[Vector, Vector, float]:
+    """Solve the dyad PRP: blocks on the lines through o along t and through p along r, pinned at the ends of their arms a, b.
+
+    Returns their positions as arms along their lines, and the magnitude of the sine of the angle between the lines.
+    """
+    x1, y1, share1, bias1 = _on_line(o, t, a)
+    x2, y2, share2, bias2 = _on_line(p, r, b)
+    ex, ey = p.x + x2 - o.x - x1, p.y + y2 - o.y - y1
+    sine = t.c * r.s - t.s * r.c
+    z1, z2 = (ex * r.s - ey * r.c) / sine, (ex * t.s - ey * t.c) / sine
+    columns1, columns2 = [], []
+    for g, h, w1, w2 in zip(share1, share2, t.columns, r.columns):
+        fx = h[0] - z2 * r.s * w2 - g[0] + z1 * t.s * w1
+        fy = h[1] + z2 * r.c * w2 - g[1] - z1 * t.c * w1
+        columns1.append((fx * r.s - fy * r.c) / sine)
+        columns2.append((fx * t.s - fy * t.c) / sine)
+    v1, v2 = _dot(tuple(columns1), v), _dot(tuple(columns2), v)
+    lx, ly = _line_bias(t, z1, v1)
+    mx, my = _line_bias(r, z2, v2)
+    fx, fy = bias2[0] + mx - bias1[0] - lx, bias2[1] + my - bias1[1] - ly
+    return (
+        _slid(z1, v1, columns1, (fx * r.s - fy * r.c) / sine),
+        _slid(z2, v2, columns2, (fx * t.s - fy * t.c) / sine),
+        fabs(sine),
+    )
+
+
+def _line_bias(t: Turn, z: float, vz: float) -> tuple[float, float]:
+    """Return the bias of an arm z along a line that turns and along which it grows, but for that of its length."""
+    beta, ww, w2 = z * t.columns[-1], z * t.w * t.w, 2.0 * t.w * vz
+    return -t.s * (beta + w2) - t.c * ww, t.c * (beta + w2) - t.s * ww
+
+
+def _slid(z: float, rate: float, share: list[float], bias: float) -> Vector:
+    """Return an arm along x."""
+    return Vector(z, 0.0, rate, 0.0, (*((g, 0.0) for g in share), (bias, 0.0)))
+
+
+def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Rates) -> tuple[Turn, Vector, float]:
+    """Solve the dyad RPR: body 1, which holds a line, is pinned at p, body 2, its block, at q.
+
+    ``a`` is the pin p in the axes of the line, from the line's origin; ``b`` the pin q in the block's axes, which are
+    parallel. ``branch`` is the sign of the component of q - p along the line. Returns the direction of the line, the position
+    of the block as an arm along it, and the sine of the angle between the line and the normal of q - p.
+    """
+    dx, dy = q.x - p.x, q.y - p.y
+    lever = minus(b, a)
+    dd, h = dx * dx + dy * dy, lever.y
+    root = branch * sqrt(dd - h * h)
+    c, s = (dx * root + dy * h) / dd, (dy * root - dx * h) / dd
+    # t z' + J d w = e in every column; J d . n = d . t = root
+    start = zip(p.columns, q.columns, _shares(c, s, lever))
+    rows = [(k[0] - g[0] - f[0], k[1] - g[1] - f[1]) for g, k, f in start]
+    share = [(c * ey - s * ex) / root for ex, ey in rows]
+    gz = [c * ex + s * ey + h * w for w, (ex, ey) in zip(share, rows)]
+    w, vz = _dot(tuple(share), v), _dot(tuple(gz), v)
+    # the arm from p to q in the axes of the line grows by z
+    ux, uy = c * lever.vx - s * lever.vy, s * lever.vx + c * lever.vy
+    bx, by = lever.columns[-1]
+    ex = q.columns[-1][0] - p.columns[-1][0] - c * bx + s * by + 2.0 * w * uy + w * w * dx + 2.0 * w * vz * s
+    ey = q.columns[-1][1] - p.columns[-1][1] - s * bx - c * by - 2.0 * w * ux + w * w * dy - 2.0 * w * vz * c
+    beta = (c * ey - s * ex) / root
+    return (
+        Turn(c, s, w, (*share, beta)),
+        _slid(root - lever.x, vz, gz, c * ex + s * ey + h * beta),
+        branch * root / sqrt(dd),
+    )
+
+
+def pin_slide_slide(
+    p: Vector, o: Vector, t: Turn, r: Turn, a: Vector, b: Vector, v: Rates
+) -> tuple[Vector, Vector, float]:
+    """Solve the dyad RPP: body 2 slides on the line through o along t, body 1 is pinned at p and slides on body 2, or 2 on it.
+
+    ``r`` is the direction of the slide between them, ``a`` the pin p in its axes from body 1's end of it, ``b`` the other
+    end, on body 2, in the axes of t from the origin of body 2. Returns the position of body 2 along its line, that of body 1
+    along the slide from the end on body 2, and the magnitude of the sine of the angle between both lines.
+    """
+    x1, y1, share1, bias1 = _on_line(o, t, b)
+    pin = turned(r, a)
+    ex, ey = p.x - pin.x - o.x - x1, p.y - pin.y - o.y - y1
+    sine = t.c * r.s - t.s * r.c
+    z, u = (ex * r.s - ey * r.c) / sine, (t.c * ey - t.s * ex) / sine
+    gz, gu = [], []
+    for g, h, k, w1, w2 in zip(p.columns, pin.columns, share1, t.columns, r.columns):
+        fx = g[0] - h[0] - k[0] + z * t.s * w1 + u * r.s * w2
+        fy = g[1] - h[1] - k[1] - z * t.c * w1 - u * r.c * w2
+        gz.append((fx * r.s - fy * r.c) / sine)
+        gu.append((t.c * fy - t.s * fx) / sine)
+    vz, vu = _dot(tuple(gz), v), _dot(tuple(gu), v)
+    lx, ly = _line_bias(t, z, vz)
+    mx, my = _line_bias(r, u, vu)
+    fx = p.columns[-1][0] - pin.columns[-1][0] - bias1[0] - lx - mx
+    fy = p.columns[-1][1] - pin.columns[-1][1] - bias1[1] - ly - my
+    return (
+        _slid(z, vz, gz, (fx * r.s - fy * r.c) / sine),
+        _slid(u, vu, gu, (t.c * fy - t.s * fx) / sine),
+        fabs(sine),
+    )
+
+
+# Dynamics in the freedoms
+
+
+def mass_matrix(masses: tuple[Mass, ...], n: int) -> Matrix:
+    """Compute the mass matrix of the freedoms."""
+    return tuple(
+        tuple(
+            sum(
+                m.mass * (g[i][0] * g[j][0] + g[i][1] * g[j][1]) + m.inertia * h[i] * h[j]
+                for m, g, h in ((m, m.centre.columns, m.frame.turn.columns) for m in masses)
+            )
+            for j in range(n)
+        )
+        for i in range(n)
+    )
+
+
+def generalised_forces(masses: tuple[Mass, ...], wrenches: tuple[Wrench, ...], n: int) -> tuple[float, ...]:
+    """Compute the generalised forces of what acts on the bodies, less those of their bias accelerations."""
+    total = [0.0] * n
+    for m, f in zip(masses, wrenches):
+        origin, h = m.frame.origin, m.frame.turn.columns
+        bx, by = m.mass * m.centre.columns[n][0], m.mass * m.centre.columns[n][1]
+        x, y = f.x - bx, f.y - by
+        moment = f.moment - m.inertia * h[n] - m.centre.x * by + m.centre.y * bx
+        # about the body's own origin
+        moment = moment - origin.x * y + origin.y * x
+        for i in range(n):
+            total[i] = total[i] + x * origin.columns[i][0] + y * origin.columns[i][1] + moment * h[i]
+    return tuple(total)
+
+
+def accelerations(matrix: Matrix, forces: Rates, held: Rates, given: Rates) -> tuple[float, ...]:
+    """Solve for the accelerations of the freedoms, where ``held`` is 1 for those that are given and 0 for the others."""
+    n = range(len(forces))
+    free = [1.0 - h for h in held]
+    rows = tuple(tuple(free[i] * free[j] * matrix[i][j] + (held[i] if i == j else 0.0) for j in n) for i in n)
+    right = tuple(
+        free[i] * (forces[i] - sum(matrix[i][j] * held[j] * given[j] for j in n)) + held[i] * given[i] for i in n
+    )
+    return solved(rows, right)
+
+
+def solved(matrix: Matrix, right: Rates) -> tuple[float, ...]:
+    """Solve linear equations with a symmetric positive definite matrix, by elimination without pivoting."""
+    if not right:
+        return ()
+    first, *rows = matrix
+    factors = [row[0] / first[0] for row in rows]
+    reduced = tuple(tuple(a - f * b for a, b in zip(row[1:], first[1:])) for f, row in zip(factors, rows))
+    rest = solved(reduced, tuple(value - f * right[0] for f, value in zip(factors, right[1:])))
+    return ((right[0] - sum(a * b for a, b in zip(first[1:], rest))) / first[0], *rest)
+
+
+def multiplied(matrix: Matrix, values: Rates) -> tuple[float, ...]:
+    """Multiply a matrix by a column."""
+    return tuple(sum(a * b for a, b in zip(row, values)) for row in matrix)
+
+
+def kinetic_energy(masses: tuple[Mass, ...]) -> float:
+    """Compute the kinetic energy (J)."""
+    return 0.5 * sum(
+        m.mass * (m.centre.vx * m.centre.vx + m.centre.vy * m.centre.vy) + m.inertia * m.frame.turn.w * m.frame.turn.w
+        for m in masses
+    )
+
+
+# Forces on bodies
+
+
+def force(x: float, y: float, at: Vector) -> Wrench:
+    """Return a force at a place."""
+    return Wrench(x, y, at.x * y - at.y * x)
+
+
+def torque(moment: float) -> Wrench:
+    """Return a torque."""
+    return Wrench(0.0, 0.0, moment)
+
+
+def added(*wrenches: Wrench) -> Wrench:
+    """Add forces on one body."""
+    return Wrench(sum(f.x for f in wrenches), sum(f.y for f in wrenches), sum(f.moment for f in wrenches))
+
+
+def less(f: Wrench, g: Wrench) -> Wrench:
+    """Subtract forces on one body."""
+    return Wrench(f.x - g.x, f.y - g.y, f.moment - g.moment)
+
+
+def needed(m: Mass, accelerations: Rates, applied: Wrench) -> Wrench:
+    """Return the force of its joints on a body that moves: mass times acceleration less what else acts on it."""
+    q = (*accelerations, 1.0)
+    x = m.mass * sum(g[0] * a for g, a in zip(m.centre.columns, q))
+    y = m.mass * sum(g[1] * a for g, a in zip(m.centre.columns, q))
+    moment = m.inertia * sum(g * a for g, a in zip(m.frame.turn.columns, q))
+    return less(Wrench(x, y, moment + m.centre.x * y - m.centre.y * x), applied)
+
+
+def moment_about(f: Wrench, at: Vector) -> float:
+    """Return the moment of forces about a place."""
+    return f.moment - at.x * f.y + at.y * f.x
+
+
+def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) -> Wrench:
+    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c; their joints must give ``on1`` and ``on2``."""
+    ux, uy, wx, wy = c.x - p.x, c.y - p.y, c.x - q.x, c.y - q.y
+    # u x F = m1, w x F = -m2
+    m1, m2, cross = moment_about(on1, p), moment_about(on2, q), ux * wy - uy * wx
+    return force((m2 * ux + m1 * wx) / cross, (m2 * uy + m1 * wy) / cross, c)
+
+
+def pin_to_block(p: Vector, c: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
+    """Return the force of the block on body 1 of a dyad RRP in the pin at c, where the block slides along t."""
+    ux, uy = c.x - p.x, c.y - p.y
+    # u x F = m1; -F . t = along
+    m1, along = moment_about(on1, p), on2.x * t.c + on2.y * t.s
+    across = (m1 + along * (ux * t.s - uy * t.c)) / (ux * t.c + uy * t.s)
+    return force(-along * t.c - across * t.s, -along * t.s + across * t.c, c)
+
+
+def pin_of_blocks(c: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wrench:
+    """Return the force of block 2 on block 1 of a dyad PRP in the pin at c, where they slide along t and r."""
+    # F . t = f1, F . r = -f2
+    f1, f2, sine = on1.x * t.c + on1.y * t.s, on2.x * r.c + on2.y * r.s, t.c * r.s - t.s * r.c
+    return force((f1 * r.s + f2 * t.s) / sine, -(f1 * r.c + f2 * t.c) / sine, c)
+
+
+def slide_between_pins(p: Vector, q: Vector, t: Turn, on1: Wrench, on2: Wrench) -> Wrench:
+    """Return the force of body 2 on body 1 of a dyad RPR in the slide along t between them."""
+    m1, m2 = moment_about(on1, p), moment_about(on2, q)
+    # across the slide: its moments about p and q differ by (q - p) . t times it
+    across = (m1 + m2) / ((q.x - p.x) * t.c + (q.y - p.y) * t.s)
+    x, y = -across * t.s, across * t.c
+    return Wrench(x, y, m1 + p.x * y - p.y * x)
+
+
+def slide_to_block(p: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wrench:
+    """Return the force of body 2, which slides along t, on body 1 of a dyad RPP in the slide along r between them."""
+    m1, f2 = moment_about(on1, p), on2.x * t.c + on2.y * t.s
+    across = -f2 / (t.s * r.c - t.c * r.s)
+    x, y = -across * r.s, across * r.c
+    return Wrench(x, y, m1 + p.x * y - p.y * x)
+
+
+def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
+    """Return the force of its mate on a gear that is pinned at ``pin``, along the common tangent of both.
+
+    ``other`` is the centre of its mate, ``ratio`` the gear's speed by its mate's, both seen from the line of centres.
+    """
+    moment = moment_about(on, pin)
+    dx, dy = pin.x - other.x, pin.y - other.y
+    share = (ratio - 1.0) * moment / (dx * dx + dy * dy)
+    x, y = -share * dy, share * dx
+    return Wrench(x, y, moment + pin.x * y - pin.y * x)
+
+
+# Measures
+
+
+def angle_of(t: Turn) -> float:
+    """Return an angle in (-pi, pi]."""
+    return atan2(t.s, t.c)
+
+
+def angle_between(t: Turn, r: Turn, c: float, s: float) -> float:
+    """Return the angle of r from t less the angle of cosine c and sine s, in (-pi, pi]."""
+    x, y = t.c * r.c + t.s * r.s, t.c * r.s - t.s * r.c
+    return atan2(y * c - x * s, x * c + y * s)
+
+
+def transmission(p: Vector, c: Vector, q: Vector) -> float:
+    """Return the angle at c between the directions to p and q, in [0, pi]."""
+    ux, uy, wx, wy = c.x - p.x, c.y - p.y, c.x - q.x, c.y - q.y
+    return atan2(fabs(ux * wy - uy * wx), ux * wx + uy * wy)
+
+
+def position_along(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple[float, float]:
+    """Return position and velocity of a block's origin along a line of body f through its point (x, y), of direction t."""
+    start = point(f, x, y)
+    dx, dy = block.origin.x - start.x, block.origin.y - start.y
+    vx, vy = block.origin.vx - start.vx, block.origin.vy - start.vy
+    return t.c * dx + t.s * dy, t.c * (vx + t.w * dy) + t.s * (vy - t.w * dx)
+
+
+def distance(a: Vector, b: Vector) -> tuple[float, float, float, float]:
+    """Return the distance between two points, its rate, and the direction from a to b."""
+    dx, dy = b.x - a.x, b.y - a.y
+    length = sqrt(dx * dx + dy * dy)
+    cx, cy = dx / length, dy / length
+    return length, cx * (b.vx - a.vx) + cy * (b.vy - a.vy), cx, cy
+
+
+def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: str) -> None:
+    """Make sure that the bodies can be joined, clear of the limit of assembly.
+
+    Raises
+    ------
+    AssemblyError
+        If they cannot be joined, or are nearer to the limit than `limits.LIMIT_SINE`.
+    """
+    try:
+        clearance = places(tuple(x), p).clearance
+    except (ValueError, ArithmeticError):
+        raise AssemblyError(f"the bodies cannot be joined at {where}: they do not reach each other") from None
+    if not clearance >= LIMIT_SINE:
+        angle = degrees(asin(max(-1.0, min(1.0, clearance))))
+        raise AssemblyError(f"limit of assembly at {where}: the bodies of a dyad are in line to {angle:.3f} deg")

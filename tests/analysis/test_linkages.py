@@ -1,0 +1,395 @@
+"""Described linkages: against multipliers in all coordinates, against the hand-written five-bar, energy, files, mistakes."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.linkages import Package, described, linkage, load_linkage, mechanism
+from analysis.mechanisms import FIVE_BAR, MECHANISMS, check
+from analysis.run import Inputs, Trajectory, load_case, simulate
+from linkwork.errors import LinkworkError
+from linkwork.mechanism import Mechanism
+from tests.oracles.planar import Multipliers
+from tests.random_linkages import random_linkage
+
+
+@pytest.fixture(autouse=True)
+def only_our_own():
+    """Forget the mechanisms that a test registers."""
+    before = dict(MECHANISMS)
+    yield
+    MECHANISMS.clear()
+    MECHANISMS.update(before)
+
+
+def imported(package: Package, folder: Path) -> Any:
+    """The equations of a package, and its mechanism, not registered."""
+    own = folder / package.name
+    own.mkdir(parents=True, exist_ok=True)
+    for name, text in package.files.items():
+        (own / name).write_text(text)
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+    importlib.invalidate_caches()
+    return importlib.import_module(package.name)
+
+
+def assembled(seed: int, folder: Path, **changes: Any) -> tuple[Package, dict[str, tuple[float, float, float]]]:
+    """A random linkage with the signs of assembly that give the places from which it was made; and these."""
+    data, places = random_linkage(seed)
+    package = Package(described(data))
+    module = imported(package, folder)
+    names = [dyad.inner.name for dyad in package.structure.dyads if dyad.assembled]
+    x = module.MECHANISM.state(module.MECHANISM.published["random-linkage"].initial)
+    for signs in itertools.product((1, -1), repeat=len(names)):
+        chosen = dict(zip(names, signs))
+        p = module.Parameters(**{f"{name}_assembly": sign for name, sign in chosen.items()}).constants()
+        try:
+            found = module.equations.places(x, p)
+        except (ValueError, ZeroDivisionError):
+            continue
+        errors = []
+        for body, (bx, by, angle) in places.items():
+            if body != "ground":
+                f = getattr(found, f"{body}_frame")
+                errors += [f.origin.x - bx, f.origin.y - by, f.turn.c - math.cos(angle), f.turn.s - math.sin(angle)]
+        if np.abs(errors).max() < 1e-9:
+            return Package(described(data | {"assembly": chosen} | changes)), places
+    raise AssertionError("no assembly gives the places")
+
+
+def compared(seed: int, folder: Path) -> list[str]:
+    """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return its kinds of dyads."""
+    package, places = assembled(seed, folder)
+    d, made = package.description, imported(package, folder).MECHANISM
+    check(made)
+    oracle, rng = Multipliers(d), np.random.default_rng(seed)
+    q = np.array([c for body in d.bodies for c in places[body]])
+    assert oracle.residual(q) < 1e-9
+    n = len(made.freedoms)
+    rates = rng.uniform(-3, 3, n)
+    known = made.published["random-linkage"]
+    x = (*made.state(known.initial)[:n], *rates, 0.0, 0.0)
+    p, equations = known.parameters.constants(), made.modules[-1]
+    for mode in (0.0, 1.0):
+        u = rng.uniform(-3, 3, len(made.channels))
+        i = made.equations.applied((mode,) * len(made.modes), tuple(u), p)
+        values = dict(zip(made.input_names, u))
+        commanded = {c.freedom: u[k] for k, c in enumerate(made.channels) if c.kind == "rate" and mode}
+        loads = np.zeros(n)
+        for k, c in enumerate(made.channels):
+            if c.kind == "force" and c.freedom >= 0 and c.freedom not in commanded:
+                loads[c.freedom] = u[k]
+        forces = {name: values[f"{name}.torque"] for name in d.torques}
+        forces |= {name: values[f"{name}.force"] for name, s in d.springs.items() if s.driven}
+        points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in d.loads}
+        wanted = oracle.solve(q, rates, loads, commanded, points, forces)
+        m = equations.motion(x, i, p)
+        # near the limit of assembly both lose digits alike
+        near = 1e-9 / min(1.0, equations.places(x, p).clearance) ** 3
+        np.testing.assert_allclose(m.accelerations, wanted.accelerations, rtol=near, atol=near * 10)
+        np.testing.assert_allclose(m.loads, wanted.loads, rtol=near, atol=near * 10)
+        out = dict(zip(made.output_names, made.equations.outputs(x, i, 0.0, p)))
+        assert out["energy.kinetic"] == pytest.approx(wanted.kinetic, rel=1e-9)
+        scale = 1.0 + max(float(np.abs(f).max()) for f in wanted.forces.values())
+        for r in package.motion.reactions:
+            if r.joint.name not in wanted.forces or len(wanted.forces[r.joint.name]) < 2:
+                continue
+            pin = f"{r.name}.fx" in out
+            found = [out[f"{r.name}.{c}"] for c in (("fx", "fy") if pin else ("force", "moment"))]
+            sign = 1.0 if (r.on == r.joint.bodies[0]) == pin else -1.0
+            np.testing.assert_allclose(found, sign * wanted.forces[r.joint.name], atol=near * scale, err_msg=r.name)
+    return [dyad.kind for dyad in package.structure.dyads]
+
+
+def test_random_linkages_move_as_with_multipliers(tmp_path):
+    kinds = [kind for seed in range(16) for kind in compared(seed, tmp_path)]
+    assert set(kinds) == {"RRR", "RRP", "PRP", "RPR", "RPP"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(16, 316, 50))
+def test_many_random_linkages_move_as_with_multipliers(tmp_path, first):
+    for seed in range(first, first + 50):
+        compared(seed, tmp_path)
+
+
+@pytest.mark.parametrize("seed", [0, 3, 4])
+def test_random_linkages_keep_their_energy(tmp_path, seed):
+    """Energy gained and lost is that supplied, over a run of the compiled solver from rest."""
+    package, _ = assembled(seed, tmp_path, name=f"random-{seed}")
+    made = mechanism(package.description, tmp_path)
+    known = made.published[made.name]
+    modes = dict.fromkeys((freedom.mode.arguments[0] for freedom in made.freedoms if freedom.mode), 0.0)
+    run = simulate(known.parameters, Inputs(**modes), initial=known.initial, stop_time=0.05, step=1e-3, tolerance=1e-11)
+    assert abs(run["energy.residual"]).max() < 1e-7 * (1.0 + abs(run["energy.kinetic"]).max())
+    assert run["energy.kinetic"].max() > 1e-3
+
+
+def five_bar(p: Any) -> dict[str, Any]:
+    """The five-bar slider in words, of the parameters of the hand-written one."""
+    return {
+        "name": "five-bar-described",
+        "ground": {"A": [0, 0], "O": [p.ground_length, 0]},
+        "bodies": {
+            "crank": {
+                "bar": ["A", "B"], "length": p.crank_length, "mass": 0.3, "inertia": p.crank_inertia - 1.2e-4,
+                "cog": [0.02, 0],
+            },
+            "coupler": {
+                "bar": ["B", "C"], "length": p.coupler_length, "points": {"P": [0.05, 0.03]}, "mass": p.coupler_mass,
+                "inertia": p.coupler_inertia, "cog": [p.coupler_cog_distance, 0.001],
+            },
+            "rocker": {
+                "bar": ["D", "C"], "length": p.rocker_length, "mass": p.rocker_mass, "inertia": p.rocker_inertia,
+                "cog": [p.rocker_cog_distance, 0],
+            },
+            "block": {"points": {"D": [0, 0]}, "mass": p.slider_mass},
+        },
+        "slides": {"G": {"body": "block", "through": "O", "direction": 0.3}},
+        "freedoms": {"crank": {"joint": "A", "speed": 44.0}, "slider": "G"},
+        "springs": {
+            "spring": {
+                "at": "G", "stiffness": p.slider_stiffness, "damping": p.slider_damping, "free": 0.002, "friction": 0.7
+            }
+        },
+        "loads": ["P"],
+        "gravity": 9.81,
+        "gravity_direction": -0.5 * math.pi - 0.2,
+    }  # fmt: skip
+
+
+def test_described_five_bar_is_the_hand_written_one(tmp_path):
+    base = FIVE_BAR.published["table-3.1"].parameters
+    made = mechanism(described(five_bar(base)), tmp_path)
+    by_hand = replace(
+        base, crank_mass=0.3, crank_cog_distance=0.02, slider_guide_angle=0.3, slider_spring_free_position=0.002,
+        coupler_cog_distance=math.hypot(base.coupler_cog_distance, 0.001), slider_coulomb_friction=0.7,
+        coupler_cog_angle=math.atan2(0.001, base.coupler_cog_distance), coupler_point_distance=math.hypot(0.05, 0.03),
+        coupler_point_angle=math.atan2(0.03, 0.05), ground_inclination=0.2,
+    )  # fmt: skip
+    k, p = by_hand.constants(), made.published["five-bar-described"].parameters.constants()
+    names = {
+        "pin.A.fx": "A.fx",
+        "pin.B.fy": "B.fy",
+        "pin.C.fx": "C.fx",
+        "pin.D.fy": "D.fy",
+        "slider.guide_force": "G.force",
+    }
+    names |= {"transmission.angle": "C.transmission_angle", "coupler.angle": "coupler.angle", "coupler.point.y": "P.y"}
+    names |= {name: name for name in ("drive.applied_torque", "energy.kinetic", "rocker.angle", "slider.acceleration")}
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        x = (rng.uniform(0, 6.28), rng.uniform(-0.01, 0.01), rng.uniform(-50, 50), rng.uniform(-1, 1), 0.0, 0.0)
+        u = tuple(rng.uniform(-9, 9, 6))
+        for mode in (0.0, 1.0):
+            acting = [m.equations.applied((mode,), u, c) for m, c in ((FIVE_BAR, k), (made, p))]
+            one, other = (
+                (
+                    m.equations.derivative(x, i, c),
+                    m.equations.jump(x, i, u, c),
+                    dict(zip(m.output_names, m.equations.outputs(x, i, 0.0, c))),
+                )
+                for m, i, c in ((FIVE_BAR, acting[0], k), (made, acting[1], p))
+            )
+            np.testing.assert_allclose(other[0], one[0], rtol=1e-11, atol=1e-11)
+            np.testing.assert_allclose(other[1], one[1], rtol=1e-11, atol=1e-11)
+            for own, name in names.items():
+                assert other[2][name] == pytest.approx(one[2][own], rel=1e-10, abs=1e-10), own
+
+
+def test_described_five_bar_costs_little_more():
+    """At most 1.3 times the operations of the hand-written equations (prototypes of both: 310 and 260)."""
+    casadi = pytest.importorskip("casadi")
+    from analysis.run.equations import expressions
+
+    def operations(m: Mechanism) -> int:
+        traces = expressions(m)
+        f = casadi.Function("f", [*traces.symbols], [traces.derivative], {"cse": True})
+        ids = [f.instruction_id(n) for n in range(f.n_instructions())]
+        return sum(code not in (casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST) for code in ids)
+
+    made = mechanism(described(five_bar(FIVE_BAR.published["table-3.1"].parameters)))
+    assert operations(made) <= 1.3 * operations(FIVE_BAR)
+
+
+FOUR_BAR = {
+    "name": "four-bar-test",
+    "ground": {"A": [0, 0], "D": ["150 mm", 0]},
+    "bodies": {
+        "crank": {"bar": ["A", "B"], "length": "50 mm", "mass": "0.2 kg", "inertia": 1e-4},
+        "coupler": {"bar": ["B", "C"], "length": "150 mm", "mass": "0.3 kg", "inertia": 1e-3},
+        "rocker": {"bar": ["D", "C"], "length": "120 mm", "mass": "0.3 kg", "inertia": 1e-3},
+    },
+    "freedoms": {"crank": {"joint": "A", "speed": "300 rpm"}},
+}
+
+
+def changed(path: str, value: Any) -> dict[str, Any]:
+    """The four-bar with another entry; None removes it."""
+    import copy
+
+    data = copy.deepcopy(FOUR_BAR)
+    *tables, last = path.split("/")
+    place: Any = data
+    for name in tables:
+        place = place.setdefault(name, {})
+    if value is None:
+        del place[last]
+    else:
+        place[last] = value
+    return data
+
+
+#: Wrong descriptions, and what the sentence must contain: the place, or the value with what would be right.
+MISTAKES = [
+    ("bodies/crank/length", "-50 mm", "linkage.bodies.crank.length"),
+    ("bodies/crank/length", "50 kg", "linkage.bodies.crank.length"),
+    ("bodies/crank/length", None, "linkage.bodies.crank"),
+    ("bodies/crank/lenght", "50 mm", "linkage.bodies.crank.length"),
+    ("bodies/crank/bar", ["A"], "linkage.bodies.crank.bar"),
+    ("bodies/crank/bar", ["A", "B", "C"], "linkage.bodies.crank.bar"),
+    ("bodies/crank/bar", ["A", "B 2"], "linkage.bodies.crank.bar"),
+    ("bodies/crank/mass", "-1 kg", "linkage.bodies.crank.mass"),
+    ("bodies/crank/mass", None, "linkage.bodies.crank"),
+    ("bodies/crank/mass", "1 m", "linkage.bodies.crank.mass"),
+    ("bodies/crank/inertia", "1 kg", "linkage.bodies.crank.inertia"),
+    ("bodies/crank/cog", ["1 mm"], "linkage.bodies.crank.cog"),
+    ("bodies/crank/points", {"P": "1 mm"}, "linkage.bodies.crank.points.P"),
+    ("bodies/crank/points", {"P": ["1 mm", "2 N"]}, "linkage.bodies.crank.points.P"),
+    ("bodies/crank/points", {"P_1": [0, 0]}, "P_1"),
+    ("bodies/crank/section", {"kind": "rod"}, "linkage.bodies.crank.section"),
+    ("bodies/crank/section", {"kind": "beam"}, "linkage.bodies.crank.section.kind"),
+    ("bodies/dangling", {"points": {"Q": [0, 0]}, "mass": 1.0}, "dangling"),
+    ("bodies/extra", {"bar": ["C", "Q"], "length": 0.1, "mass": 1.0}, "2 freedoms"),
+    ("bodies/brace", {"bar": ["B", "D"], "length": 0.1, "mass": 1.0}, "0 freedoms"),
+    ("bodies/my_link", {"bar": ["C", "Q"], "length": 0.1}, "my_link"),
+    ("bodies", {}, "freedoms"),
+    ("ground", None, "linkage.ground"),
+    ("ground/A", [0], "linkage.ground.A"),
+    ("ground/A", "here", "linkage.ground.A"),
+    ("ground/A", ["1 s", 0], "linkage.ground.A"),
+    ("name", None, "linkage.name"),
+    ("nmae", "x", "linkage.name"),
+    ("gravity", "-9.81 m/s^2", "linkage.gravity"),
+    ("gravity", "9.81 m", "linkage.gravity"),
+    ("gravity_direction", "2 m", "linkage.gravity_direction"),
+    ("loads", ["Q"], "linkage.loads"),
+    ("loads", "C", "linkage.loads"),
+    ("torques", ["gear"], "linkage.torques"),
+    ("assembly", {"C": 2}, "linkage.assembly.C"),
+    ("assembly", {"C": "left"}, "linkage.assembly.C"),
+    ("assembly", {"B": 1}, "linkage.assembly"),
+    ("freedoms", {"a": "A", "d": "D"}, "2 are given"),
+    ("freedoms/crank/joint", "Z", "linkage.freedoms.crank"),
+    ("freedoms/crank/start", "1 m", "linkage.freedoms.crank.start"),
+    ("freedoms/crank/speed", "1 m/s", "linkage.freedoms.crank.speed"),
+    ("freedoms/crank/speed", "5 Hz", "linkage.freedoms.crank.speed"),
+    ("freedoms/crank/driven", "yes", "linkage.freedoms.crank.driven"),
+    ("freedoms/crank", 3, "linkage.freedoms.crank"),
+    ("slides/G", {"body": "rocker", "through": "Z"}, "linkage.slides.G.through"),
+    ("slides/G", {"body": "block", "through": "A"}, "linkage.slides.G"),
+    ("slides/G", {"body": "ground", "through": "A"}, "linkage.slides.G.body"),
+    ("slides/G", {"body": "rocker"}, "linkage.slides.G.through"),
+    ("slides/C", {"body": "rocker", "through": "A"}, "C"),
+    ("slides/G", {"body": "rocker", "through": "A", "direction": "1 m"}, "linkage.slides.G.direction"),
+    ("slots/S", {"pin": "Z", "on": "rocker", "through": "D"}, "linkage.slots.S"),
+    ("slots/S", {"pin": "B", "on": "lever", "through": "D"}, "linkage.slots.S"),
+    ("slots/S", {"pin": "B", "on": "rocker", "through": "B"}, "linkage.slots.S.through"),
+    ("gears/X", {"bodies": ["crank"], "ratio": -1}, "linkage.gears.X.bodies"),
+    ("gears/X", {"bodies": ["crank", "wheel"], "ratio": -1}, "linkage.gears.X"),
+    ("gears/X", {"bodies": ["crank", "rocker"]}, "linkage.gears.X.ratio"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": -1}, "0 freedoms"),
+    ("springs/k", {"stiffness": "1 N/mm"}, "linkage.springs.k"),
+    ("springs/k", {"at": "C", "between": ["A", "C"], "stiffness": 1.0}, "linkage.springs.k"),
+    ("springs/k", {"at": "Z", "stiffness": 1.0}, "linkage.springs.k"),
+    ("springs/k", {"at": "C", "stiffness": "1 N/mm"}, "linkage.springs.k.stiffness"),
+    ("springs/k", {"between": ["A", "C"], "stiffness": "1 N*m/rad"}, "linkage.springs.k.stiffness"),
+    ("springs/k", {"between": ["A", "Z"], "stiffness": 1.0}, "linkage.springs.k.between"),
+    ("springs/k", {"between": ["A"], "stiffness": 1.0}, "linkage.springs.k.between"),
+    ("springs/k", {"at": "C", "stiffness": -1.0}, "linkage.springs.k.stiffness"),
+    ("springs/k", {"at": "C", "damping": "-1 N*m*s/rad"}, "linkage.springs.k.damping"),
+    ("springs/k", {"at": "C", "law": "import os"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "x.real"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "__import__('os')"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "y + 1"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": [[1, 2], [0, 3]]}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": [[1, 2]]}, "linkage.springs.k.law"),
+    ("springs/crank", {"at": "C", "stiffness": 1.0, "driven": "no"}, "linkage.springs.crank.driven"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "named"), MISTAKES, ids=[f"{n}-{m[0]}" for n, m in enumerate(MISTAKES)])
+def test_mistakes_are_named(tmp_path, path, value, named):
+    with pytest.raises(LinkworkError) as error:
+        mechanism(described(changed(path, value)), tmp_path)
+    assert named in str(error.value)
+
+
+def test_other_freedoms_are_proposed(tmp_path):
+    """A Stephenson chain driven on its far side is no chain of dyads: the joints that would do are named."""
+    data = {
+        "name": "stephenson-far",
+        "ground": {"A": [0, 0], "D": [0.3, 0], "F": [0.6, 0]},
+        "bodies": {
+            "crank": {"bar": ["A", "B"], "length": 0.05, "mass": 1.0},
+            "coupler": {"points": {"B": [0, 0], "C": [0.3, 0], "E": [0.2, 0.1]}, "mass": 1.0},
+            "rocker": {"bar": ["D", "C"], "length": 0.2, "mass": 1.0},
+            "link": {"bar": ["E", "G"], "length": 0.4, "mass": 1.0},
+            "lever": {"bar": ["F", "G"], "length": 0.2, "mass": 1.0},
+        },
+        "freedoms": {"lever": "F"},
+    }
+    with pytest.raises(LinkworkError, match="A or D") as error:
+        mechanism(described(data), tmp_path)
+    assert all(body in str(error.value) for body in ("crank", "coupler", "rocker", "link"))
+    # left to itself the linkage takes one that does
+    made = mechanism(described({k: v for k, v in data.items() if k != "freedoms"}), tmp_path)
+    assert made.freedoms[0].coordinate == "crank.angle"
+
+
+def simulate_case(path: Path) -> Trajectory:
+    """Run a case file."""
+    case = load_case(path)
+    return simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
+
+
+def test_case_file_and_python_say_the_same(tmp_path):
+    """A file that describes a linkage is a case; the builder fills the same tables."""
+    text = """
+[linkage]
+name = "bar-test"
+gravity = "9.81 m/s^2"
+ground = { A = [0, 0] }
+bodies.rod.bar = ["A", "B"]
+bodies.rod.length = "0.5 m"
+bodies.rod.section = { kind = "bar", width = "30 mm", thickness = "10 mm", material = "steel" }
+freedoms.swing = { joint = "A", start = "20 deg", driven = false }
+[run]
+stop_time = "0.5 s"
+"""
+    (tmp_path / "bar.toml").write_text(text)
+    (tmp_path / "other.toml").write_text(
+        'linkage = "bar.toml"\ninitial.swing_angle = "30 deg"\nrun.stop_time = "0.1 s"\n'
+    )
+    run = simulate_case(tmp_path / "bar.toml")
+    # a physical pendulum: w^2 = 3 g sin / L at the top of its fall, by energy (I about the pin = m (L^2/3 + w^2/12))
+    fall = np.sin(np.deg2rad(20)) - np.sin(run["swing.angle"])
+    square = 2.0 * 9.81 * 0.25 * fall / (0.25 / 3.0 + 0.03**2 / 12.0)
+    np.testing.assert_allclose(run["swing.speed"] ** 2, square, rtol=1e-7, atol=1e-7)
+    assert simulate_case(tmp_path / "other.toml")["swing.angle"][0] == pytest.approx(np.deg2rad(30))
+    section = {"kind": "bar", "width": "30 mm", "thickness": "10 mm", "material": "steel"}
+    built = linkage("bar-test", ground={"A": (0, 0)}, gravity="9.81 m/s^2")
+    built.body("rod", bar=("A", "B"), length="0.5 m", section=section).freedom(
+        "swing", "A", start="20 deg", driven=False
+    )
+    assert built.mechanism() is load_linkage(tmp_path / "bar.toml")

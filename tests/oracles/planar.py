@@ -1,0 +1,199 @@
+"""Planar linkages in all coordinates of their bodies: closure from the description, Lagrange multipliers for the joints.
+
+Nothing of `linkwork.planar` or of the structure analysis is used: each body has a place (x, y, angle), each joint its
+equations, and accelerations and joint forces follow from one linear system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import casadi
+import numpy as np
+
+from analysis.linkages.description import GROUND, Description
+
+
+class Solution(NamedTuple):
+    """Accelerations of the freedoms, loads on them, kinetic energy; by joint (x, y) of a pin, (across, couple) of a slide."""
+
+    accelerations: np.ndarray
+    loads: np.ndarray
+    forces: dict[str, np.ndarray]
+    kinetic: float
+
+
+class Multipliers:
+    """The equations of one description."""
+
+    def __init__(self, description: Description) -> None:
+        self.d = description
+        self.bodies = list(description.bodies)
+        self.q = casadi.SX.sym("q", 3 * len(self.bodies))
+        self.v = casadi.SX.sym("v", 3 * len(self.bodies))
+        owners: dict[str, list[str]] = {own: [GROUND] for own in description.ground}
+        for name, body in description.bodies.items():
+            for own in body.all_points:
+                owners.setdefault(own, []).append(name)
+        self.owners = owners
+        self.rows: dict[str, tuple[int, int]] = {}
+        rows: list[Any] = []
+
+        def closed(name: str, *equations: Any) -> None:
+            self.rows[name] = (len(rows), len(rows) + len(equations))
+            rows.extend(equations)
+
+        for own, of in owners.items():
+            for body in of[1:]:
+                first, second = self.at(of[0], own), self.at(body, own)
+                closed(own if len(of) == 2 else f"{own} of {body}", first[0] - second[0], first[1] - second[1])
+        for name, s in description.slides.items():
+            (normal, start), (x, y) = self.line(s), casadi.vertsplit(self.pose(s.body))[:2]
+            across = normal[0] * (x - start[0]) + normal[1] * (y - start[1])
+            closed(name, across, self.pose(s.body)[2] - self.pose(s.on)[2] - s.direction)
+        for name, t in description.slots.items():
+            normal, start = self.line(t)
+            x, y = self.at(owners[t.pin][0], t.pin)
+            closed(name, normal[0] * (x - start[0]) + normal[1] * (y - start[1]))
+        for name, g in description.gears.items():
+            carrier = self.pose(self.carrier(*g.bodies))[2]
+            a, b = (self.pose(body)[2] - carrier for body in g.bodies)
+            closed(name, b - g.ratio * a - g.phase)
+        self.closure = casadi.vertcat(*rows)
+        self.freedoms = casadi.vertcat(*(self.coordinate(f.joint) for f in description.freedoms.values()))
+
+    def pose(self, body: str) -> Any:
+        """Place of a body."""
+        if body == GROUND:
+            return casadi.SX(3, 1)
+        n = self.bodies.index(body)
+        return self.q[3 * n : 3 * n + 3]
+
+    def at(self, body: str, own: str) -> tuple[Any, Any]:
+        """A point of a body."""
+        x, y = self.d.ground[own] if body == GROUND else self.d.bodies[body].all_points[own]
+        px, py, angle = casadi.vertsplit(self.pose(body))
+        return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
+
+    def line(self, s: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+        """Normal and a point of the line of a slide or a slot."""
+        angle = self.pose(s.on)[2] + s.direction
+        return (-casadi.sin(angle), casadi.cos(angle)), self.at(s.on, s.through)
+
+    def carrier(self, one: str, other: str) -> str:
+        """The body to which both gears are pinned."""
+        pinned = [{b for of in self.owners.values() if gear in of for b in of} for gear in (one, other)]
+        return next(iter((pinned[0] & pinned[1]) - {one, other}))
+
+    def coordinate(self, joint: str) -> Any:
+        """Coordinate of a joint."""
+        if joint in self.d.slides:
+            s = self.d.slides[joint]
+            normal, start = self.line(s)
+            x, y, _ = casadi.vertsplit(self.pose(s.body))
+            return normal[1] * (x - start[0]) - normal[0] * (y - start[1])
+        first, second = self.owners[joint]
+        return self.pose(second)[2] - self.pose(first)[2]
+
+    def moving(self, own: str) -> str:
+        """The body on which a force at a point acts: the first that moves, where several are pinned there."""
+        return next((body for body in self.owners[own] if body != GROUND), GROUND)
+
+    def stretch(self, s: Any) -> Any:
+        """What a spring measures."""
+        if s.at:
+            return self.coordinate(s.at)
+        (ax, ay), (bx, by) = (self.at(self.moving(own), own) for own in s.between)
+        return casadi.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+
+    def centre(self, name: str) -> tuple[Any, Any]:
+        """Centre of mass of a body."""
+        body = self.d.bodies[name]
+        x, y = body.cog if body.cog is not None else (0.5 * body.length, 0.0)
+        px, py, angle = casadi.vertsplit(self.pose(name))
+        return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
+
+    def residual(self, q: np.ndarray) -> float:
+        """Largest closure error."""
+        return float(np.abs(np.asarray(casadi.Function("c", [self.q], [self.closure])(q))).max(initial=0.0))
+
+    def share(self, forces: dict[str, np.ndarray], q: np.ndarray, gear: Any, couple: float) -> None:
+        """Replace the couple between two gears, all that closure knows, by a force at their pitch point."""
+        carrier = self.carrier(*gear.bodies)
+        pins = [next(own for own, of in self.owners.items() if {carrier, body} <= set(of)) for body in gear.bodies]
+        places = [casadi.Function("p", [self.q], [casadi.vertcat(*self.at(carrier, own))])(q) for own in pins]
+        first, second = (np.asarray(place).ravel() for place in places)
+        if gear.ratio == 1.0:
+            return
+        pitch = first + gear.ratio / (gear.ratio - 1.0) * (second - first)
+        lever = pitch - second
+        force = couple / (lever @ lever) * np.array([-lever[1], lever[0]])
+        for own, body, sign in ((pins[1], gear.bodies[1], -1.0), (pins[0], gear.bodies[0], 1.0)):
+            if own in forces:
+                forces[own] = forces[own] + sign * force * (1.0 if self.owners[own][0] == body else -1.0)
+
+    def solve(
+        self,
+        q: np.ndarray,
+        rates: np.ndarray,
+        loads: np.ndarray,
+        commanded: Mapping[int, float],
+        points: Mapping[str, tuple[float, float]],
+        forces: Mapping[str, float],
+    ) -> Solution:
+        """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations.
+
+        ``points`` are forces on points, ``forces`` torques on bodies and forces of driven springs by their names.
+        """
+        jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
+        drift = casadi.jtimes(
+            casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
+        )
+        kinetic = casadi.SX(0)
+        for n, name in enumerate(self.bodies):
+            body = self.d.bodies[name]
+            vx, vy = (casadi.jtimes(c, self.q, self.v) for c in self.centre(name))
+            kinetic += 0.5 * (body.mass or 0.0) * (vx**2 + vy**2) + 0.5 * (body.inertia or 0.0) * self.v[3 * n + 2] ** 2
+        momentum = casadi.gradient(kinetic, self.v)
+        force = casadi.gradient(kinetic, self.q) - casadi.jtimes(momentum, self.q, self.v)
+        g = self.d.gravity * np.array([np.cos(self.d.gravity_direction), np.sin(self.d.gravity_direction)])
+        for name in self.bodies:
+            for component, c in zip(g, self.centre(name)):
+                force += (self.d.bodies[name].mass or 0.0) * component * casadi.gradient(c, self.q)
+        for name, s in self.d.springs.items():
+            measure = self.stretch(s)
+            x, v = measure - float(s.free), casadi.jtimes(measure, self.q, self.v)
+            law = eval(s.law, {"x": x, "v": v, "fabs": casadi.fabs}) if s.law else 0.0
+            pull = float(s.stiffness) * x + float(s.damping) * v + law - forces.get(name, 0.0)
+            force -= pull * casadi.gradient(measure, self.q)
+        for name in self.d.torques:
+            force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
+        for own, (fx, fy) in points.items():
+            x, y = self.at(self.moving(own), own)
+            force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
+        mass = casadi.jacobian(momentum, self.v)
+        f = casadi.Function("f", [self.q, self.v], [jacobian, drift, mass, force, kinetic])
+        j = np.asarray(f(q, np.zeros(len(q)))[0])
+        size, count = self.closure.numel(), self.freedoms.numel()
+        v = np.linalg.solve(j, np.concatenate([np.zeros(size), rates]))
+        j, d, m, right, energy = (np.asarray(a) for a in f(q, v))
+        closed, along = j[:size], j[size:]
+        held = sorted(commanded)
+        free = [n for n in range(count) if n not in commanded]
+        constraints = np.concatenate([closed, along[held]])
+        total = len(q) + size + len(held)
+        matrix = np.zeros((total, total))
+        matrix[: len(q), : len(q)] = m
+        matrix[: len(q), len(q) :] = -constraints.T
+        matrix[len(q) :, : len(q)] = constraints
+        wanted = np.concatenate([-d[:size, 0], [commanded[n] - d[size + n, 0] for n in held]])
+        solution = np.linalg.solve(matrix, np.concatenate([right[:, 0] + along[free].T @ loads[free], wanted]))
+        accelerations = along @ solution[: len(q)] + d[size:, 0]
+        multipliers = solution[len(q) :]
+        all_loads = loads.copy()
+        all_loads[held] = multipliers[size:]
+        joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
+        for name, gear in self.d.gears.items():
+            self.share(joints, q, gear, float(joints[name][0]))
+        return Solution(accelerations, all_loads, joints, float(energy[0, 0]))

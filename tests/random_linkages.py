@@ -1,0 +1,194 @@
+"""Random planar linkages: chains of dyads of all kinds, made from places of their joints, so that they can be assembled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+KINDS = ("RRR", "RRP", "PRP", "RPR", "RPP", "gear", "slot")
+
+
+class Maker:
+    """A description that grows dyad by dyad; every body has a place, from which its own coordinates follow."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.data: dict[str, Any] = {"name": "random-linkage", "ground": {}, "bodies": {}, "freedoms": {}}
+        self.data |= {"slides": {}, "slots": {}, "gears": {}, "springs": {}, "assembly": {}, "loads": []}
+        self.places: dict[str, tuple[float, float, float]] = {"ground": (0.0, 0.0, 0.0)}
+        self.count = 0
+        #: bodies with angles that are linear in the freedoms, pinned to the ground: mates of gears
+        self.mates: list[tuple[str, np.ndarray]] = []
+
+    def name(self, prefix: str) -> str:
+        self.count += 1
+        return f"{prefix}{self.count}"
+
+    def spot(self) -> np.ndarray:
+        return self.rng.uniform(-0.5, 0.5, 2)
+
+    def new(self, place: np.ndarray | None = None, angle: float | None = None) -> str:
+        """A body somewhere, with a mass."""
+        name, rng = self.name("b"), self.rng
+        x, y = self.spot() if place is None else place
+        self.places[name] = (float(x), float(y), float(rng.uniform(-3, 3) if angle is None else angle))
+        self.data["bodies"][name] = {
+            "points": {},
+            "mass": float(rng.uniform(0.2, 2.0)),
+            "inertia": float(rng.uniform(1e-3, 1e-2)),
+            "cog": [float(c) for c in rng.uniform(-0.1, 0.1, 2)],
+        }
+        return name
+
+    def mark(self, body: str, own: str, place: np.ndarray) -> None:
+        """Give a body a point at a place in the ground."""
+        x, y, angle = self.places[body]
+        c, s = np.cos(angle), np.sin(angle)
+        dx, dy = place[0] - x, place[1] - y
+        points = self.data["ground"] if body == "ground" else self.data["bodies"][body]["points"]
+        points[own] = [float(c * dx + s * dy), float(-s * dx + c * dy)]
+
+    def known(self) -> str:
+        return str(self.rng.choice(list(self.places)))
+
+    def pin(self, *bodies: str, place: np.ndarray | None = None) -> str:
+        own, place = self.name("p"), self.spot() if place is None else place
+        for body in bodies:
+            self.mark(body, own, place)
+        return own
+
+    def slide(self, on: str, block: str) -> str:
+        """A slide of a block, along its x axis, on another body."""
+        name, own = self.name("s"), self.name("o")
+        x, y, angle = self.places[block]
+        way = self.rng.uniform(-0.3, 0.3)
+        self.mark(on, own, np.array([x - way * np.cos(angle), y - way * np.sin(angle)]))
+        direction = float(angle - self.places[on][2])
+        self.data["slides"][name] = {"body": block, "on": on, "through": own, "direction": direction}
+        return name
+
+    def joined(self, kind: str, base: str, body: str) -> str:
+        """A joint between a base and a body: P with either of them as the block."""
+        if kind == "R":
+            return self.pin(base, body)
+        swap = base != "ground" and self.rng.uniform() < 0.5
+        return self.slide(body, base) if swap else self.slide(base, body)
+
+    def freedom(self) -> None:
+        """A body pinned to a known one, or sliding on it, as a freedom."""
+        base, body = self.known(), self.new()
+        kind = self.rng.choice(["R", "R", "P"])
+        joint = self.joined(kind, base, body)
+        start = self.places[body][2] - self.places[base][2]
+        if kind == "P":
+            s = self.data["slides"][joint]
+            block, points = (
+                s["body"],
+                self.data["ground"] if s["on"] == "ground" else self.data["bodies"][s["on"]]["points"],
+            )
+            x, y, angle = self.places[s["on"]]
+            ox, oy = points[s["through"]]
+            ox, oy = x + np.cos(angle) * ox - np.sin(angle) * oy, y + np.sin(angle) * ox + np.cos(angle) * oy
+            bx, by, turn = self.places[block]
+            start = (bx - ox) * np.cos(turn) + (by - oy) * np.sin(turn)
+        elif base == "ground":
+            self.mates.append((body, self.place_of("ground", joint)))
+        self.data["freedoms"][self.name("f")] = {
+            "joint": joint,
+            "start": float(start),
+            "driven": bool(self.rng.uniform() < 0.6),
+        }
+
+    def place_of(self, body: str, own: str) -> np.ndarray:
+        points = self.data["ground"] if body == "ground" else self.data["bodies"][body]["points"]
+        return np.array(points[own])
+
+    def dyad(self, kind: str) -> None:
+        if kind == "gear":
+            return self.gear()
+        if kind == "slot":
+            base, other, body = self.known(), self.known(), self.new()
+            self.pin(base, body)
+            own, name, through = self.name("p"), self.name("t"), self.name("o")
+            at = self.spot()
+            holder, pinned = (body, other) if self.rng.uniform() < 0.5 else (other, body)
+            self.mark(pinned, own, at)
+            self.mark(holder, through, self.spot())
+            x, y, angle = self.places[holder]
+            p = self.place_of(holder, through)
+            start = np.array(
+                [x + np.cos(angle) * p[0] - np.sin(angle) * p[1], y + np.sin(angle) * p[0] + np.cos(angle) * p[1]]
+            )
+            direction = np.arctan2(at[1] - start[1], at[0] - start[0]) - angle
+            self.data["slots"][name] = {"pin": own, "on": holder, "through": through, "direction": float(direction)}
+            return None
+        first, second = self.known(), self.known()
+        one, other = self.new(), self.new()
+        outer = [kind[0], kind[2]]
+        if kind == "RPP":
+            outer = ["R", "P"]
+        self.joined(outer[0], first, one)
+        self.joined(outer[1], second, other)
+        if kind[1] == "R":
+            self.pin(one, other)
+        else:
+            # the block's axis is its own, so that any two bodies can slide on each other
+            pair = (one, other) if self.rng.uniform() < 0.5 else (other, one)
+            self.slide(*pair)
+        return None
+
+    def gear(self) -> None:
+        if not self.mates:
+            return
+        mate, _ = self.mates[int(self.rng.integers(len(self.mates)))]
+        body = self.new()
+        self.pin("ground", body)
+        ratio = float(self.rng.choice([-1.0, -0.5, 1.5, 2.0]))
+        phase = self.places[body][2] - ratio * self.places[mate][2]
+        self.data["gears"][self.name("g")] = {"bodies": [mate, body], "ratio": ratio, "phase": float(phase)}
+
+    def actions(self) -> None:
+        """Springs, dampers, a load and gravity."""
+        rng, data = self.rng, self.data
+        data |= {"gravity": 9.81, "gravity_direction": float(rng.uniform(-3, 3))}
+        owned = [(body, own) for body, table in data["bodies"].items() for own in table["points"]]
+        for freedom in data["freedoms"].values():
+            if rng.uniform() < 0.5:
+                data["springs"][self.name("k")] = {
+                    "at": freedom["joint"], "stiffness": 30.0, "damping": 0.3, "free": float(freedom["start"] + 0.1),
+                }  # fmt: skip
+        if data["slides"] and rng.uniform() < 0.5:
+            joint = str(rng.choice(list(data["slides"])))
+            data["springs"][self.name("k")] = {"at": joint, "stiffness": 40.0, "damping": 0.2, "free": 0.03}
+        ends = {own for _, own in owned}
+        if len(ends) > 1:
+            pair = rng.choice(sorted(ends), 2, replace=False)
+            data["springs"][self.name("k")] = {
+                "between": [str(own) for own in pair],
+                "stiffness": 50.0,
+                "damping": 0.5,
+                "free": 0.2,
+            }
+        if not owned:
+            body = next(iter(data["bodies"]))
+            owned = [(body, self.pin(body))]
+        data["loads"] = [owned[int(rng.integers(len(owned)))][1]]
+
+
+def random_linkage(
+    seed: int, kinds: tuple[str, ...] = KINDS
+) -> tuple[dict[str, Any], dict[str, tuple[float, float, float]]]:
+    """Return the tables of a random linkage and the places of its bodies (x, y, angle)."""
+    for attempt in range(100):
+        maker = Maker(100 * seed + attempt)
+        for _ in range(int(maker.rng.integers(1, 4))):
+            maker.freedom()
+        for _ in range(int(maker.rng.integers(1, 4))):
+            maker.dyad(str(maker.rng.choice(kinds)))
+        blocks = [slide["body"] for slide in maker.data["slides"].values()]
+        # two slides along the axis of one block are parallel
+        if len(set(blocks)) == len(blocks):
+            break
+    maker.actions()
+    return maker.data, maker.places
