@@ -68,6 +68,8 @@ release: $(DEV)
 	rm -rf dist
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(BIN)/python build_fmu.py --platforms all --dest dist --publish dist/compatibility
+	cd dist && $(abspath $(BIN))/python -c "import hashlib, pathlib; [print(hashlib.sha256(p.read_bytes()).hexdigest(), '', p) \
+		for p in sorted(pathlib.Path().glob('*.*'))]" > SHA256SUMS
 
 $(RUN): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --editable '.[all]'
