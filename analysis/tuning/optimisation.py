@@ -327,7 +327,7 @@ def _spread(low: FloatArray, high: FloatArray) -> FloatArray:
     share = qmc.Sobol(len(low), rng=0).random(_SPREAD)
     wide = (low > 0.0) & (high > _WIDE * low)
     base, ratio = np.where(wide, low, 1.0), np.where(wide, high / np.where(wide, low, 1.0), 1.0)
-    return np.where(wide, base * ratio**share, low + (high - low) * share)
+    return np.asarray(np.where(wide, base * ratio**share, low + (high - low) * share))
 
 
 def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
