@@ -51,7 +51,7 @@ html_math_renderer = "mathml"
 LINKS = (
     (r"\]\((?:\.\./)?(CONTRIBUTING|CHANGELOG)\.md", lambda match: f"]({match[1].lower()}.md"),
     (r"\]\((?:\.\./)?docs/", lambda match: "]("),
-    (r"\]\((?=CITATION|examples/)", lambda match: "](../"),
+    (r"\]\((?=CITATION|CODE_OF_CONDUCT|LICENSE|paper/|examples/)", lambda match: "](../"),
 )
 
 
