@@ -1,11 +1,13 @@
 from . import figures as figures
 from . import linear as linear
+from . import linkages as linkages
 from . import periodic as periodic
 from . import slider as slider
 from . import slider_crank as slider_crank
 from . import synthesis as synthesis
 from . import tuning as tuning
 from . import youssef as youssef
+from .linkages import linkage as linkage
 from .linear import design_lqr as design_lqr
 from .linear import design_pi as design_pi
 from .linear import design_pid as design_pid

@@ -48,6 +48,15 @@ def registered() -> Iterator[None]:
         del MECHANISMS[mechanism.name]
 
 
+@pytest.fixture
+def own_linkages() -> Iterator[None]:
+    """The linkages that a test describes are forgotten after it."""
+    before = dict(MECHANISMS)
+    yield
+    MECHANISMS.clear()
+    MECHANISMS.update(before)
+
+
 @pytest.fixture(scope="session")
 def launched() -> Iterator[Callable[..., Browser]]:
     """Starts the system's Chromium, with these arguments besides."""
