@@ -161,7 +161,7 @@ Picture = tuple[str, "Figure", int]
 def study_pictures() -> Iterator[Picture]:
     """Draw the still of README.md, and the pictures of rig-2.md and coexisting-motions.md."""
     from analysis import figures as draw
-    from analysis.periodic import frequency_response
+    from analysis.periodic import frequency_response, with_isolas
     from analysis.studies import load
     from analysis.units import RAD_S_PER_RPM
     from analysis.youssef import approximations
@@ -180,7 +180,9 @@ def study_pictures() -> Iterator[Picture]:
         ("rig-1-response", "rig-1-spring-b", 850.0, 1250.0),
     ):
         rig = SETS[of]
-        response = frequency_response(rig.parameters, low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, doublings=3)
+        response = with_isolas(
+            frequency_response(rig.parameters, low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, doublings=3)
+        )
         yield name, draw.plot(response, title=rig.source, beside=approximations(response)), 100
 
 

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
 
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
+from benchmarks.studio import chromium
 from build_fmu import FMUS
 
 from .mechanisms import pendulum, rotor_on_cart
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 # a drawn example has no time limit: the first of a run loads libraries, and machines are loaded
 settings.register_profile("unhurried", settings.default, deadline=None)
@@ -77,3 +82,35 @@ def natives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("native")
     built = [build_native(mechanism, kind, folder) for mechanism in NATIVE_MECHANISMS for kind in (NATIVE, NATIVE_FMI3)]
     return {path.stem: path for path in built}
+
+
+@pytest.fixture(scope="session")
+def launched() -> Iterator[Callable[..., Browser]]:
+    """Starts the system's Chromium, with these arguments besides."""
+    path = chromium()
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        path = None
+    if path is None:
+        pytest.skip(
+            "there is no Chromium here, or Playwright is not installed: apt install chromium, pip install playwright"
+        )
+    with sync_playwright() as playwright:
+        made: list[Any] = []
+
+        def launch(*arguments: str) -> Browser:
+            made.append(playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *arguments]))
+            return made[-1]
+
+        yield launch
+        for one in made:
+            one.close()
+
+
+@pytest.fixture(scope="module")
+def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
+    """Chromium."""
+    made = launched()
+    yield made
+    made.close()

@@ -255,20 +255,49 @@ def test_every_published_set_and_example_opens_in_the_studio(openings):
             assert case_of(json.loads(kept)).parameters
 
 
-@pytest.mark.slow
-@pytest.mark.fmu
-def test_the_site_builds_without_a_warning_and_needs_no_network(tmp_path):
-    """Its links lead somewhere, its notebooks run, every page is in its contents; all that it loads is its own."""
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built without a warning: its links lead somewhere, its notebooks run, every page is in its contents."""
+    folder = tmp_path_factory.mktemp("docs")
     build = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going"]
-    site = tmp_path / "site"
     done = subprocess.run(
-        [*build, "-d", tmp_path / "doctrees", ROOT / "docs", site],
+        [*build, "-d", folder / "doctrees", ROOT / "docs", folder / "site"],
         capture_output=True,
         text=True,
         timeout=500,
         check=False,
     )
     assert done.returncode == 0, done.stderr
+    return folder / "site"
+
+
+@pytest.mark.slow
+@pytest.mark.fmu
+def test_pages_of_the_site_fit_their_windows_and_long_ones_have_contents(site, browser):
+    """On a phone and on three desktops, light and dark."""
+    look = (ROOT / "tests" / "layout.js").read_text(encoding="utf-8")
+    page = browser.new_page()
+    wrong = []
+    for path in sorted(site.rglob("*.html")):
+        if path.name == "page.html" or "_static" in path.parts:
+            continue
+        page.goto(path.as_uri())
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            for width in (390, 1280, 1440, 1920):
+                page.set_viewport_size({"width": width, "height": 1000})
+                wrong += [(path.name, scheme, width, flaw) for flaw in page.evaluate(look)]
+        # those of the index and of the names of the API are lists themselves
+        lists = ("genindex", "py-modindex", "index", "analysis")
+        if path.stem not in lists and page.evaluate("document.querySelector('.content').scrollHeight") > 4000:
+            assert page.locator(".toc-tree li").count() > 2, path.name
+    assert wrong == []
+
+
+@pytest.mark.slow
+@pytest.mark.fmu
+def test_the_site_needs_no_network(site):
+    """All that it loads is its own."""
     pages = {path.relative_to(site).as_posix(): path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
     loaded = re.compile(r"""<(?:script|img|link)[^>]+(?:src|href)=["'](?:https?:)?//""")
     assert [name for name, page in pages.items() if loaded.search(page)] == []

@@ -235,6 +235,8 @@ def _avoid(response: Any, factor: float, unit: str) -> None:
     """Print the ranges to avoid and the jumps at folds in words."""
     ranges = response.speeds_to_avoid
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
+    if response.caution:
+        say(f"{response.caution}: --places seeks them")
     if not ranges:
         say(f"no {words} to avoid: no resonance inside the range, one stable motion throughout")
     else:

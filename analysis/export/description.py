@@ -231,7 +231,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if variable.causality in _INITIAL:
             attributes["initial"] = _INITIAL[variable.causality]
         value = _value(variable, starts.get(variable.name, variable.start))
-        if kind.native and entry.derivative_of is not None:
+        if entry.derivative_of in scale:  # of a state: OMSimulator takes every other one for a state, too
             value["derivative"] = _number(kind, entry.derivative_of)
         nominal = scale.get(entry.reference, variable.nominal)
         if nominal is not None:
@@ -349,10 +349,10 @@ def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
         (traced.clearance, [indicator(mechanism)]),
     ):
         for on, references in known:
-            expression = column if on is x else casadi.substitute(column, x, traced.jump)
-            pattern = casadi.jacobian_sparsity(expression, on)
-            for row, col in zip(*pattern.get_triplet()):
-                found.setdefault(unknowns[row], set()).add(references[col])
+            for expression in (column, casadi.substitute(column, x, traced.jump)):
+                pattern = casadi.jacobian_sparsity(expression, on)
+                for row, col in zip(*pattern.get_triplet()):
+                    found.setdefault(unknowns[row], set()).add(references[col])
         for unknown in unknowns:
             found.setdefault(unknown, set())
     return {unknown: frozenset(on) for unknown, on in found.items()}

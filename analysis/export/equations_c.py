@@ -46,7 +46,20 @@ _START = "constants, RULES and error_scale must be arithmetic without branches, 
 def _equations(mechanism: Mechanism) -> str:
     made = {function.name(): function for function in functions(mechanism)}
     text = c_of(made.values(), "equations")
-    return text + _choices(mechanism, made["equations_solution"].numel_out(0)) if mechanism.switch else text
+    if mechanism.switch:
+        text += _choices(mechanism, made["equations_solution"].numel_out(0))
+    return '#include "sizes.h"\n\n#ifndef LOCAL\n#define LOCAL\n#endif\n\n' + re.sub(
+        "^int equations_", r"LOCAL \g<0>", text, flags=re.MULTILINE
+    )
+
+
+#: Functions about functions, which CasADi writes beside each and no one calls.
+_ASKED = re.compile(
+    r"^[\w* ]+_(?:\w+_mem|checkout|release|incref|decref|n_in|n_out|default_in|\w+_work|work\w*"
+    r"|(?:name|sparsity)_(?:in|out)|\w+_size|version)"
+    r"\([^)]*\) ?\{(?:[^\n]*\}|.*?^\})\n+",
+    re.MULTILINE | re.DOTALL,
+)
 
 
 def c_of(functions: Iterable[Any], file: str) -> str:
@@ -58,6 +71,7 @@ def c_of(functions: Iterable[Any], file: str) -> str:
     with TemporaryDirectory(prefix="linkwork-c-") as folder:
         generator.generate(f"{folder}/")
         text = (Path(folder) / f"{file}.c").read_text(encoding="utf-8")
+    text = re.sub("^casadi_real casadi_", r"static \g<0>", _ASKED.sub("", text), flags=re.MULTILINE)
     # the shell leaves out no argument and no result: without these questions the code is smaller
     return re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
 
@@ -71,7 +85,7 @@ def _choices(mechanism: Mechanism, numbers: int) -> str:
     on = f"arg[3][{mechanism.switch_place}] != 0.0"
     sides = "(const double** arg, double** res, int* iw, double* w, int mem)"
     pair = f"return ({on} ? equations_clearance_on : equations_clearance_off)(arg, res, iw, w, mem);"
-    text = f'#include "sizes.h"\n\nint equations_clearance{sides} {{\n  {pair}\n}}\n'
+    text = f"\nint equations_clearance{sides} {{\n  {pair}\n}}\n"
     for name, (called, count, results) in _CHOSEN.items():
         given = ", ".join(f"arg[{n}]" for n in range(count))
         off = f"  if (!({on})) return equations_{name}_off(arg, res, iw, w, mem);\n" if called == "values" else ""
@@ -279,7 +293,7 @@ def _number(value: float) -> str:
 
 def _array(name: str, values: Sequence[object], size: str, kind: str = "int") -> str:
     body = ", ".join(map(str, values)) or "{0}" if kind != "int" else ", ".join(map(str, values)) or "0"
-    return f"const {kind} {name}[{size}] = {{{body}}};"
+    return f"LOCAL const {kind} {name}[{size}] = {{{body}}};"
 
 
 def _sizes(mechanism: Mechanism, kind: Kind) -> str:
@@ -337,13 +351,13 @@ def _tables(mechanism: Mechanism) -> str:
             f"/* Tables of a {mechanism.name}. Generated. */",
             '#include "model.h"',
             "",
-            f"const Variable variables[VARIABLES] = {{\n{rows},\n}};",
+            f"LOCAL const Variable variables[VARIABLES] = {{\n{rows},\n}};",
             _array("parameter_at", [reference[name] for name in own], "ROOM(PARAMETERS)"),
             _array("initial_at", [reference[name] for name in initial], "2 * FREEDOMS"),
             _array("mode_at", [reference[mode.name] for mode in mechanism.modes], "ROOM(MODES)"),
             _array("input_at", [reference[name] for name in mechanism.input_names], "ROOM(INPUTS)"),
             _array("state_at", states(mechanism), "STATES"),
-            *(f"const int {n}_at = {reference[f'solver.{n}']};" for n in ("tolerance", "status", "message")),
+            *(f"LOCAL const int {n}_at = {reference[f'solver.{n}']};" for n in ("tolerance", "status", "message")),
             _array("freedoms", freedoms, "FREEDOMS", "FreedomName"),
             _array("commands", _commands(mechanism), "ROOM(COMMANDS)", "Command"),
             _array("least", rules, "ROOM(BOUNDS)", "Least"),

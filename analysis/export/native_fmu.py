@@ -27,6 +27,7 @@ from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals
 from .equations_c import generated
+from .experiments import experiments, manifest
 from .interface import interface
 
 
@@ -62,6 +63,8 @@ _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
 }
+#: What is compiled: it includes all the rest.
+COMPILED = ("all.c",)
 _NOTES = (
     "The equations are those of the Python sources of Linkwork, written as C and compiled; nothing but the C library is "
     "needed. The sources are in the archive.",
@@ -118,27 +121,43 @@ def build_native(
     dest = Path(dest)
     dest.mkdir(parents=True, exist_ok=True)
     sources = source_files(mechanism, kind)
-    compiled = [name for name in sources if name.endswith(".c")]
     identifier = kind.identifier(mechanism)
     entries = {f"sources/{name}": text.encode() for name, text in sources.items()}
     entries |= _binaries(identifier, kind, sources, platforms)
-    entries["modelDescription.xml"] = description(mechanism, kind, compiled)
-    entries["sources/buildDescription.xml"] = build_description(identifier, compiled)
+    entries["modelDescription.xml"] = description(mechanism, kind, COMPILED)
+    entries["sources/buildDescription.xml"] = build_description(identifier, COMPILED)
     if kind.fmi == 3:
         entries["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
     entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES)
+    entries |= experiments(mechanism) | manifest()
     return write(entries, dest / kind.file_name(mechanism))
 
 
 def source_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
-    """Return all C files of a native FMU by name: the shell, the headers of the standard, and the generated files."""
+    """Return all C files of a native FMU by name: the shell, the headers of the standard, and the generated files.
+
+    `COMPILED` includes all the others. The functions of the standard have the prefix FMI2_FUNCTION_PREFIX or
+    FMI3_FUNCTION_PREFIX if it is defined; nothing else is visible outside.
+    """
     shell = SOURCES / "native"
     headers = resources.files("fmpy") / "c-code"
     files = {name: (shell / name).read_text(encoding="utf-8") for name in (f"fmi{kind.fmi}.c", *_SHELL)}
     files |= {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[kind.fmi]}
-    return files | generated(mechanism, kind)
+    if kind.fmi == 2:
+        files["fmi2Functions.h"] = _with_prefix(files["fmi2Functions.h"], (headers / "fmi3Functions.h").read_text())
+    files |= generated(mechanism, kind)
+    units = "".join(f'#include "{name}"\n' for name in files if name.endswith(".c"))
+    units = f'#define ALL_IN_ONE\n#include "model.h"\n{units}'
+    return files | {"all.c": f"/* All of the FMU in one file. Generated. */\n{units}"}
+
+
+def _with_prefix(fmi2: str, fmi3: str) -> str:
+    """Return the FMI 2.0 header with the standard's prefix of functions, which FMPy leaves out; FMI 3.0 has the same lines."""
+    first, last = fmi2.index("/*\nExport FMI2 API functions"), "#define fmi2FullName(name) name\n"
+    lines = fmi3[fmi3.index("#if !defined(FMI3_OVERRIDE") : fmi3.index("/* FMI version */")]
+    return fmi2[:first] + lines.replace("FMI3", "FMI2").replace("fmi3", "fmi2") + fmi2[fmi2.index(last) + len(last) :]
 
 
 def _binaries(identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]) -> dict[str, bytes]:
@@ -147,14 +166,13 @@ def _binaries(identifier: str, kind: Kind, sources: dict[str, str], platforms: S
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
-        files = [name for name in sources if name.endswith(".c")]
         for number, name in enumerate(platforms):
             platform = PLATFORMS[name]
             place = platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3
             library = f"{identifier}.{platform.suffix}"
             with shown(False, float(len(platforms)), f"compiling for {name}") as show:
                 show(float(number))
-                compile_library(folder, files, library, platform.target, (*OPTIONS, *platform.options))
+                compile_library(folder, COMPILED, library, platform.target, (*OPTIONS, *platform.options))
             found.setdefault(f"binaries/{place}/{library}", []).append((Path(folder) / library).read_bytes())
     return {place: parts[0] if len(parts) == 1 else _universal(parts) for place, parts in found.items()}
 

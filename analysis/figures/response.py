@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,7 +26,6 @@ from ..periodic import (
     SpecialPoint,
     Stability,
     fold_jumps,
-    ranges_to_avoid,
 )
 from ..units import RAD_S_PER_RPM, display_of
 from ..youssef import Approximations
@@ -119,8 +118,9 @@ def describe_branches(
     rpm: bool = True,
     beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[Avoided] = (),
+    caution: str = "",
 ) -> Picture:
-    """Return the picture that `plot_branches` draws."""
+    """Return the picture that `plot_branches` draws, with a line above the legend on what the ranges do not know."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     rpm &= family.unit == "rad/s"
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
@@ -132,7 +132,8 @@ def describe_branches(
         for a in avoid
     ]
     bare = [Shade(low=shade.low, high=shade.high, label="", number=shade.number) for shade in shades]
-    panels = [_amplitudes(branches, look, others, shades), _harmonics(branches, look, bare)]
+    amplitudes = replace(_amplitudes(branches, look, others, shades), legend=caution)
+    panels = [amplitudes, _harmonics(branches, look, bare)]
     if others:
         panels.append(_errors(others, look, bare))
     panels += _loads(branches, look, bare)
@@ -481,7 +482,8 @@ def plot_branch(branch: Branch, *, title: str = "") -> Picture:
     Ranges to avoid are shaded.
     """
     low, high = float(branch.parameter.min()), float(branch.parameter.max())
-    return describe_branches([branch], title=title, avoid=ranges_to_avoid([branch], low, high))
+    alone = Response(branches=(branch,), low=low, high=high, problems=())
+    return describe_branches([branch], title=title, avoid=alone.speeds_to_avoid, caution=alone.caution)
 
 
 @pictured
@@ -495,4 +497,5 @@ def plot_response(
         rpm=rpm,
         beside=None if beside is None else beside.at,
         avoid=response.speeds_to_avoid,
+        caution=response.caution,
     )

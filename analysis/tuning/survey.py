@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -268,7 +268,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
     except ContinuationError:
         return response
     branches = (*response.branches, branch)
-    return Response(branches=branches, low=response.low, high=response.high, problems=response.problems)
+    return replace(response, branches=branches)
 
 
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:

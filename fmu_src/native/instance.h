@@ -58,62 +58,62 @@ struct Instance {
     char *text; /* what the last get of a string returned */
 };
 
-Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
+LOCAL Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
                        void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void));
-void instance_free(Instance *c);
-void instance_reset(Instance *c);
+LOCAL void instance_free(Instance *c);
+LOCAL void instance_reset(Instance *c);
 
 /* Whether an instance is there and may be called this in its state: if not, that is said in the log. */
-bool instance_allows(Instance *c, const char *function, int phases);
+LOCAL bool instance_allows(Instance *c, const char *function, int phases);
 
 /* Whether a count is right: if not, that is said in the log. */
-bool instance_counts(Instance *c, const char *function, size_t count, size_t right);
+LOCAL bool instance_counts(Instance *c, const char *function, size_t count, size_t right);
 
 /* Log some categories, or all of them, or no longer. */
-Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[]);
+LOCAL Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[]);
 
 /* Say a sentence, and return the status. */
-Status instance_say(const Instance *c, Status status, const char *format, ...);
+LOCAL Status instance_say(const Instance *c, Status status, const char *format, ...);
 
-Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop);
-Status instance_exit_initialization(Instance *c);
+LOCAL Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop);
+LOCAL Status instance_exit_initialization(Instance *c);
 
 /* Values */
-Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value);
-Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value);
-Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
-bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind);
-void instance_set(Instance *c, unsigned reference, double value);
-Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
-Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count, const int orders[],
+LOCAL Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value);
+LOCAL Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value);
+LOCAL Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
+LOCAL bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind);
+LOCAL void instance_set(Instance *c, unsigned reference, double value);
+LOCAL Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
+LOCAL Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count, const int orders[],
                               double values[]);
 
 /* The status of a call about `count` things of a kind that this FMU does not have. */
-Status instance_none(Instance *c, const char *function, size_t count);
+LOCAL Status instance_none(Instance *c, const char *function, size_t count);
 
-Status instance_step(Instance *c, double time, double step, const Watch *watch);
+LOCAL Status instance_step(Instance *c, double time, double step, const Watch *watch);
 
 /* Number of the state that a value reference is of; -1 where it is none. */
-int instance_state(unsigned reference);
+LOCAL int instance_state(unsigned reference);
 
 /* Model exchange */
 /* WARNING, and a sentence, where commands contradicted their accelerations. */
-Status instance_check_commands(Instance *c);
-void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);
-Status instance_set_time(Instance *c, const char *function, double time);
-Status instance_set_states(Instance *c, const char *function, const double x[], size_t count);
-Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count);
+LOCAL Status instance_check_commands(Instance *c);
+LOCAL void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);
+LOCAL Status instance_set_time(Instance *c, const char *function, double time);
+LOCAL Status instance_set_states(Instance *c, const char *function, const double x[], size_t count);
+LOCAL Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count);
 
 /* Derivatives of unknowns with respect to knowns, times a change of these, or the unknowns' weights times them. */
-Status instance_directional(Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count,
+LOCAL Status instance_directional(Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count,
                             const unsigned knowns[], size_t known_count, const double seed[], double result[]);
 
 /* Saved state */
-Status instance_save(Instance *c, void **state);
-Status instance_restore(Instance *c, const void *state);
-void instance_forget_saved(void **state);
-size_t instance_serialized_size(const void *state);
-Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size);
-Status instance_deserialize(Instance *c, const char *text, size_t size, void **state);
+LOCAL Status instance_save(Instance *c, void **state);
+LOCAL Status instance_restore(Instance *c, const void *state);
+LOCAL void instance_forget_saved(void **state);
+LOCAL size_t instance_serialized_size(const void *state);
+LOCAL Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size);
+LOCAL Status instance_deserialize(Instance *c, const char *text, size_t size, void **state);
 
 #endif

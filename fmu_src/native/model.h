@@ -4,6 +4,15 @@
 
 #include "sizes.h"
 
+/* In one file, all.c, everything but the functions of the standard is static, so that several FMUs link into one program. */
+#ifdef ALL_IN_ONE
+#define LOCAL static
+#define TABLE static
+#else
+#define LOCAL
+#define TABLE extern
+#endif
+
 /* C has no arrays of no elements: a mechanism may have no inputs and no modes */
 #define ROOM(count) ((count) > 0 ? (count) : 1)
 
@@ -47,30 +56,30 @@ typedef struct {
     const char *name, *unit;
 } FreedomName;
 
-extern const FreedomName freedoms[FREEDOMS];
-extern const Variable variables[VARIABLES];
-extern const int parameter_at[ROOM(PARAMETERS)], initial_at[2 * FREEDOMS], mode_at[ROOM(MODES)], input_at[ROOM(INPUTS)];
-extern const int state_at[STATES];
-extern const int tolerance_at, status_at, message_at;
-extern const Command commands[ROOM(COMMANDS)];
-extern const Least least[ROOM(BOUNDS)];
+TABLE const FreedomName freedoms[FREEDOMS];
+TABLE const Variable variables[VARIABLES];
+TABLE const int parameter_at[ROOM(PARAMETERS)], initial_at[2 * FREEDOMS], mode_at[ROOM(MODES)], input_at[ROOM(INPUTS)];
+TABLE const int state_at[STATES];
+TABLE const int tolerance_at, status_at, message_at;
+TABLE const Command commands[ROOM(COMMANDS)];
+TABLE const Least least[ROOM(BOUNDS)];
 
 /* The equations, as CasADi writes them. x: state, m: modes, u: inputs, p: constants with the energy at the start after them,
    d: of a change, g: of a gradient. */
 typedef int Equation(const double **arguments, double **results, int *iw, double *w, int memory);
 
-Equation equations_bounds;        /* parameters -> bounds */
-Equation equations_begin;         /* m, parameters, state as given, u -> p, x, scale */
-Equation equations_begin_forward; /* ..., dparameters, dstate, du -> dp, dx */
-Equation equations_begin_reverse; /* ..., gp, gx -> gparameters, gstate, gu */
-Equation equations_derivative;    /* x, m, u, p -> x' */
-Equation equations_outputs;       /* x, m, u, p -> y */
-Equation equations_clearance;     /* x, m, u, p -> clearance */
-Equation equations_jump;          /* x, m, u, p -> x */
-Equation equations_following;     /* x, m, u, p, derivative of the motion -> x' where the motion is that of a jump to u */
-Equation equations_jump_forward;  /* x, m, u, p, dx, du, dp -> dx */
-Equation equations_jump_reverse;  /* x, m, u, p, gx -> gx, gu, gp */
-Equation equations_forward;       /* x, m, u, p, dx, du, dp -> dy, dx', dclearance */
-Equation equations_reverse;       /* x, m, u, p, gy, gx', gclearance -> gx, gu, gp */
+LOCAL Equation equations_bounds;        /* parameters -> bounds */
+LOCAL Equation equations_begin;         /* m, parameters, state as given, u -> p, x, scale */
+LOCAL Equation equations_begin_forward; /* ..., dparameters, dstate, du -> dp, dx */
+LOCAL Equation equations_begin_reverse; /* ..., gp, gx -> gparameters, gstate, gu */
+LOCAL Equation equations_derivative;    /* x, m, u, p -> x' */
+LOCAL Equation equations_outputs;       /* x, m, u, p -> y */
+LOCAL Equation equations_clearance;     /* x, m, u, p -> clearance */
+LOCAL Equation equations_jump;          /* x, m, u, p -> x */
+LOCAL Equation equations_following;     /* x, m, u, p, derivative of the motion -> x' where the motion is that of a jump to u */
+LOCAL Equation equations_jump_forward;  /* x, m, u, p, dx, du, dp -> dx */
+LOCAL Equation equations_jump_reverse;  /* x, m, u, p, gx -> gx, gu, gp */
+LOCAL Equation equations_forward;       /* x, m, u, p, dx, du, dp -> dy, dx', dclearance */
+LOCAL Equation equations_reverse;       /* x, m, u, p, gy, gx', gclearance -> gx, gu, gp */
 
 #endif

@@ -48,46 +48,46 @@ typedef struct {
 } Watch;
 
 /* Put start values in the place of all that was given. */
-void plant_reset(Plant *a);
+LOCAL void plant_reset(Plant *a);
 
 /* Constants and state from what is given; on failure the reason, with the sentence. */
-Reason plant_begin(Plant *a, char sentence[SENTENCE]);
+LOCAL Reason plant_begin(Plant *a, char sentence[SENTENCE]);
 
 /* Go forward by a step under the inputs in force. A step that fails leaves all as it was. Where `early`, a step into the limit
    of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
-Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);
+LOCAL Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);
 
 /* Whether the links can be joined at a state, clear of the limit of assembly; if not, the sentence. */
-Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]);
+LOCAL Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]);
 
 /* Where the clearance is small: whether friction may jam the links there, and they are clear of the limit of assembly. */
-bool plant_jams(const Plant *a, const double x[STATES]);
+LOCAL bool plant_jams(const Plant *a, const double x[STATES]);
 
 /* The motion: the state with the commands applied, in co-simulation those that were set since the last step. */
-void plant_present(const Plant *a, double x[STATES]);
+LOCAL void plant_present(const Plant *a, double x[STATES]);
 
 /* Model exchange. A command is followed: the motion has it at every instant, while the state that a solver integrates carries the
    momenta on, which do not depend on the rate of the command. At an event the state becomes the motion. */
-bool plant_jump(Plant *a); /* an event: whether the state changed */
-bool plant_state_derivative(const Plant *a, double derivative[STATES]);
+LOCAL bool plant_jump(Plant *a); /* an event: whether the state changed */
+LOCAL bool plant_state_derivative(const Plant *a, double derivative[STATES]);
 
 /* All outputs anew; on failure the last good ones stay. */
-Reason plant_outputs(Plant *a, char sentence[SENTENCE]);
+LOCAL Reason plant_outputs(Plant *a, char sentence[SENTENCE]);
 /* Whether a command stayed the same since the last event while its acceleration was not zero; the sentence. */
-bool plant_contradicted(const Plant *a, char sentence[SENTENCE]);
-bool plant_derivative(const Plant *a, double derivative[STATES]); /* of the motion */
-double plant_margin(const Plant *a);
+LOCAL bool plant_contradicted(const Plant *a, char sentence[SENTENCE]);
+LOCAL bool plant_derivative(const Plant *a, double derivative[STATES]); /* of the motion */
+LOCAL double plant_margin(const Plant *a);
 
 /* Changes of all rows with those of what is given (by value reference) and of the state; `start`: at the start of a run, where
    state and constants follow from what is given, else a change of a command that is in force applies it. */
-void plant_forward(const Plant *a, bool start, const double given[VARIABLES], const double x[STATES], double rows[ROWS]);
+LOCAL void plant_forward(const Plant *a, bool start, const double given[VARIABLES], const double x[STATES], double rows[ROWS]);
 
 /* The gradient of a weighted sum of rows; `commanded` as the commands whose inputs it is asked for. */
-void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)],
+LOCAL void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)],
                    double given[VARIABLES], double x[STATES]);
 
 /* A number in words, with a decimal point where the host's locale has a comma. */
 typedef char Digits[32];
-const char *digits(Digits text, double value);
+LOCAL const char *digits(Digits text, double value);
 
 #endif

@@ -124,6 +124,7 @@ export class Response extends Search {
       lines.push(
         arcs.length > 0 ? `${speed} to avoid: none in this range.` : "No periodic motion was found.",
       );
+    lines.push("Motions that no branch leads to were not sought; the command linkwork resonance seeks them.");
     for (const { value, rising, before, after } of jumpsOf(arcs)) {
       const then = after.map((amplitude) => shown(amplitude, output)).join(" or ");
       lines.push(

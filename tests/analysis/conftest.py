@@ -13,7 +13,6 @@ from click.testing import CliRunner, Result
 from analysis import cli
 from analysis.mechanisms import MECHANISMS, register
 from analysis.studio import PAGE
-from benchmarks.studio import chromium
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
 
 if TYPE_CHECKING:
@@ -55,38 +54,6 @@ def own_linkages() -> Iterator[None]:
     yield
     MECHANISMS.clear()
     MECHANISMS.update(before)
-
-
-@pytest.fixture(scope="session")
-def launched() -> Iterator[Callable[..., Browser]]:
-    """Starts the system's Chromium, with these arguments besides."""
-    path = chromium()
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        path = None
-    if path is None:
-        pytest.skip(
-            "there is no Chromium here, or Playwright is not installed: apt install chromium, pip install playwright"
-        )
-    with sync_playwright() as playwright:
-        made: list[Any] = []
-
-        def launch(*arguments: str) -> Browser:
-            made.append(playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *arguments]))
-            return made[-1]
-
-        yield launch
-        for one in made:
-            one.close()
-
-
-@pytest.fixture(scope="module")
-def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
-    """Chromium."""
-    made = launched()
-    yield made
-    made.close()
 
 
 @pytest.fixture

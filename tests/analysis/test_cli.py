@@ -358,6 +358,7 @@ def test_resonance_says_what_moves_it(linkwork, tmp_path):
         "--no-plot", "--sensitivity", "--places", "0",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
+    assert "not sought: --places" in result.output
     # half a percent for a percent of the stiffness: w^2 = k / m; an amplitude that the damper alone limits
     assert re.search(r"maximum │ +586\.1\d │ slider\.stiffness \+0\.49\d* +│ +17\.153 ", result.output), result.output
     path = tmp_path / "out" / "rig-2-spring-c-resonance-sensitivity.csv"

@@ -171,6 +171,18 @@ def test_a_start_ends_in_a_motion_of_four_turns() -> None:
     assert np.abs(last[1:4] - last[0]).min() > 1e-3
 
 
+def test_speeds_to_avoid_know_a_motion_that_no_branch_leads_to_or_say_that_none_was_sought() -> None:
+    """At 950 rpm a stable motion of 14.5 cm lies beside one of 1.28 cm, and no branch from an end of the range leads to it."""
+    damped, rpm = replace(LIGHT, slider_damping=12.0), RAD_S_PER_RPM
+    assert max(orbit.amplitude for orbit in find_orbits(damped, speed=950.0 * rpm).stable) > 0.14
+    response = frequency_response(damped, 900.0 * rpm, 1200.0 * rpm, doublings=0)
+    whole = with_isolas(response, places=2)
+    for found, known in ((response, False), (whole, True)):
+        assert known == any(a.low < 950.0 * rpm < a.high for a in found.speeds_to_avoid)
+        assert known != ("not sought" in repr(found))
+    assert "not sought" in plot(response).axes[0].get_legend().get_title().get_text()
+
+
 def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_they_are_stable() -> None:
     """The range is 12 rpm; the branch is begun from an unstable motion some 80 rpm below it."""
     low, high = 1200.0 * RAD_S_PER_RPM, 1400.0 * RAD_S_PER_RPM

@@ -32,7 +32,7 @@ NATIVE = [f"{model}-{kind}" for model in FMUS for kind in ("native", "native-fmi
 #: writes, waits, knows the time or ends the process.
 C_LIBRARY = """
     atan2 cos floor log10 nextafter pow sin sqrt tanh calloc free malloc bcmp memchr memcmp memcpy memmove memset
-    strchr strcmp strcpy strlen strstr snprintf vsnprintf
+    feholdexcept fesetenv strchr strcmp strcpy strlen strstr snprintf vsnprintf
 """
 #: What compilers put in the place of these on macOS, and its loader.
 MACHINE = "__sincos_stret __bzero bzero dyld_stub_binder"

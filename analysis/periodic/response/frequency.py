@@ -131,6 +131,10 @@ def natural_frequency(parameters: Parameters) -> float:
 STRAYED = 4.0
 
 
+#: What ranges to avoid do not know if no motions were sought beside the branches.
+UNSOUGHT = "motions that no branch leads to were not sought"
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Response(Shown):
     """The periodic motions over a range of one parameter.
@@ -144,16 +148,26 @@ class Response(Shown):
         The range asked for.
     problems : tuple of str
         What could not be followed, a sentence each with the last good parameter; empty if all was followed.
+    sought : int
+        Values of the parameter at which all motions were sought. If it is 0 there may be stable motions that no branch leads
+        to, and `speeds_to_avoid` does not know them: see `with_isolas`.
     """
 
     branches: tuple[Branch, ...]
     low: float
     high: float
     problems: tuple[str, ...]
+    sought: int = 0
 
     def __repr__(self) -> str:
         parts = f"{format_count(len(self.branches), 'branch')}, {format_count(len(self.problems), 'problem')}"
-        return f"<Response: {describe(self.branches)}; {parts}>"
+        caution = f"; {self.caution}: with_isolas" if self.caution else ""
+        return f"<Response: {describe(self.branches)}; {parts}{caution}>"
+
+    @property
+    def caution(self) -> str:
+        """What `speeds_to_avoid` does not know, in words; empty if motions were sought beside the branches."""
+        return "" if self.sought else UNSOUGHT
 
     @property
     def family(self) -> Family:
@@ -162,7 +176,10 @@ class Response(Shown):
 
     @property
     def speeds_to_avoid(self) -> tuple[Avoided, ...]:
-        """Ranges of the speed, or of the parameter that varies, that a machine should avoid, each with its reason."""
+        """Ranges of the speed, or of the parameter that varies, that a machine should avoid, each with its reason.
+
+        They follow from the branches. A stable motion that no branch leads to is among them only after `with_isolas`.
+        """
         return ranges_to_avoid(self.branches, self.low, self.high)
 
     @property
@@ -250,7 +267,8 @@ def frequency_response(
     Returns
     -------
     Response
-        ``problems`` has what could not be followed: there are no silent gaps.
+        ``problems`` has what could not be followed: there are no silent gaps. Motions that no branch leads to are not sought,
+        which would take one to ten times as long: see `with_isolas`.
 
     Raises
     ------
@@ -496,7 +514,9 @@ def with_isolas(
             show(float(number))
             if interrupted:
                 break
-    result = replace(response, branches=tuple(branches), problems=tuple(problems))
+    result = replace(
+        response, branches=tuple(branches), problems=tuple(problems), sought=response.sought + number // turns
+    )
     if interrupted:
         raise ResponseInterrupted(result)
     return result
