@@ -7,12 +7,12 @@ from . import slider_crank as slider_crank
 from . import synthesis as synthesis
 from . import tuning as tuning
 from . import youssef as youssef
-from .linkages import linkage as linkage
 from .linear import design_lqr as design_lqr
 from .linear import design_pi as design_pi
 from .linear import design_pid as design_pid
 from .linear import find_equilibrium as find_equilibrium
 from .linear import linearise as linearise
+from .linkages import linkage as linkage
 from .mechanisms import PUBLISHED as PUBLISHED
 from .mechanisms import FiveBarParameters as FiveBarParameters
 from .mechanisms import SliderCrankParameters as SliderCrankParameters

@@ -162,9 +162,8 @@ def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
     """
     if not _from_drawing(parameters):
         raise DrawingError(type(parameters), "picture")
-    from .scheme import draw_run
-
-    return draw_run(parameters, axis, run)
+    caption: str = import_module(".scheme", __package__).draw_run(parameters, axis, run)
+    return caption
 
 
 def _from_drawing(parameters: object) -> bool:

@@ -21,7 +21,6 @@ from linkwork.mechanism import Mechanism
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import random_linkage
 
-
 pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
