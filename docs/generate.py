@@ -232,6 +232,19 @@ def closed_form_pictures() -> Iterator[Picture]:
         yield name, plot(guidance(case.task, count), title=case.title), 70
 
 
+def linkage_pictures() -> Iterator[Picture]:
+    """Draw the picture of docs/linkages.md."""
+    import tempfile
+
+    from analysis.figures import plot
+    from analysis.linkages import TEXT, load_linkage
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "four-bar.toml"
+        path.write_text(TEXT.format(file=path.name), encoding="utf-8")
+        yield "four-bar", plot(load_linkage(path)), 90
+
+
 def race_pictures() -> Iterator[Picture]:
     """Draw the picture of docs/synthesis-race.md."""
     from benchmarks.race import picture, read
@@ -276,6 +289,7 @@ def main(arguments: list[str]) -> int:
             study_pictures,
             hand_drawn_pictures,
             closed_form_pictures,
+            linkage_pictures,
             race_pictures,
             slider_crank_pictures,
         ):

@@ -200,6 +200,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
         ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
         ("workers.md", 1, 1, ()),
+        ("linkages.md", 6, 1, ("out/four-bar.png", "out/MyLinkage-native.fmu")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
     ],
 )
@@ -217,7 +218,7 @@ def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_pat
 def test_pictures_of_the_documentation_are_small():
     pictures = [
         picture
-        for name in ("hand-drawn", "slider-crank", "four-poses", "five-poses")
+        for name in ("hand-drawn", "slider-crank", "four-poses", "five-poses", "four-bar")
         for picture in (ROOT / "docs").glob(f"{name}*.png")
     ]
     assert pictures
