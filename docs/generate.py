@@ -159,7 +159,7 @@ Picture = tuple[str, "Figure", int]
 
 
 def study_pictures() -> Iterator[Picture]:
-    """Draw the still of README.md, and the pictures of rig-2.md and coexisting-motions.md."""
+    """Draw the pictures of rig-2.md and coexisting-motions.md."""
     from analysis import figures as draw
     from analysis.periodic import frequency_response, with_isolas
     from analysis.studies import load
@@ -168,7 +168,6 @@ def study_pictures() -> Iterator[Picture]:
     from linkwork.five_bar.published import SETS
 
     for name, number in (
-        ("linkage", "linkage"),
         ("rig-2-approximations", "8.19"),
         ("rig-2-harmonics", "8.21"),
         ("rig-2-forces", "rig-2-forces"),
@@ -230,7 +229,20 @@ def closed_form_pictures() -> Iterator[Picture]:
 
     for name, count in (("five-poses", 6), ("four-poses", 1)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        yield name, plot(guidance(case.task, count), title=case.title), 90
+        yield name, plot(guidance(case.task, count), title=case.title), 70
+
+
+def linkage_pictures() -> Iterator[Picture]:
+    """Draw the picture of docs/linkages.md."""
+    import tempfile
+
+    from analysis.figures import plot
+    from analysis.linkages import TEXT, load_linkage
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "four-bar.toml"
+        path.write_text(TEXT.format(file=path.name), encoding="utf-8")
+        yield "four-bar", plot(load_linkage(path)), 90
 
 
 def race_pictures() -> Iterator[Picture]:
@@ -277,6 +289,7 @@ def main(arguments: list[str]) -> int:
             study_pictures,
             hand_drawn_pictures,
             closed_form_pictures,
+            linkage_pictures,
             race_pictures,
             slider_crank_pictures,
         ):

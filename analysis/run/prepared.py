@@ -17,6 +17,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.workers import interruptible
 from .angles import WholeTurns
+from .cautions import PATIENCE, SHARE, energy_balance, fastest_decay, stiffness
 from .equations import OUTPUTS, machine
 from .events import Event, RunInterrupted, shown
 from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
@@ -142,9 +143,10 @@ class Run:
         carry, x, u = state.carries[0], state.x[0], state.u[0]
         status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
-        with interruptible() as interrupted, shown(progress, times[-1] - times[0]) as show:
+        stiff, expected, span = "", 0.0, times[-1] - times[0]
+        with interruptible() as interrupted, shown(progress, span) as show:
             try:
-                while status[0] == k.RUNNING and carry["steps"] < most and not interrupted:
+                while status[0] == k.RUNNING and carry["steps"] < most and expected < SHARE * most and not interrupted:
                     entered = clock.perf_counter()
                     compiled.run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
@@ -152,7 +154,10 @@ class Run:
                     found[:, 2:] += turns.taken
                     occurrences += found.tolist()
                     carry["found"] = 0
-                    show(carry["begin"] + carry["elapsed"] - times[0])
+                    passed, steps = float(carry["begin"] + carry["elapsed"] - times[0]), float(carry["steps"])
+                    show(passed)
+                    stiff = stiffness(lambda: fastest_decay(self.mechanism, x, self.applied(u), self.p), steps, passed)
+                    expected = steps * span / passed if stiff and steps >= PATIENCE else 0.0
                     if status[0] == k.RUNNING:
                         turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
@@ -166,9 +171,14 @@ class Run:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit)
+        if code and expected:
+            message = f"stopped at t = {t:.9g} s, as about {expected:.2g} steps would be needed"
+        values = turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces))
+        balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
+        message = "; ".join(filter(None, (message, stiff, balance)))
         trajectory = Trajectory(
             time=times,
-            values=turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces)),
+            values=values,
             status=code,
             message=message,
             events=tuple(
