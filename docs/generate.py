@@ -119,6 +119,13 @@ def probe(of: str, page: str) -> str:
     )
 
 
+def accuracy(of: str, page: str) -> str:
+    """Return the table of work and precision of a mechanism's FMUs."""
+    from analysis.export.accuracy import HEADINGS, known, texts
+
+    return _markdown(f"| {' | '.join(HEADINGS)} |", (tuple(texts(row)) for row in known(MECHANISMS[of])))
+
+
 def race(of: str, page: str) -> str:
     """Return a table of the searches' results in docs/race.csv."""
     from benchmarks.race import markdown, read
@@ -138,7 +145,7 @@ CHAPTERS = (*"345678", "R", "ours")
 #: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
-    "crossing": crossing,
+    "crossing": crossing, "accuracy": accuracy,
 }  # fmt: skip
 
 
