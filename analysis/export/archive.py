@@ -59,7 +59,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
             for name in sorted(entries, key=lambda entry: (entry != "modelDescription.xml", entry)):
                 info = zipfile.ZipInfo(name, EPOCH)
                 info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = 0o644 << 16
+                info.external_attr, info.create_system = 0o644 << 16, 3  # those of Unix, on Windows too
                 archive.writestr(info, entries[name])
         problems = validate_fmu(str(part))
         if problems:
