@@ -50,6 +50,7 @@ from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel
 from .fmu import FmuRun as FmuRun
 from .fmu import offered as offered
+from .fmu import read_description as read_description
 from .fmu import unpacking_folder as unpacking_folder
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs
