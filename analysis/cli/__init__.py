@@ -40,6 +40,7 @@ COMMANDS = {
     "studio": ("studio", "Open a page on which a mechanism moves and can be dragged."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
     "tune": ("tuning", "Change parameters least so that a range of speeds is clear."),
+    "verify": ("verify", "Run the experiments that an FMU carries, and compare."),
 }
 
 

@@ -27,6 +27,7 @@ from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals
 from .equations_c import generated
+from .experiments import experiments, manifest
 from .interface import interface
 
 
@@ -130,6 +131,7 @@ def build_native(
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
     entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES)
+    entries |= experiments(mechanism) | manifest()
     return write(entries, dest / kind.file_name(mechanism))
 
 

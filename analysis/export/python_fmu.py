@@ -25,6 +25,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import check
 from .archive import SOURCES, BuildError, documentation, write
 from .description import PYTHON, description, token
+from .experiments import experiments, manifest
 
 #: The oldest Python that what travels in the FMUs runs on.
 OLDEST = (3, 10)
@@ -80,6 +81,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     entries["modelDescription.xml"] = described
     made = f"FMI 2.0 co-simulation, made with {PYTHON.tool}"
     entries |= documentation(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
+    entries |= experiments(mechanism) | manifest()
     return write(entries, dest / PYTHON.file_name(mechanism))
 
 

@@ -19,11 +19,13 @@ from .case_files import signal_kinds as signal_kinds
 from .checks import CASES as CASES
 from .checks import CHECKED as CHECKED
 from .checks import check as check
+from .checks import standard_cases as standard_cases
 from .cosimulation import INTERFACES as INTERFACES
 from .cosimulation import Comparison as Comparison
 from .cosimulation import OutputDifference as OutputDifference
 from .cosimulation import compare as compare
 from .cosimulation import cosimulate as cosimulate
+from .cosimulation import held_inputs as held_inputs
 from .ensemble import Ensemble as Ensemble
 from .ensemble import EnsembleBroken as EnsembleBroken
 from .ensemble import EnsembleInterrupted as EnsembleInterrupted
@@ -38,6 +40,12 @@ from .events import Event as Event
 from .events import RunInterrupted as RunInterrupted
 from .events import heard_by as heard_by
 from .events import shown as shown
+from .experiments import ALLOWED as ALLOWED
+from .experiments import EXPERIMENTS as EXPERIMENTS
+from .experiments import MANIFEST as MANIFEST
+from .experiments import STANDARD as STANDARD
+from .experiments import ExperimentError as ExperimentError
+from .experiments import verify as verify
 from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel
 from .fmu import FmuRun as FmuRun

@@ -1,141 +1,53 @@
-"""The standard cases on which the FMU is held against the in-process solver."""
+"""The standard cases on which the FMU is held against the in-process solver: each mechanism brings its own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from math import pi
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from linkwork.errors import InputError
-from linkwork.five_bar.published import TABLE_3_1
-from linkwork.slider_crank.published import OFFSET_CASE
+from linkwork.mechanism import Mechanism
 
-from ..units import RAD_S_PER_RPM
+from ..mechanisms import MECHANISMS
 from .case import Case, published_case
+from .case_files import case_from
 from .cosimulation import Comparison, compare, cosimulate
-from .inputs import Inputs
-from .signals import Harmonics, InductionMotor, TorsionBar, ramp, steps, table
 from .simulation import simulate
 from .trajectory import Trajectory
-
-_SPEED = 14.0 * pi  # 420 rpm
 
 #: The interfaces that a run in process can be held against.
 CHECKED = ("co-simulation", "model-exchange")
 
 
-def _case(title: str, inputs: Inputs, **changes: Any) -> Case:
-    return Case(
-        title=title, parameters=replace(TABLE_3_1, **changes), inputs=inputs, stop_time=0.4, step=1e-3, tolerance=1e-9
-    )
+@cache
+def standard_cases(mechanism: Mechanism) -> Mapping[str, Case]:
+    """Return the standard cases of a mechanism by name; without cases of its own, the run of its first published set."""
+    if not mechanism.cases:
+        name = next(iter(mechanism.published))
+        return {name: published_case(name)}
+    return {name: case_from(tables, folder=Path()) for name, tables in mechanism.cases.items()}
 
 
-def _slider_crank(title: str, inputs: Inputs, **changes: Any) -> Case:
-    parameters, initial = OFFSET_CASE
-    return Case(
-        title=f"slider-crank: {title}",
-        parameters=replace(parameters, **changes),
-        initial=initial,
-        inputs=inputs,
-        stop_time=1.2,
-        step=4e-3,
-        tolerance=1e-9,
-    )
+class _Cases(Mapping[str, Case]):
+    """The standard cases of all known mechanisms."""
+
+    def _all(self) -> dict[str, Case]:
+        return {name: case for m in MECHANISMS.values() for name, case in standard_cases(m).items()}
+
+    def __getitem__(self, name: str) -> Case:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
 
 
-_RPM_50 = 50.0 * RAD_S_PER_RPM
-_GENERAL = {
-    "guide_twist": 4.0,
-    "crank_cog_y": 0.02,
-    "crank_cog_z": -0.05,
-    "crank_product_xz": 0.02,
-    "crank_product_yz": -0.01,
-    "slider_cog_x": 0.02,
-    "slider_cog_z": 0.03,
-    "gravity_y": -9.81,
-    "gravity_z": 1.0,
-}
-
-#: By name: every way of driving and loading a mechanism, the five-bar's on Table 3.1, the slider-crank's on Rahman's case
-#: a4 = 10 in, S1 = 3.5 in.
-CASES: Mapping[str, Case] = MappingProxyType(
-    {
-        "table-3.1": published_case("table-3.1"),
-        "constant-speed": _case("constant speed of 300 rpm", Inputs(speed=10.0 * pi)),
-        "speed-ramp": _case("ramp of the speed from 100 to 420 rpm", Inputs(speed=ramp(10.0, _SPEED, 0.05, 0.3))),
-        "speed-jump": _case("jumps of the speed", Inputs(speed=steps([0.0, 0.1, 0.25], [20.0, 40.0, 30.0]))),
-        "torque-switched-off": _case(
-            "torsion bar of 1e8 dyn.cm, released at 1 rad", Inputs(torque=TorsionBar(torque=10.0))
-        ),
-        "induction-motor": _case(
-            "run-up by an induction motor",
-            Inputs(torque=InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0)),
-        ),
-        "control-force": _case(
-            "harmonic control force on the slider", Inputs(speed=_SPEED, force=Harmonics(1.0, [5.0], [30.0], [0.3]))
-        ),
-        "load": _case(
-            "load at the coupler point",
-            Inputs(speed=_SPEED, load_x=3.0, load_y=table([0.0, 0.2, 0.4], [0.0, 5.0, -2.0], "cubic")),
-            coupler_point_distance=0.1,
-            coupler_point_angle=0.4,
-        ),
-        "inclined-guide": _case(
-            "guide and ground inclined", Inputs(speed=_SPEED), slider_guide_angle=0.4, ground_inclination=0.3
-        ),
-        "other-assembly": _case("the other assembly", Inputs(speed=_SPEED), assembly_branch=-1),
-        "coulomb-friction": _case(
-            "Coulomb friction of 5 N in the guide", Inputs(speed=_SPEED), slider_coulomb_friction=5.0
-        ),
-        "contact-friction": _case(
-            "friction in guide and pins by their forces",
-            Inputs(speed=_SPEED),
-            slider_friction_coefficient=0.2,
-            pin_A_friction_radius=1e-3,
-            pin_B_friction_radius=1e-3,
-            pin_C_friction_radius=1e-3,
-            pin_D_friction_radius=1e-3,
-        ),
-        "slider-crank-constant-speed": _slider_crank("50 rpm, the shift held", Inputs(speed=_RPM_50)),
-        "slider-crank-torque": _slider_crank(
-            "a torque of 10 N.m against a load", Inputs(torque=10.0, load=table([0.0, 1.2], [0.0, -20.0]))
-        ),
-        "slider-crank-shifted": _slider_crank(
-            "ramp of the speed, the shift to and fro",
-            Inputs(speed=ramp(2.0, 6.0, 0.2, 0.8), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0])),
-        ),
-        "slider-crank-jumps": _slider_crank(
-            "jumps of both speeds",
-            Inputs(speed=steps([0.0, 0.4], [5.0, 3.0]), shift_speed=steps([0.0, 0.6], [0.1, -0.1])),
-        ),
-        "slider-crank-free-shift": _slider_crank(
-            "both freedoms free, spring and damper on the shift",
-            Inputs(torque=5.0, axial_force=Harmonics(0.0, [20.0], [6.0], [0.0])),
-            shift_stiffness=500.0,
-            shift_damping=20.0,
-        ),
-        "slider-crank-groove": _slider_crank(
-            "a groove makes the shift",
-            Inputs(torque=5.0, groove=True),
-            groove_amplitude=0.1,
-            groove_ratio=2.0,
-        ),
-        "slider-crank-general": _slider_crank(
-            "general twist and masses, springs, dampers, friction, gravity, the other assembly",
-            Inputs(speed=_RPM_50, axial_force=3.0),
-            **_GENERAL,
-            shift_stiffness=800.0,
-            slider_stiffness=200.0,
-            slider_spring_free_position=-1.0,
-            slider_damping=15.0,
-            slider_coulomb_friction=2.0,
-            assembly_branch=-1,
-        ),
-    }
-)
+#: By name: every way of driving and loading a mechanism.
+CASES: Mapping[str, Case] = _Cases()
 
 
 def check(

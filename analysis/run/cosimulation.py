@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
@@ -20,6 +20,7 @@ from ..mechanisms import InitialState, Parameters, output_units, wrapping_output
 from ..numerics.workers import interruptible
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
+from .case import Case
 from .events import RunInterrupted, shown
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs
@@ -124,6 +125,21 @@ def cosimulate(
     if interrupted:
         raise RunInterrupted(trajectory)
     return trajectory
+
+
+def held_inputs(case: Case, steps: int) -> Callable[[int, Sequence[float] | None], dict[str, float]]:
+    """Return the function that samples the inputs of a case for co-simulation in equal steps.
+
+    It takes the number of a step and the outputs at its start, None at the start of the run, and must be called step by step.
+    """
+    times = np.linspace(0.0, case.stop_time, steps + 1)
+    settings = Settings(times=times, hold=float(times[1]), tolerance=case.tolerance, max_steps=1)
+    march = _Stepwise(Run(case.parameters, case.inputs, case.initial, settings), False)
+
+    def inputs(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
+        return march.inputs(number, march.start if outputs is None else march.state(list(outputs)))
+
+    return inputs
 
 
 class _Stepwise:

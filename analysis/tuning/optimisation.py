@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from linkwork.errors import LinkworkError
 
 from ..numerics import symbolic
-from ..periodic import Crossing, SpecialPoint
+from ..periodic import Crossing, SpecialPoint, ending
 from ..run import shown
 from .conditions import (
     Across,
@@ -173,8 +173,9 @@ _ROUNDS, _WAYS = 12, 8
 #: Value of a condition that is far from being active.
 _FAR = 0.05
 #: Changes spread over their bounds that are tried where no way meets the wish, a power of two; and halvings of the way from the
-#: present values to one of them that meets it.
-_SPREAD, _BISECTIONS = 4, 6
+#: present values to one of them that meets it. Between positive bounds of more than
+#: this ratio they are spread evenly in the logarithm.
+_SPREAD, _BISECTIONS, _WIDE = 16, 6, 10.0
 #: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
 _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
@@ -304,7 +305,7 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
     """
     wish = search.wish
     low, high = wish.scaled(wish.low), wish.scaled(wish.high)
-    spread = low + (high - low) * qmc.Sobol(len(low), rng=0).random(_SPREAD)
+    spread = wish.scaled(_spread(wish.low, wish.high))
     for x in sorted([low, high, *spread], key=lambda x: float(objective(wish, x))):
         if _try_changes(search, x)[0]:
             break
@@ -319,6 +320,14 @@ def _survey_near_solution(search: _Search, first: Survey) -> Survey | None:
         else:
             dirty, found = middle, there or found
     return found
+
+
+def _spread(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return values spread over their bounds, shape (m, k)."""
+    share = qmc.Sobol(len(low), rng=0).random(_SPREAD)
+    wide = (low > 0.0) & (high > _WIDE * low)
+    base, ratio = np.where(wide, low, 1.0), np.where(wide, high / np.where(wide, low, 1.0), 1.0)
+    return np.asarray(np.where(wide, base * ratio**share, low + (high - low) * share))
 
 
 def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
@@ -340,7 +349,10 @@ def _try_changes(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
 def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
     wish = search.wish
     largest, level, count = charted(after)
-    problems = list(after.response.problems)
+    low, high = (f(*ends) for f, ends in zip((min, max), zip(wish.span, wish.without_resonance)))
+    # a branch that is lost beside the range leaves nothing open in it
+    beside = {ending(b) for b in after.response.branches if not any(low <= b.parameter[end] <= high for end in (0, -1))}
+    problems = [sentence for sentence in after.response.problems if sentence not in beside]
     if wish.judged and not largest <= wish.radius + MARGINAL and all(r.excess == 0.0 for r in readings(after).values()):
         problems.append(f"a chart has a multiplier of {largest:.6g}, which the response does not have")
     return Tuned(

@@ -218,8 +218,8 @@ class Tuned(Shown):
     def missed(self) -> tuple[str, ...]:
         """Sentences about requirements that are missed, and about failures of the verification."""
         return (
-            *(f"{r.name} cannot be met: {r.after.missed}" for r in self.requirements if not r.met),
-            *self.verification.problems,
+            *(f"{r.name} is not met: {r.after.missed}" for r in self.requirements if not r.met),
+            *(f"not verified: {sentence}" for sentence in self.verification.problems),
         )
 
     def tables(self) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from math import degrees
@@ -283,6 +283,8 @@ class Mechanism:
         Those whose masses a section can give.
     drawing : Drawing or None
         How it is drawn; None where there is no picture of it.
+    cases : mapping
+        Standard cases by name, in the tables of a case file: with them its FMUs are checked. None are needed.
     """
 
     name: str
@@ -305,6 +307,7 @@ class Mechanism:
     switch: str = ""
     links: tuple[Link, ...] = ()
     drawing: Drawing | None = None
+    cases: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __reduce__(self) -> Any:
         # by its package: a copy would be another mechanism

@@ -35,7 +35,7 @@ from analysis.linear import (
     settled_motion,
 )
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK, MechanismError, check, register
-from analysis.run import InductionMotor, expressions, simulate_many
+from analysis.run import CASES, InductionMotor, expressions, simulate_many, standard_cases
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.mechanism import Mechanism
@@ -183,6 +183,13 @@ def test_free_rotor_hangs_and_swings_with_the_cart() -> None:
     # held where it is, the rotor takes the moment of its weight
     held = find_equilibrium(published.parameters, held={"rotor.angle": 0.4})
     assert held.holding["rotor.angle"] == pytest.approx(p.weight * cos(0.4))
+
+
+def test_a_mechanism_without_cases_is_checked_by_its_published_set() -> None:
+    assert not PENDULUM.cases
+    assert list(standard_cases(PENDULUM)) == ["pendulum-demo"]
+    assert standard_cases(PENDULUM)["pendulum-demo"].parameters == demo(PENDULUM).parameters
+    assert {"pendulum-demo", *FIVE_BAR.cases, *SLIDER_CRANK.cases} < {*CASES}
 
 
 def test_pendulum_swings_as_by_hand() -> None:

@@ -6,7 +6,7 @@ from math import pi
 
 from .. import friction
 from ..mechanism import Channel, Equations, Freedom, Link, Mechanism, Mode
-from . import assembly, drawing, dynamics, kinematics, published, variables
+from . import assembly, cases, drawing, dynamics, kinematics, published, variables
 from .parameters import FiveBarParameters, InitialState
 
 MECHANISM = Mechanism(
@@ -74,5 +74,6 @@ MECHANISM = Mechanism(
         for name in ("crank", "coupler", "rocker")
     ),
     drawing=drawing.DRAWING,
+    cases=cases.CASES,
     switch="rough",
 )

@@ -6,7 +6,7 @@ from math import pi
 
 from .. import friction
 from ..mechanism import Channel, Equations, Freedom, Link, Mechanism, Mode
-from . import assembly, drawing, dynamics, kinematics, published, variables, vectors
+from . import assembly, cases, drawing, dynamics, kinematics, published, variables, vectors
 from .parameters import InitialState, SliderCrankParameters
 
 MECHANISM = Mechanism(
@@ -81,4 +81,5 @@ MECHANISM = Mechanism(
         Link("rod", "rod.length", "rod.mass", "rod.inertia", ("rod.cog_distance",)),
     ),
     drawing=drawing.DRAWING,
+    cases=cases.CASES,
 )

@@ -1,0 +1,58 @@
+"""The command that verifies an FMU by what it carries."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from .common import CHECK_FAILED, console, handled, print_error, show_table, tolerance_option
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
+@tolerance_option(
+    help="Greatest relative difference; by default what the FMU states, or 100 times the solver's tolerance."
+)
+@handled
+def verify(fmu: str, tolerance: float | None) -> None:
+    """Run the experiments that an FMU of any make carries (FMI-LS-REF), and compare with its reference results.
+
+    The largest difference of each experiment is shown, relative to the variable's scale. The exit code is 4 if one is too
+    large.
+
+    \b
+    Examples:
+      linkwork verify build/FiveBarSlider-native.fmu
+      linkwork verify other.fmu --tolerance 1e-4
+    """
+    from ..run import verify as verify_fmu
+
+    rows, failed, interface = [], [], ""
+    for outcome in verify_fmu(fmu, allowed=tolerance):
+        interface = outcome.interface
+        if not outcome.passed:
+            failed.append(outcome)
+        beyond = [d for d in outcome.deviations if d.relative > outcome.allowed] or list(outcome.deviations[:1])
+        cells = [
+            (d.name, f"{d.time:.6g}", f"{d.value:.7g}", f"{d.reference:.7g} {d.unit}", f"{d.relative:.1e}")
+            for d in beyond
+        ] or [("", "", "", "", "")]
+        verdict = "pass" if outcome.passed else "FAIL"
+        rows += [(outcome.experiment, *cell, f"{outcome.allowed:.0e}", verdict) for cell in cells[:5]]
+    show_table(
+        f"{fmu}, {interface}",
+        ("experiment", "variable", "t in s", "value", "reference", "relative", "allowed", "verdict"),
+        rows,
+        words=("experiment", "variable", "verdict"),
+        unwrapped=("experiment", "variable", "reference", "verdict"),
+        styles=[None if row[-1] == "pass" else "red" for row in rows],
+    )
+    for outcome in failed:
+        if outcome.message:
+            print_error(f"{outcome.experiment}: {outcome.message}", "red")
+    if failed:
+        print_error(f"verify failed: {', '.join(outcome.experiment for outcome in failed)}", "red")
+        sys.exit(CHECK_FAILED)
+    count = len({row[0] for row in rows})
+    console.print(f"{count} of {count} experiments pass", style="green", highlight=False)

@@ -1,0 +1,142 @@
+"""Experiments in every FMU: the mechanism's standard cases, with reference results that the plant in Python computes.
+
+The files are those of the layered standard FMI-LS-REF; `analysis.run.experiments` reads and runs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from functools import cache
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import fmi_name
+from linkwork.plant import Plant
+
+from ..mechanisms import MECHANISMS
+from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, held_inputs, standard_cases
+from .compatibility import table
+
+#: Communication steps of an experiment, and rows of its reference.
+STEPS, ROWS = 100, 10
+#: Tolerances of the reference and of the experiment; the greatest relative difference between them.
+REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
+_LAYERED = "http://fmi-standard.org/fmi-ls-manifest"
+_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+_DESCRIPTION = "Layered Standard providing information on related files included in an FMU."
+#: Of a file of experiments: its place below the folder of the standard, and its type.
+_EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
+
+
+@cache
+def experiments(mechanism: Mechanism) -> dict[str, bytes]:
+    """Return the files of a mechanism's experiments, by their places in the archive.
+
+    An unregistered mechanism, or one without cases, has its default experiment alone.
+    """
+    cases = standard_cases(mechanism) if mechanism.cases and mechanism.name in MECHANISMS else {}
+    root = Element("Experiments", {"name": mechanism.fmu, "description": "Standard cases of Linkwork"})
+    files: dict[str, bytes] = {}
+
+    def add(name: str, title: str, values: Mapping[str, Any], end: float, inputs: _Inputs) -> None:
+        start, step = mechanism.experiment[0], (end - mechanism.experiment[0]) / STEPS
+        node = SubElement(root, "Experiment", {"name": name, "description": title, "tolerance": repr(TOLERANCE)})
+        times = {"startTime": start, "stopTime": end, "stepSize": step}
+        SubElement(node, "TransientSimulation", {key: repr(value) for key, value in times.items()})
+        starts = {v.name: v.start for v in mechanism.variables if v.causality == "parameter"}
+        changed = {key: value for key, value in values.items() if key in starts and value != starts[key]}
+        stimuli, reference = _reference(mechanism, values, [start + n * step for n in range(STEPS + 1)], inputs)
+        if changed:
+            files[f"{name}.ssv"] = _parameter_set(name, changed)
+            SubElement(node, "Parameters", {"source": f"{name}.ssv"})
+        constant = all(row[1:] == stimuli[0][1:] for row in stimuli)
+        rows = [stimuli[0], stimuli[-1]] if constant else stimuli
+        files[f"{name}-in.csv"] = table(["time", *mechanism.input_names], rows).encode()
+        results = [mechanism.output_names[place] for place in _results(mechanism)]
+        files[f"{name}-ref.csv"] = table(["time", *results], reference).encode()
+        SubElement(node, "Stimuli", {"source": f"{name}-in.csv"})
+        SubElement(node, "References", {"source": f"{name}-ref.csv"})
+        notes = SubElement(node, "Annotations")
+        SubElement(notes, "Annotation", {"type": ALLOWED}).text = repr(DIFFERENCE)
+
+    for name, case in cases.items():
+        add(name, case.title, _values(mechanism, case), case.stop_time, held_inputs(case, STEPS))
+    if not cases:
+        starts = {v.name: v.start for v in mechanism.variables}
+        constant = {name: float(starts[name]) for name in mechanism.input_names}
+        add("default", "default experiment", starts, mechanism.experiment[1], lambda number, outputs: constant)
+    files[_EXPERIMENTS[0]] = _xml(root)
+    return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()}
+
+
+def manifest(related: Iterable[tuple[str, str, str, str]] = ()) -> dict[str, bytes]:
+    """Return the manifest of FMI-LS-REF by its place: the experiments, and other files by source, type, role, description."""
+    root = Element(
+        "fmiReferences",
+        {
+            "xmlns:fmi-ls": _LAYERED,
+            "fmi-ls:fmi-ls-name": STANDARD,
+            "fmi-ls:fmi-ls-version": "1.0.0-alpha.1",
+            "fmi-ls:fmi-ls-description": _DESCRIPTION,
+        },
+    )
+    own = (*_EXPERIMENTS, "experiment/smoke-test", "Standard cases with reference results")
+    for source, kind, role, text in (own, *related):
+        SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": text})
+    return {MANIFEST: _xml(root)}
+
+
+#: The inputs of a step by name, from its number and the outputs at its start.
+_Inputs = Callable[[int, Sequence[float] | None], Mapping[str, float]]
+
+
+def _values(mechanism: Mechanism, case: Case) -> dict[str, Any]:
+    """Return parameters, start and modes of a case by FMI name."""
+    values = {fmi_name(name): value for name, value in asdict(case.parameters).items()}
+    values |= {f"initial.{name}": value for name, value in asdict(case.initial).items()}
+    return values | case.inputs.modes(mechanism)
+
+
+def _results(mechanism: Mechanism) -> list[int]:
+    """Return the places of the outputs that are results; residuals are errors, which no other solver repeats."""
+    return [n for n, name in enumerate(mechanism.output_names) if not name.endswith(".residual")]
+
+
+def _reference(
+    mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs
+) -> tuple[list[list[float]], list[list[float]]]:
+    """Return the inputs of all steps, and the outputs at the end of some, before the next inputs, both after the time."""
+    first = inputs(0, None)
+    starts = {v.name: v.start for v in mechanism.variables}
+    plant = Plant.of_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
+    stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
+    outputs = list(plant.outputs())
+    places = _results(mechanism)
+    rows = [[times[0], *(outputs[place] for place in places)]]
+    for n, time in enumerate(times[1:], start=1):
+        plant.step(times[n - 1], time - times[n - 1])
+        outputs = list(plant.outputs())
+        if n * ROWS % STEPS == 0:
+            rows.append([time, *(float(f"{outputs[place]:.12g}") for place in places)])
+        now = inputs(n, outputs)
+        stimuli.append([time, *(now[name] for name in mechanism.input_names)])
+        for name, value in now.items():
+            plant.set_input(name, value)
+    return stimuli, rows
+
+
+def _parameter_set(name: str, values: Mapping[str, Any]) -> bytes:
+    """Return a parameter set of SSP."""
+    root = Element("ssv:ParameterSet", {"xmlns:ssv": _SSV, "version": "1.0", "name": name})
+    listed = SubElement(root, "ssv:Parameters")
+    for key, value in values.items():
+        tag = "ssv:Integer" if isinstance(value, int) else "ssv:Real"
+        SubElement(SubElement(listed, "ssv:Parameter", {"name": key}), tag, {"value": repr(value)})
+    return _xml(root)
+
+
+def _xml(root: Element) -> bytes:
+    indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'.encode()

@@ -1,0 +1,343 @@
+"""Experiments that an FMU carries: inputs, parameters and reference results, run again and compared.
+
+The layered standard FMI-LS-REF (https://github.com/modelica/fmi-ls-ref, tag v1.0.0-beta.1) lists them in
+``extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml``, in the format of https://github.com/modelica/ma-hs-experiments.
+"""
+
+from __future__ import annotations
+
+import csv
+import posixpath
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, LinkworkError
+
+from ..files import check_fmu, first_line
+from .fmu import unpacking_folder
+
+STANDARD = "org.fmi-standard.fmi-ls-ref"
+EXPERIMENTS = f"extra/{STANDARD}"
+MANIFEST = f"{EXPERIMENTS}/fmi-ls-manifest.xml"
+#: Type of an annotation of Linkwork that gives the relative difference that an experiment allows.
+ALLOWED = "org.linkwork.allowed"
+#: Where an experiment gives none: so many times its tolerance, at least the first, and the second where it has no tolerance.
+_TIMES, _LEAST, _USUAL = 100.0, 1e-6, 1e-3
+#: A variable is not asked for more digits than this share of the largest variable of its unit carries.
+_SMALL = 1e-3
+
+
+class ExperimentError(LinkworkError):
+    """The experiments in an FMU cannot be read or run."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """An experiment of an FMU; what its file leaves out is None or empty.
+
+    Attributes
+    ----------
+    name, description : str
+    start, stop, step, tolerance : float or None
+        Times (s) and tolerance of the solver.
+    allowed : float or None
+        Greatest relative difference from the reference, if the FMU states one.
+    parameters : mapping
+        Values by the names of variables.
+    stimuli, reference : structured ndarray or None
+        Columns by the names of variables, after the column of the time.
+    """
+
+    name: str
+    description: str = ""
+    start: float | None = None
+    stop: float | None = None
+    step: float | None = None
+    tolerance: float | None = None
+    allowed: float | None = None
+    parameters: Mapping[str, str]
+    stimuli: NDArray[Any] | None = None
+    reference: NDArray[Any] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation:
+    """The largest difference of a variable from its reference: where, and relative to the variable's scale."""
+
+    name: str
+    unit: str
+    time: float
+    value: float
+    reference: float
+    relative: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """An experiment that was run: deviations of all variables, largest first, what was allowed, and why it ended early."""
+
+    experiment: str
+    description: str
+    interface: str
+    deviations: tuple[Deviation, ...]
+    allowed: float
+    message: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Return whether the experiment ran to its end, and every variable is within the allowed difference."""
+        return not self.message and all(d.relative <= self.allowed for d in self.deviations)
+
+
+def read_experiments(fmu: str | Path) -> tuple[Experiment, ...]:
+    """Read the experiments that an FMU carries.
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU.
+    ExperimentError
+        If it has no experiments, or they cannot be read.
+    """
+    check_fmu(fmu)
+    with ZipFile(fmu) as archive:
+        if MANIFEST not in archive.namelist():
+            raise ExperimentError(f"{fmu} has no experiments: there is no {MANIFEST} in it (FMI-LS-REF)")
+        reader = _Reader(fmu, archive)
+        found = [
+            experiment
+            for related in reader.xml(MANIFEST).iter("Related")
+            if related.get("role", "").partition("/")[0] == "experiment"
+            for experiment in reader.experiments(reader.place(MANIFEST, related))
+        ]
+    if not found:
+        raise ExperimentError(f"{fmu} has no experiments: {MANIFEST} names none")
+    return tuple(found)
+
+
+class _Reader:
+    """The files of an FMU that its manifest leads to."""
+
+    def __init__(self, fmu: str | Path, archive: ZipFile) -> None:
+        self.fmu, self.archive, self.names = fmu, archive, set(archive.namelist())
+
+    def place(self, base: str, node: ElementTree.Element) -> str:
+        """Return the place in the archive that the attribute ``source`` leads to from a file."""
+        source = node.get("source", "")
+        parts = urlsplit(source)
+        place = posixpath.normpath(posixpath.join(posixpath.dirname(base), unquote(parts.path)))
+        if parts.scheme or parts.netloc or place not in self.names:
+            raise ExperimentError(f"{self.fmu}: {base} names {source!r}: it must be a file inside the FMU")
+        return place
+
+    def text(self, place: str) -> str:
+        try:
+            return self.archive.read(place).decode("utf-8-sig")
+        except Exception as error:  # zipfile and zlib raise their own
+            raise ExperimentError(f"{self.fmu}: {place} cannot be read: {first_line(error)}") from error
+
+    def xml(self, place: str) -> ElementTree.Element:
+        """Read XML; the names of elements come without namespaces."""
+        try:
+            root = ElementTree.fromstring(self.text(place))
+        except ElementTree.ParseError as error:
+            raise ExperimentError(f"{self.fmu}: {place} is not XML: {error}") from error
+        for node in root.iter():
+            node.tag = node.tag.rpartition("}")[2]
+        return root
+
+    def experiments(self, place: str) -> Iterator[Experiment]:
+        """Yield the experiments of a file."""
+        for node in self.xml(place).iter("Experiment"):
+            name = node.get("name", "")
+            # the schema has the times at the kind of analysis, the text of the standard at the experiment
+            kinds = [child for child in node if child.tag not in ("Parameters", "Stimuli", "References", "Annotations")]
+            if kinds and kinds[0].tag != "TransientSimulation":
+                raise ExperimentError(
+                    f"{self.fmu}: the experiment {name!r} is a {kinds[0].tag}: only TransientSimulation can be run"
+                )
+            values = {**node.attrib, **(kinds[0].attrib if kinds else {})}
+            for note in node.iter("Annotation"):
+                if note.get("type") == ALLOWED:
+                    values["allowed"] = note.text or ""
+            start, stop, step, tolerance, allowed = (
+                self._number(values[key], f"{key} of the experiment {name!r}") if key in values else None
+                for key in ("startTime", "stopTime", "stepSize", "tolerance", "allowed")
+            )
+            sources = {child.tag: self.place(place, child) for child in node if "source" in child.attrib}
+            yield Experiment(
+                name=name,
+                description=node.get("description", ""),
+                start=start,
+                stop=stop,
+                step=step,
+                tolerance=tolerance,
+                allowed=allowed,
+                parameters=self._parameters(sources["Parameters"]) if "Parameters" in sources else {},
+                stimuli=self._table(sources["Stimuli"]) if "Stimuli" in sources else None,
+                reference=self._table(sources["References"]) if "References" in sources else None,
+            )
+
+    def _number(self, text: str, what: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            number = np.nan
+        if not np.isfinite(number):
+            raise ExperimentError(f"{self.fmu}: {what} is {text!r}: it must be a finite number")
+        return number
+
+    def _parameters(self, place: str) -> dict[str, str]:
+        """Read a parameter set of SSP."""
+        values = {}
+        for node in self.xml(place).iter("Parameter"):
+            value = next((child.get("value") for child in node if "value" in child.attrib), None)
+            if value is None or "name" not in node.attrib:
+                raise ExperimentError(f"{self.fmu}: {place} has a parameter without name or value")
+            values[node.attrib["name"]] = value
+        return values
+
+    def _table(self, place: str) -> NDArray[Any]:
+        """Read a table whose first column is the time."""
+        names, *rows = list(csv.reader(self.text(place).splitlines())) or [[]]
+        names = [name.strip() for name in names]
+        if len(names) < 2 or len(set(names)) < len(names) or not rows or any(len(row) != len(names) for row in rows):
+            raise ExperimentError(
+                f"{self.fmu}: {place} must be CSV with different names in its first row, the time first, and rows as long"
+            )
+        values = [tuple(self._number(cell, f"a cell of {place}") for cell in row) for row in rows]
+        table = np.array(values, dtype=[(name, float) for name in names])
+        if (np.diff(table[names[0]]) < 0.0).any():
+            raise ExperimentError(f"{self.fmu}: the times in {place} decrease: they must increase")
+        return table
+
+
+def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome]:
+    """Run the experiments that an FMU of any make carries, by FMPy, and compare with its reference results.
+
+    An experiment is run in co-simulation if the FMU has that interface: inputs are held over each step, and the reference
+    has the outputs at its end, before the next inputs. The scale of a variable is the largest magnitude of its reference, and
+    at least a thousandth of the largest of all variables of its unit.
+
+    Parameters
+    ----------
+    fmu : path
+    allowed : float, optional
+        Greatest relative difference; by default what the experiment states, or else 100 times its tolerance and at least
+        1e-6, or 1e-3 where it has no tolerance.
+
+    Yields
+    ------
+    Outcome
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU.
+    ExperimentError
+        If it has no experiments, or they cannot be read.
+
+    Examples
+    --------
+    >>> from analysis.run import verify
+    >>> all(outcome.passed for outcome in verify("build/FiveBarSlider-native.fmu"))
+    True
+    """
+    from fmpy import extract, read_model_description
+
+    experiments = read_experiments(fmu)
+    try:
+        description = read_model_description(str(fmu), validate=False)
+    except Exception as error:  # FMPy raises plain ones
+        raise InputError(f"{fmu} is not an FMU: {first_line(error)}") from error
+    folder = tempfile.mkdtemp(dir=unpacking_folder())
+    try:
+        extract(str(fmu), folder)
+        for experiment in experiments:
+            yield _run(experiment, description, folder, allowed)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _run(experiment: Experiment, description: Any, folder: str, allowed: float | None) -> Outcome:
+    """Run one experiment of an unpacked FMU."""
+    from fmpy import simulate_fmu
+
+    kind = "ModelExchange" if description.coSimulation is None else "CoSimulation"
+    reference, tolerance = experiment.reference, experiment.tolerance
+    if allowed is None:
+        allowed = experiment.allowed
+    if allowed is None:
+        allowed = _USUAL if tolerance is None else max(_LEAST, _TIMES * tolerance)
+    names, stimuli = _columns(reference), _columns(experiment.stimuli)
+    known = {v.name for v in description.modelVariables}
+    unknown = [name for name in (*names, *stimuli, *experiment.parameters) if name not in known]
+    deviations: tuple[Deviation, ...] = ()
+    message = f"the FMU has no variable {unknown[0]}" if unknown else ""
+    if not message:
+        try:
+            found = simulate_fmu(
+                folder, validate=False, fmi_type=kind, model_description=description, start_time=experiment.start,
+                stop_time=experiment.stop, output_interval=experiment.step, relative_tolerance=tolerance,
+                start_values=dict(experiment.parameters), input=experiment.stimuli, output=list(names) or None,
+                record_events=False,
+            )  # fmt: skip
+        except Exception as error:  # FMPy raises plain ones
+            message = first_line(error)
+        else:
+            end = experiment.stop if reference is None else float(reference[-1][0])
+            if end is not None and found["time"][-1] < end - 1e-9 * max(1.0, abs(end)):
+                message = f"the run ended early, at t = {found['time'][-1]:.9g} s"
+            elif reference is not None:
+                deviations = _deviations(found, reference, {v.name: v.unit or "" for v in description.modelVariables})
+    return Outcome(
+        experiment=experiment.name,
+        description=experiment.description,
+        interface="model exchange" if kind == "ModelExchange" else "co-simulation",
+        deviations=deviations,
+        allowed=allowed,
+        message=message,
+    )
+
+
+def _columns(table: NDArray[Any] | None) -> tuple[str, ...]:
+    """Return the names of the columns of a table after that of the time."""
+    return () if table is None else (table.dtype.names or ())[1:]
+
+
+def _deviations(found: NDArray[Any], reference: NDArray[Any], units: Mapping[str, str]) -> tuple[Deviation, ...]:
+    """Return the largest difference of each variable at the times of the reference, the largest of all first."""
+    clock, *names = reference.dtype.names or ()
+    times = reference[clock]
+    sizes = {name: float(np.abs(reference[name]).max()) for name in names}
+    of_unit: dict[str, float] = {}
+    for name, size in sizes.items():
+        of_unit[units[name]] = max(size, of_unit.get(units[name], 0.0))
+    deviations = []
+    for name in names:
+        values = np.interp(times, found["time"], found[name].astype(float))
+        difference = np.abs(values - reference[name])
+        difference[np.isnan(difference)] = np.inf
+        worst = int(np.argmax(difference))
+        scale = max(sizes[name], _SMALL * of_unit[units[name]]) or 1.0
+        deviations.append(
+            Deviation(
+                name=name,
+                unit=units[name],
+                time=float(times[worst]),
+                value=float(values[worst]),
+                reference=float(reference[name][worst]),
+                relative=float(difference[worst]) / scale,
+            )
+        )
+    return tuple(sorted(deviations, key=lambda d: -d.relative))
