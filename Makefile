@@ -63,11 +63,17 @@ studio: $(DEV)
 	cd studio && npm ci --no-audit --no-fund --ignore-scripts && npm run --silent check && npm test --silent && npm run --silent build
 	$(BIN)/python -m analysis.studio
 
-# wheel, FMUs of every kind for all platforms, and what fmi-standard.org asks to be published with them
+# all that is published, in dist: wheel, FMUs of every kind for all platforms with what fmi-standard.org asks for, site, page of the studio;
+# the wheel is then installed and run where there is no checkout
 release: $(DEV)
-	rm -rf dist
+	rm -rf dist build/site
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(BIN)/python build_fmu.py --platforms all --dest dist --publish dist/compatibility
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees docs build/site
+	$(BIN)/python -m zipfile --create dist/linkwork-site.zip build/site/
+	cp analysis/studio/page.html dist/linkwork-studio.html
+	LINKWORK_WHEEL=$$(ls dist/*.whl) $(PYTEST) tests/test_wheel.py
+	cd dist && sha256sum *.whl *.fmu *.zip *.html > SHA256SUMS
 
 $(RUN): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --editable '.[all]'

@@ -1,5 +1,6 @@
 from . import figures as figures
 from . import linear as linear
+from . import linkages as linkages
 from . import periodic as periodic
 from . import slider as slider
 from . import slider_crank as slider_crank
@@ -11,6 +12,7 @@ from .linear import design_pi as design_pi
 from .linear import design_pid as design_pid
 from .linear import find_equilibrium as find_equilibrium
 from .linear import linearise as linearise
+from .linkages import linkage as linkage
 from .mechanisms import PUBLISHED as PUBLISHED
 from .mechanisms import FiveBarParameters as FiveBarParameters
 from .mechanisms import SliderCrankParameters as SliderCrankParameters

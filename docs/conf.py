@@ -51,7 +51,8 @@ html_math_renderer = "mathml"
 LINKS = (
     (r"\]\((?:\.\./)?(CONTRIBUTING|CHANGELOG)\.md", lambda match: f"]({match[1].lower()}.md"),
     (r"\]\((?:\.\./)?docs/", lambda match: "]("),
-    (r"\]\((?=CITATION|examples/)", lambda match: "](../"),
+    (r"\[([\w ]+)\]\((?:paper/paper|CODE_OF_CONDUCT)\.md\)", lambda match: match[1]),
+    (r"\]\((?=CITATION|LICENSE|examples/)", lambda match: "](../"),
 )
 
 

@@ -119,6 +119,13 @@ def probe(of: str, page: str) -> str:
     )
 
 
+def accuracy(of: str, page: str) -> str:
+    """Return the table of work and precision of a mechanism's FMUs."""
+    from analysis.export.accuracy import HEADINGS, known, texts
+
+    return _markdown(f"| {' | '.join(HEADINGS)} |", (tuple(texts(row)) for row in known(MECHANISMS[of])))
+
+
 def race(of: str, page: str) -> str:
     """Return a table of the searches' results in docs/race.csv."""
     from benchmarks.race import markdown, read
@@ -138,7 +145,7 @@ CHAPTERS = (*"345678", "R", "ours")
 #: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
-    "crossing": crossing,
+    "crossing": crossing, "accuracy": accuracy,
 }  # fmt: skip
 
 
@@ -159,7 +166,7 @@ Picture = tuple[str, "Figure", int]
 
 
 def study_pictures() -> Iterator[Picture]:
-    """Draw the still of README.md, and the pictures of rig-2.md and coexisting-motions.md."""
+    """Draw the pictures of rig-2.md and coexisting-motions.md."""
     from analysis import figures as draw
     from analysis.periodic import frequency_response, with_isolas
     from analysis.studies import load
@@ -168,7 +175,6 @@ def study_pictures() -> Iterator[Picture]:
     from linkwork.five_bar.published import SETS
 
     for name, number in (
-        ("linkage", "linkage"),
         ("rig-2-approximations", "8.19"),
         ("rig-2-harmonics", "8.21"),
         ("rig-2-forces", "rig-2-forces"),
@@ -230,7 +236,20 @@ def closed_form_pictures() -> Iterator[Picture]:
 
     for name, count in (("five-poses", 6), ("four-poses", 1)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        yield name, plot(guidance(case.task, count), title=case.title), 90
+        yield name, plot(guidance(case.task, count), title=case.title), 70
+
+
+def linkage_pictures() -> Iterator[Picture]:
+    """Draw the picture of docs/linkages.md."""
+    import tempfile
+
+    from analysis.figures import plot
+    from analysis.linkages import TEXT, load_linkage
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "four-bar.toml"
+        path.write_text(TEXT.format(file=path.name), encoding="utf-8")
+        yield "four-bar", plot(load_linkage(path)), 90
 
 
 def race_pictures() -> Iterator[Picture]:
@@ -277,6 +296,7 @@ def main(arguments: list[str]) -> int:
             study_pictures,
             hand_drawn_pictures,
             closed_form_pictures,
+            linkage_pictures,
             race_pictures,
             slider_crank_pictures,
         ):

@@ -141,6 +141,7 @@ class LinkworkSlave(Fmi2Slave):
         #: status and sentence of what went wrong first since the last good step, other than calls out of order
         self._cause: tuple[int, str] | None = None
         self._start_time = 0.0
+        self._stop_time: float | None = None
         self._master_tolerance: float | None = None
 
     def _build(self) -> Plant:
@@ -160,7 +161,10 @@ class LinkworkSlave(Fmi2Slave):
     @_guarded
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
         self._expect("fmi2SetupExperiment", INSTANTIATED)
+        if stop_time is not None and not stop_time >= start_time:
+            raise self._fail(StepError(f"the stop time is {stop_time:.9g} s: it must not be before the start time"))
         self._start_time = start_time
+        self._stop_time = stop_time
         self._master_tolerance = tolerance
         self._plant = None
         self._stale = True
@@ -191,6 +195,9 @@ class LinkworkSlave(Fmi2Slave):
                 return self._refuse(
                     STATUS_NOT_INITIALISED, f"a step at t = {current_time:.9g} s before the initialisation{why}"
                 )
+            end, stop = current_time + step_size, self._stop_time
+            if stop is not None and end > stop + 1e-6 * step_size + 1e-12 * abs(current_time):
+                raise StepError(f"a step to t = {end:.9g} s: the stop time is {stop:.9g} s")
             self._plant.step(current_time, step_size)
             self._values[self._status_at] = STATUS_GOOD
             self._values[self._message_at] = ""
@@ -281,15 +288,15 @@ class LinkworkSlave(Fmi2Slave):
         running = self._phase == RUNNING
         for reference, value in zip(references, values):
             self._check_reference(reference, kind)
+            causality = self._causalities[reference]
+            if running and causality != "input":
+                why = f"{self._names[reference]} is {_NOT_TAKEN[causality]}: the value {value!r} was not taken"
+                raise self._fail(StepError(why))
+        for reference, value in zip(references, values):
             name = self._names[reference]
             causality = self._causalities[reference]
-            computed = self._computed[reference]
-            if computed and not running:
+            if self._computed[reference]:
                 continue  # a guess for the initialisation, which is solved without one
-            if computed or (causality == "parameter" and running):
-                why = _NOT_TAKEN[causality]
-                self._say(f"{name} is {why}: the value {value!r} was not taken", Fmi2Status.warning)
-                continue
             self._values[reference] = value
             self._stale = True
             if causality == "parameter":
@@ -344,6 +351,7 @@ class LinkworkSlave(Fmi2Slave):
             "stale": self._stale,
             "cause": self._cause,
             "start_time": self._start_time,
+            "stop_time": self._stop_time,
             "master_tolerance": self._master_tolerance,
             "plant": None if self._plant is None else self._plant.save(),
         }
@@ -362,6 +370,7 @@ class LinkworkSlave(Fmi2Slave):
             values, cause = list(state["values"]), state["cause"]
             phase, stale = state["phase"], state["stale"]
             start_time, master_tolerance = state["start_time"], state["master_tolerance"]
+            stop_time = state["stop_time"]
             if phase not in PHASES or (phase == RUNNING and plant is None):
                 raise StateError(f"the saved state is damaged: a slave that is {phase!r} without a plant")
         except LinkworkError as error:
@@ -372,7 +381,7 @@ class LinkworkSlave(Fmi2Slave):
         self._values = values
         self._cause = None if cause is None else (cause[0], cause[1])
         self._phase, self._stale = phase, stale
-        self._start_time, self._master_tolerance = start_time, master_tolerance
+        self._start_time, self._stop_time, self._master_tolerance = start_time, stop_time, master_tolerance
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:

@@ -10,11 +10,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 import yaml
 
+from analysis import cli
 from analysis.mechanisms import PUBLISHED
 from analysis.studies import RAHMAN, YOUSSEF
 from analysis.studies.study import FAILS, UNJUDGED
@@ -197,6 +200,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
         ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
         ("workers.md", 1, 1, ()),
+        ("linkages.md", 6, 1, ("out/four-bar.png", "out/MyLinkage-native.fmu")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
     ],
 )
@@ -214,7 +218,7 @@ def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_pat
 def test_pictures_of_the_documentation_are_small():
     pictures = [
         picture
-        for name in ("hand-drawn", "slider-crank", "four-poses", "five-poses")
+        for name in ("hand-drawn", "slider-crank", "four-poses", "five-poses", "four-bar")
         for picture in (ROOT / "docs").glob(f"{name}*.png")
     ]
     assert pictures
@@ -307,6 +311,45 @@ def test_the_site_needs_no_network(site):
     assert "--published" in pages["reference/commands.html"]
     for path in NOTEBOOKS:
         assert "data:image" in (page := pages[f"notebooks/{path.stem}.html"]) or "_images/" in page
+
+
+def test_every_claim_of_the_paper_has_a_command_that_is_there():
+    rows = [line.split("|") for line in (ROOT / "paper" / "paper.md").read_text().splitlines() if line.startswith("| ")]
+    commands = [row[2].strip().strip("`").split() for row in rows[2:]]
+    assert len(commands) >= 5
+    for words in commands:
+        match words:
+            case ["linkwork", name, *_]:
+                assert name in cli.COMMANDS, words
+            case ["python", "-m", "pytest", place]:
+                assert (ROOT / place).exists(), words
+            case ["python", "-m", module]:
+                assert find_spec(module), words
+            case _:
+                pytest.fail(f"no command: {words}")
+
+
+def test_the_numbers_of_the_paper_are_those_of_the_pages():
+    paper = " ".join((ROOT / "paper" / "paper.md").read_text().split())
+    for page, words in (
+        ("youssef", "Of {} statements of the first thesis {} hold, {} do not"),
+        ("rahman", "of {} of the second {} hold, {} do not"),
+    ):
+        counts = re.search(
+            r"Of (\d+) statements of the thesis (\d+) hold, (\d+) do not", (ROOT / "docs" / f"{page}.md").read_text()
+        )
+        assert words.format(*counts.groups()) in paper
+    solvers = (ROOT / "docs" / "solvers.md").read_text()
+    assert "0.113 ms" in paper
+    assert "0.113 ms" in solvers
+
+
+def test_the_conda_recipe_has_the_version_and_the_requirements_of_the_package():
+    recipe = yaml.safe_load((ROOT / "packaging" / "conda" / "recipe.yaml").read_text())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert recipe["package"]["version"] == __version__
+    run = {requirement.replace(" ", "") for requirement in recipe["requirements"]["run"]}
+    assert run == {f"python{project['requires-python']}", *project["dependencies"]}
 
 
 def test_the_citation_is_of_this_version():

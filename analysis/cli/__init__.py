@@ -30,6 +30,7 @@ COMMANDS = {
     "examples": ("making", "Copy the examples to a folder."),
     "figures": ("runs", "Make the theses' figures, a still and an animation."),
     "info": ("runs", "Describe published sets, a parameter or case file, an FMU."),
+    "linkage": ("linkage", "Draw a described linkage; say how it moves."),
     "new": ("new", "Write a case file to begin with, every entry explained."),
     "probe": ("probe", "Probe an FMU of any make with legal and forbidden calls."),
     "resonance": ("vibration", "Follow the periodic motion over speed or a parameter."),

@@ -16,6 +16,7 @@ from .common import handled, say, unknown
 
 SLIDER_MOTION = "slider-motion"
 TUNING = "tuning"
+LINKAGE = "linkage"
 _HEAD = """\
 # {title}: {command} {file}
 # Every quantity is a number in SI or a text with its unit, such as "5 cm" or "420 rpm". Entries behind a # may be left out:
@@ -73,12 +74,17 @@ def kinds() -> dict[str, str]:
         | {
             SLIDER_MOTION: "linkwork slider-motion",
             TUNING: "linkwork tune",
+            LINKAGE: "linkwork linkage",
         }
     )
 
 
 def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
     """Return the text of a case file of a kind; for a mechanism with ``parameters``, of the parameters alone."""
+    if kind == LINKAGE:
+        from ..linkages import TEXT
+
+        return TEXT.format(file=file)
     if kind in MECHANISMS:
         mechanism = MECHANISMS[kind]
         command = f"linkwork {kind if kind == 'slider-crank' else ''} info".replace("  ", " ")
@@ -242,7 +248,8 @@ def _synthesis(kind: str, file: str) -> Iterator[str]:
 def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
     """Write a case file to begin with, every entry explained, which runs as it is. Without a KIND they are listed.
 
-    KIND is a mechanism, for a run of it, or a task: of a synthesis, of a slider's motion, or a tuning.
+    KIND is a mechanism, for a run of it, or a task: of a synthesis, of a slider's motion, or a tuning; or "linkage", for a
+    linkage of your own.
 
     \b
     Examples:

@@ -140,6 +140,8 @@ def run(
         for sentence in _bare_speeds(case, settings, chosen):
             print_error(sentence)
         sys.exit(ENDED_EARLY)
+    if result.message:
+        print_error(f"note: {result.message}")
 
 
 def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:

@@ -23,6 +23,7 @@ from matplotlib.figure import Figure
 
 from linkwork.errors import LinkworkError
 
+from ..mechanisms import MECHANISMS as REGISTRY
 from ..run import Trajectory
 
 #: The modules that register what they draw, those that import fastest first.
@@ -40,6 +41,7 @@ MODULES = (
     "slider_crank",
     "slider_crank_picture",
     "tuning",
+    "scheme",
 )
 #: Those that register the picture of a mechanism.
 MECHANISMS = ("linkage", "slider_crank_picture")
@@ -158,7 +160,16 @@ def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
     DrawingError
         If there is no picture of this mechanism: see `has_picture`.
     """
-    raise DrawingError(type(parameters), "picture")
+    if not _from_drawing(parameters):
+        raise DrawingError(type(parameters), "picture")
+    caption: str = import_module(".scheme", __package__).draw_run(parameters, axis, run)
+    return caption
+
+
+def _from_drawing(parameters: object) -> bool:
+    """Return whether parameters are of a mechanism that says how it is drawn, in the plane."""
+    kind = next((m for m in REGISTRY.values() if isinstance(parameters, m.parameters)), None)
+    return kind is not None and kind.drawing is not None and kind.drawing.planar
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
@@ -170,4 +181,4 @@ def last_samples(run: Trajectory) -> tuple[slice, str]:
 
 def has_picture(parameters: object) -> bool:
     """Return whether `draw_mechanism` draws the mechanism of these parameters."""
-    return _find(draw_mechanism, type(parameters), MECHANISMS) is not None
+    return _find(draw_mechanism, type(parameters), MECHANISMS) is not None or _from_drawing(parameters)

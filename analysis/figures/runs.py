@@ -75,6 +75,8 @@ def plot_outputs(
         panels = [_output(run, table, name) for name in names]
     if run.status:
         notes.append(f"The run ended early: {run.message}.")
+    elif run.message:
+        notes.append(f"Note: {run.message}.")
     with styled():
         grid = _with_picture(len(panels)) if picture else _in_columns(len(panels), columns)
         width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if picture else (_WIDTH * columns, _HEIGHT)

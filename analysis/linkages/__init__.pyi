@@ -8,6 +8,11 @@ from .description import Description as Description
 from .description import LinkageError as LinkageError
 from .package import Package as Package
 from .package import mechanism as mechanism
+from .reach import Reach as Reach
+from .reach import reach as reach
 from .sections import SECTIONS as SECTIONS
 from .sections import Made as Made
 from .sections import millimetres as millimetres
+from .structure import Dyad as Dyad
+from .structure import Geared as Geared
+from .template import TEXT as TEXT

@@ -46,13 +46,14 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     if not described_in(tables):
         return tables
     own = tables[LINKAGE]
-    if isinstance(own, str):
-        inner = files.read_tables(folder / own)
-        if not described_in(inner) or isinstance(inner[LINKAGE], str):
-            raise InputError(f"{folder / own} describes no linkage: it must have a table [linkage] with bodies")
-        own = inner[LINKAGE]
-    made = mechanism(described(own))
+    made = load_linkage(folder / own) if isinstance(own, str) else _compiled(tables)
     return {"published": made.name, **{name: value for name, value in tables.items() if name != LINKAGE}}
+
+
+def _compiled(tables: Mapping[str, Any]) -> Mechanism:
+    """Compile the linkage in the tables of a file, whose title is its own where it has no other."""
+    title = {"title": tables["title"]} if "title" in tables else {}
+    return mechanism(described({**title, **tables[LINKAGE]}))
 
 
 def load_linkage(path: str | Path) -> Mechanism:
@@ -63,10 +64,12 @@ def load_linkage(path: str | Path) -> Mechanism:
     InputError, LinkageError, ParameterError
     """
     tables = files.read_tables(path)
-    if not described_in(tables):
+    if isinstance(tables.get(LINKAGE), str):
+        path = Path(path).parent / tables[LINKAGE]
+        tables = files.read_tables(path)
+    if not isinstance(tables.get(LINKAGE), Mapping) or not described_in(tables):
         raise InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
-    own = tables[LINKAGE]
-    return load_linkage(Path(path).parent / own) if isinstance(own, str) else mechanism(described(own))
+    return _compiled(tables)
 
 
 class Builder:

@@ -13,6 +13,7 @@ from scipy.integrate import OdeSolver, solve_ivp
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
+from .cautions import energy_balance
 from .events import Event, RunInterrupted, shown
 from .locating import SAME
 from .prepared import Run, verdict
@@ -43,9 +44,12 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
         rows = [*rows, (march.t, march.x, march.held)]
     values = [run.mechanism.equations.outputs(tuple(x), held, march.energy, run.p) for _, x, held in rows]
     code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x, run.limit)
+    table = np.array(values).reshape(-1, len(names))
+    if not code:
+        message = energy_balance(names, table, run.settings.tolerance)
     trajectory = Trajectory(
         time=np.array([t for t, _, _ in rows]),
-        values=np.array(values).reshape(-1, len(names)),
+        values=table,
         names=names,
         status=code,
         message=message,

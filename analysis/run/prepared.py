@@ -17,6 +17,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.workers import interruptible
 from .angles import WholeTurns
+from .cautions import PATIENCE, SHARE, energy_balance, fastest_decay, stiffness
 from .equations import OUTPUTS, machine
 from .events import Event, RunInterrupted, shown
 from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
@@ -83,7 +84,7 @@ class Run:
         AssemblyError
             If the links cannot be joined there.
         InputError
-            If an input is not a finite number.
+            If an input is not a finite number, or energy or accelerations are not.
         """
         x = np.array(self.mechanism.state(self.initial))
         u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.laws)
@@ -92,7 +93,17 @@ class Run:
         state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
         self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
-        return Start(np.array(state), self.mechanism.equations.energy(state, self.p), scale)
+        energy = self.mechanism.equations.energy(state, self.p)
+        rates = self.mechanism.equations.derivative(state, self.applied(u), self.p)
+        if not np.isfinite([energy, *rates]).all():
+            names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
+            values = dict(zip([*names[::2], *names[1::2]], state))
+            name = max(values, key=lambda name: abs(values[name]))
+            raise InputError(
+                f"energy or accelerations at the start are not finite: {name} is {values[name]:g}; it, an input or a "
+                "parameter must be far smaller"
+            )
+        return Start(np.array(state), energy, scale)
 
     def applied(self, u: NDArray[np.float64]) -> Any:
         """Return the inputs in the form that the equations take."""
@@ -142,9 +153,10 @@ class Run:
         carry, x, u = state.carries[0], state.x[0], state.u[0]
         status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
-        with interruptible() as interrupted, shown(progress, times[-1] - times[0]) as show:
+        stiff, expected, span = "", 0.0, times[-1] - times[0]
+        with interruptible() as interrupted, shown(progress, span) as show:
             try:
-                while status[0] == k.RUNNING and carry["steps"] < most and not interrupted:
+                while status[0] == k.RUNNING and carry["steps"] < most and expected < SHARE * most and not interrupted:
                     entered = clock.perf_counter()
                     compiled.run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
@@ -152,7 +164,10 @@ class Run:
                     found[:, 2:] += turns.taken
                     occurrences += found.tolist()
                     carry["found"] = 0
-                    show(carry["begin"] + carry["elapsed"] - times[0])
+                    passed, steps = float(carry["begin"] + carry["elapsed"] - times[0]), float(carry["steps"])
+                    show(passed)
+                    stiff = stiffness(lambda: fastest_decay(self.mechanism, x, self.applied(u), self.p), steps, passed)
+                    expected = steps * span / passed if stiff and steps >= PATIENCE else 0.0
                     if status[0] == k.RUNNING:
                         turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
@@ -166,9 +181,14 @@ class Run:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit)
+        if code and expected:
+            message = f"stopped at t = {t:.9g} s, as about {expected:.2g} steps would be needed"
+        values = turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces))
+        balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
+        message = "; ".join(filter(None, (message, stiff, balance)))
         trajectory = Trajectory(
             time=times,
-            values=turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces)),
+            values=values,
             status=code,
             message=message,
             events=tuple(

@@ -139,7 +139,8 @@ def simulate(
     start_time : float or str
         Start of the run; 0 by default.
     max_steps : int
-        Steps after which a compiled run ends with solver.status 4; 1e8 by default.
+        Steps after which a compiled run ends with solver.status 4; 1e8 by default. A stiff run ends after 1e6 steps if it is
+        going to need more than a tenth of them.
     progress : bool
         Show a progress bar.
     first_step, max_step, min_step, jac, jac_sparsity, lband, uband, vectorized

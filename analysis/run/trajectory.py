@@ -48,7 +48,8 @@ class Trajectory(Shown):
     status : int
         0 if the run reached its end or a stopping event, else the solver.status of the FMI contract.
     message : str
-        Why the run ended early; empty if it did not.
+        Why the run ended early. Of a run to its end, cautions: that it is stiff, or misses the balance of energy by more than
+        the tolerance promises; else empty.
     events : tuple of Occurrence
         Events in the order of time.
     source : str

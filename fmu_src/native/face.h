@@ -44,8 +44,9 @@ static inline void restore_traps(fenv_t *kept) {
 #define ARRAYS (count == 0 || (references && values))
 
 #define EACH(call)                                                                                                             \
+    Status status = OK;                                                                                                        \
     for (size_t i = 0; i < count; i++)                                                                                         \
-        if ((call) != OK) return FMI(Error);                                                                                   \
+        if ((status = (call)) != OK) RETURN(status);                                                                           \
     return FMI(OK);
 
 /* All of them, or none. */

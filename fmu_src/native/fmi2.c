@@ -116,6 +116,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const Reference
 fmi2Status fmi2EnterEventMode(fmi2Component component) {
     ALLOW(EVENT | CONTINUOUS)
     c->s.phase = EVENT;
+    c->stale = true; /* the status was left as it was */
     return fmi2OK;
 }
 

@@ -160,6 +160,7 @@ GET_DERIVATIVE(AdjointDerivative, true, unknown_count, known_count)
 fmi3Status fmi3EnterEventMode(fmi3Instance component) {
     ALLOW(CONTINUOUS)
     c->s.phase = EVENT;
+    c->stale = true; /* the status was left as it was */
     return fmi3OK;
 }
 

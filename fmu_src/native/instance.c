@@ -116,8 +116,8 @@ static void forget(Instance *c) {
 
 Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop) {
     Digits number;
-    if (stop_given && !(stop > start))
-        return instance_say(c, ERROR, "the stop time is %s s: it must be after the start time", digits(number, stop));
+    if (stop_given && !(stop >= start))
+        return instance_say(c, ERROR, "the stop time is %s s: it must not be before the start time", digits(number, stop));
     if (!isfinite(start))
         return instance_say(c, ERROR, "the time at the start is %s s: it must be a finite number", digits(number, start));
     if (tolerance_given && !(isfinite(tolerance) && tolerance > 0.0))
@@ -168,16 +168,19 @@ static const Variable *variable(Instance *c, const char *function, unsigned refe
     return &variables[reference];
 }
 
-/* Bring the outputs up to date. A read does not fail: the last good outputs stay, and the next step will be refused. */
-static void read_outputs(Instance *c) {
+/* Bring the outputs up to date. A read does not fail: the last good outputs stay, and the next step will be refused. But the states
+   that a solver tries are discarded, and what is discrete stays until the next event. */
+static Status read_outputs(Instance *c, const char *function) {
     char sentence[SENTENCE];
     Reason reason = refresh(c, sentence);
+    if (c->s.phase == CONTINUOUS) return reason == GOOD ? OK : instance_say(c, DISCARD, "%s: %s", function, sentence);
     bool running = (int)c->s.phase & RUNNING, stepping = running && c->interface == CO_SIMULATION;
     bool refused = running && c->s.reason != GOOD; /* of which the reason stays, until a good step */
     if (reason != GOOD && !refused)
         note(c, reason, sentence);
     else if (reason == GOOD && c->s.reason != GOOD && !stepping && plant_margin(&c->s.plant) >= 0.0)
         forget(c); /* but not what ended the run: the limit of assembly */
+    return OK;
 }
 
 static double computed(Instance *c, int row) {
@@ -203,22 +206,24 @@ Status instance_get(Instance *c, const char *function, unsigned reference, Kind 
     if (v->causality != COMPUTED)
         *value = c->s.plant.given[reference];
     else {
-        if (c->stale) read_outputs(c);
-        *value = (int)reference == status_at ? c->s.reason : computed(c, v->row);
+        bool status = (int)reference == status_at, tried = c->s.phase == CONTINUOUS;
+        bool follows = !status && (v->row < STATE_ROW || (DERIVATIVE_ROW <= v->row && v->row < MARGIN_ROW));
+        if (c->stale && (follows || !tried) && read_outputs(c, function) != OK) return DISCARD;
+        *value = status ? c->s.reason : computed(c, v->row);
     }
     return OK;
 }
 
 Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value) {
     double number;
-    if (instance_get(c, function, reference, INTEGER, &number) != OK) return ERROR;
-    *value = (int)number;
-    return OK;
+    Status status = instance_get(c, function, reference, INTEGER, &number);
+    if (status == OK) *value = (int)number;
+    return status;
 }
 
 Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value) {
     if (!variable(c, function, reference, STRING)) return ERROR;
-    if (c->stale) read_outputs(c);
+    if (c->stale && c->s.phase != CONTINUOUS) read_outputs(c, function);
     memcpy(c->text, c->s.message, SENTENCE);
     *value = c->text;
     return OK;
@@ -322,9 +327,12 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch) 
     Reason ended;
     c->stopped = false;
     /* beyond what rounding in the master's sum of steps can make */
-    if (time + step > c->s.plant.stop_time + 1e-6 * step + 1e-12 * fabs(time))
-        return instance_say(c, ERROR, "a step to t = %s s: the stop time is %s s", digits(end, time + step),
-                            digits(stop, c->s.plant.stop_time));
+    if (time + step > c->s.plant.stop_time + 1e-6 * step + 1e-12 * fabs(time)) {
+        snprintf(sentence, SENTENCE, "a step to t = %s s: the stop time is %s s", digits(end, time + step),
+                 digits(stop, c->s.plant.stop_time));
+        note(c, STEP_OUT_OF_ORDER, sentence);
+        return instance_say(c, ERROR, "%s", sentence);
+    }
     Reason reason = plant_step(&c->s.plant, time, step, watch, c->early_return, &ended, sentence);
     c->s.step = reason;
     c->stale = true; /* also after a refused step: its updates may have read outputs */

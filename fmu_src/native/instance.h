@@ -59,7 +59,7 @@ struct Instance {
 };
 
 LOCAL Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
-                       void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void));
+                             void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void));
 LOCAL void instance_free(Instance *c);
 LOCAL void instance_reset(Instance *c);
 
@@ -85,8 +85,8 @@ LOCAL Status instance_get_text(Instance *c, const char *function, unsigned refer
 LOCAL bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind);
 LOCAL void instance_set(Instance *c, unsigned reference, double value);
 LOCAL Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
-LOCAL Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count, const int orders[],
-                              double values[]);
+LOCAL Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count,
+                                    const int orders[], double values[]);
 
 /* The status of a call about `count` things of a kind that this FMU does not have. */
 LOCAL Status instance_none(Instance *c, const char *function, size_t count);
@@ -105,8 +105,9 @@ LOCAL Status instance_set_states(Instance *c, const char *function, const double
 LOCAL Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count);
 
 /* Derivatives of unknowns with respect to knowns, times a change of these, or the unknowns' weights times them. */
-LOCAL Status instance_directional(Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count,
-                            const unsigned knowns[], size_t known_count, const double seed[], double result[]);
+LOCAL Status instance_directional(Instance *c, const char *function, bool adjoint, const unsigned unknowns[],
+                                  size_t unknown_count, const unsigned knowns[], size_t known_count, const double seed[],
+                                  double result[]);
 
 /* Saved state */
 LOCAL Status instance_save(Instance *c, void **state);

@@ -34,7 +34,7 @@ static void inputs(const Plant *a, double u[ROOM(INPUTS)]) {
 
 /* The inputs at a time after the beginning of a step; the slope of a command is the acceleration that it demands. */
 static void inputs_after(const Plant *a, double t, double u[ROOM(INPUTS)]) {
-    for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]] + a->slopes[i] * t;
+    for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]] + a->slopes[i] * (t - a->slopes_from);
     for (int c = 0; c < COMMANDS; c++) u[commands[c].acceleration] += a->slopes[commands[c].input];
 }
 
@@ -252,7 +252,8 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
         a->fresh[c] = 0.0;
         a->applied[c] = u[commands[c].input];
     }
-    a->applied_time = a->time;
+    a->applied_time = a->seen_time = a->time;
+    inputs(a, a->seen);
     a->begun = 1.0;
     return GOOD;
 }
@@ -312,6 +313,23 @@ static Reason not_met(const Plant *a, const double x[STATES], double time, const
     return TOLERANCE_NOT_MET;
 }
 
+/* Inputs that the watch sets go on at the rate at which they have changed last, but not after a jump. */
+static void expect_inputs(Plant *a, double done, bool watched) {
+    double time = a->time - a->seen_time;
+    for (int i = 0; i < INPUTS; i++) {
+        double value = a->given[input_at[i]], last = a->seen_slopes[i], slope = time > 0.0 ? (value - a->seen[i]) / time : last;
+        if (watched && value != a->seen[i]) a->moved = 1.0;
+        a->seen[i] = value;
+        a->seen_slopes[i] = slope;
+        a->slopes[i] = fabs(slope) <= 4.0 * fabs(last) ? slope : 0.0;
+    }
+    if (a->moved == 0.0) memset(a->slopes, 0, sizeof a->slopes);
+    for (int c = 0; c < COMMANDS; c++) /* its rate is given */
+        if (a->given[input_at[commands[c].acceleration]] != 0.0) a->slopes[commands[c].input] = 0.0;
+    a->seen_time = a->time;
+    a->slopes_from = done;
+}
+
 /* Let the watch see the state reached, and take what it changed: inputs, commands, the end of the step. */
 static void look(Plant *a, double x[STATES], double time, double done, double *duration, const Watch *watch) {
     double end = time + *duration;
@@ -320,6 +338,7 @@ static void look(Plant *a, double x[STATES], double time, double done, double *d
     watch->call(watch->context, a, &end);
     plant_present(a, x);
     memset(a->fresh, 0, sizeof a->fresh);
+    expect_inputs(a, done, true);
     if (end < time + *duration) *duration = fmax(done, end - time);
 }
 
@@ -419,6 +438,8 @@ Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool e
     memcpy(x, a->x, sizeof x);
     apply(a, all, x);
     memset(a->fresh, 0, sizeof a->fresh);
+    a->slopes_from = 0.0;
+    if (watch) expect_inputs(a, 0.0, false);
     reason = integrate(a, x, time, &duration, watch, early, ended, sentence);
     if (reason != GOOD) {
         *a = before;
@@ -428,8 +449,8 @@ Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool e
     a->time = time + duration;
     for (int i = 0; i < INPUTS; i++) {
         /* an input that moved stays where it has come to */
-        a->given[input_at[i]] += a->slopes[i] * duration;
-        a->last_slopes[i] = a->slopes[i];
+        if (!watch) a->given[input_at[i]] += a->slopes[i] * duration;
+        a->last_slopes[i] = watch ? 0.0 : a->slopes[i];
         a->slopes[i] = 0.0;
     }
     return GOOD;

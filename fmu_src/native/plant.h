@@ -25,9 +25,12 @@ typedef struct {
     double given[VARIABLES];     /* parameters and inputs, by value reference */
     double slopes[ROOM(INPUTS)]; /* rates of change of the inputs over the next step */
     double last_slopes[ROOM(INPUTS)];
-    double follows;                 /* 1 in model exchange: commands act at every instant */
-    double fresh[ROOM(COMMANDS)];   /* 1 where the command was set since the last step (co-simulation) */
-    double applied[ROOM(COMMANDS)]; /* the commands at the last event, and its time (model exchange) */
+    double slopes_from;                                   /* time after the beginning of the step from which on they act */
+    double seen[ROOM(INPUTS)], seen_slopes[ROOM(INPUTS)]; /* inputs when the watch looked last, and the rates up to then */
+    double seen_time, moved;                              /* when that was; 1 where the watch changes inputs */
+    double follows;                                       /* 1 in model exchange: commands act at every instant */
+    double fresh[ROOM(COMMANDS)];                         /* 1 where the command was set since the last step (co-simulation) */
+    double applied[ROOM(COMMANDS)];                       /* the commands at the last event, and its time (model exchange) */
     double applied_time;
     double modes[ROOM(MODES)];
     double p[CONSTANTS];
@@ -55,7 +58,8 @@ LOCAL Reason plant_begin(Plant *a, char sentence[SENTENCE]);
 
 /* Go forward by a step under the inputs in force. A step that fails leaves all as it was. Where `early`, a step into the limit
    of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
-LOCAL Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);
+LOCAL Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended,
+                        char sentence[SENTENCE]);
 
 /* Whether the links can be joined at a state, clear of the limit of assembly; if not, the sentence. */
 LOCAL Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]);
@@ -84,7 +88,7 @@ LOCAL void plant_forward(const Plant *a, bool start, const double given[VARIABLE
 
 /* The gradient of a weighted sum of rows; `commanded` as the commands whose inputs it is asked for. */
 LOCAL void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)],
-                   double given[VARIABLES], double x[STATES]);
+                         double given[VARIABLES], double x[STATES]);
 
 /* A number in words, with a decimal point where the host's locale has a comma. */
 typedef char Digits[32];

@@ -48,6 +48,15 @@ def registered() -> Iterator[None]:
 
 
 @pytest.fixture
+def own_linkages() -> Iterator[None]:
+    """The linkages that a test describes are forgotten after it."""
+    before = dict(MECHANISMS)
+    yield
+    MECHANISMS.clear()
+    MECHANISMS.update(before)
+
+
+@pytest.fixture
 def phone(browser: Browser) -> Iterator[Any]:
     """The page on a phone, paused, and a finger or two on it: `touch(kind, points)`."""
     context = browser.new_context(

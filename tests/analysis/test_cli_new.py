@@ -8,9 +8,10 @@ from math import pi
 
 import pytest
 
-from analysis.cli.new import case_text, kinds
+from analysis.cli.new import LINKAGE, case_text, kinds
 from analysis.files import Many, Quantity, Whole, entry_names
 from analysis.files.template import example, meanings
+from analysis.linkages.description import Body, Description, Gear, Slide, Slot, Spring
 from analysis.mechanisms import MECHANISMS
 from analysis.run import RunTable, acting_on, load_case, load_parameters
 from analysis.slider import TABLES as MOTION
@@ -52,7 +53,7 @@ def names(lines):
     return {line.removeprefix("# ").partition(" = ")[0] for line in lines[1:]}
 
 
-@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("kind", [kind for kind in kinds() if kind != LINKAGE])
 def test_it_holds_every_entry_there_is(kind):
     found = sections(case_text(kind, "x.toml"))
     if kind in MECHANISMS:
@@ -75,7 +76,7 @@ def test_it_holds_every_entry_there_is(kind):
         assert names(found[table]) == set(entry_names(tables[table])), table
 
 
-@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("kind", [kind for kind in kinds() if kind != LINKAGE])
 def test_examples_behind_a_number_sign_are_taken(kind, tmp_path):
     text = case_text(kind, "x.toml")
     load(kind, write(tmp_path, text))
@@ -106,6 +107,19 @@ def test_a_new_run_runs_as_it_is(linkwork, tmp_path, kind):
     assert written.output == f"wrote {kind}.toml; next: linkwork run {kind}.toml\n"
     assert linkwork("run", f"{kind}.toml", "--no-plot").exit_code == 0
     assert (tmp_path / "out" / f"{kind}.csv").is_file()
+
+
+@pytest.mark.usefixtures("own_linkages")
+def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tmp_path):
+    assert linkwork("new", LINKAGE).output == "wrote linkage.toml; next: linkwork linkage linkage.toml\n"
+    assert "coupler, rocker" in linkwork("linkage", "linkage.toml").output
+    assert (tmp_path / "out" / "linkage.png").is_file()
+    assert "def places(" in linkwork("linkage", "linkage.toml", "--equations").output
+    assert linkwork("run", "linkage.toml", "--no-plot").exit_code == 0
+    text = (tmp_path / "linkage.toml").read_text()
+    for kind in (Body, Slide, Slot, Gear, Spring, Description):
+        for name in entry_names(kind):
+            assert re.search(rf"\b{name}\b", text), (kind, name)
 
 
 @pytest.mark.slow

@@ -14,21 +14,14 @@ import numpy as np
 import pytest
 
 from analysis.linkages import Package, described, linkage, load_linkage, mechanism
-from analysis.mechanisms import FIVE_BAR, MECHANISMS, check
+from analysis.mechanisms import FIVE_BAR, check
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import random_linkage
 
-
-@pytest.fixture(autouse=True)
-def only_our_own():
-    """Forget the mechanisms that a test registers."""
-    before = dict(MECHANISMS)
-    yield
-    MECHANISMS.clear()
-    MECHANISMS.update(before)
+pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
 def imported(package: Package, folder: Path) -> Any:

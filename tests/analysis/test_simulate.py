@@ -496,6 +496,43 @@ def test_a_run_cut_into_small_calls_is_the_same_run(case: str, monkeypatch: pyte
 # --- How a run ends early
 
 
+#: Next to no masses: on the spring's damper a disturbance dies out within 6e-11 s.
+LIGHT = replace(
+    TABLE_3_1, slider_mass=1e-9, coupler_mass=1e-9, rocker_mass=1e-9, coupler_inertia=1e-12, rocker_inertia=1e-12
+)
+
+
+def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "PATIENCE", 100_000)
+    whole, cut = (
+        simulate(LIGHT, Inputs(speed=SPEED), stop_time=t, step=1e-6, max_steps=3_000_000) for t in (4e-5, 1e-3)
+    )
+    assert (whole.status, cut.status) == (0, 4)
+    for run in (whole, cut):
+        assert "stiff" in run.message
+        assert "'Radau'" in run.message
+    assert cut.statistics["steps"] < 200_000
+    # the method that is named gets through in no time, and to the same place
+    other = simulate(LIGHT, Inputs(speed=SPEED), stop_time=4e-5, step=1e-6, method="Radau")
+    assert other.message == ""
+    assert other.statistics["evaluations"] < 1_000
+    assert other["slider.position"][-1] == pytest.approx(whole["slider.position"][-1], rel=1e-5)
+
+
+@pytest.mark.parametrize("method", ["compiled", "RK45"])
+@pytest.mark.parametrize("speed", [1e155, 1e308])
+def test_a_speed_beyond_all_numbers_is_refused(speed: float, method: str) -> None:
+    with pytest.raises(InputError, match=r"finite: crank\.speed is 1e\+"):
+        simulate(TABLE_3_1, Inputs(speed=speed), stop_time=1.0, method=method)
+
+
+@pytest.mark.parametrize(("mass", "warned"), [(0.59, False), (1e9, True)])
+def test_a_balance_of_energy_worse_than_the_tolerance_promises_is_noted(mass: float, warned: bool) -> None:
+    run = simulate(replace(TABLE_3_1, slider_mass=mass), Inputs(speed=SPEED), stop_time=1.0)
+    assert run.status == 0
+    assert ("balance of energy" in run.message) == warned
+
+
 SLIPS = replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=10.0)
 
 

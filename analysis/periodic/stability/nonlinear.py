@@ -466,7 +466,7 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
         )
         names = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
         states = np.column_stack([run[name] for name in (*names[::2], *names[1::2])])
-        return flow.unknowns(states, point.vector), run.message
+        return flow.unknowns(states, point.vector), run.message if run.status else ""
     passed = [start]
     for _ in range(turns):
         try:

@@ -1,0 +1,88 @@
+"""`linkwork linkage`: what a described linkage is, how it moves, its picture and its equations."""
+
+from __future__ import annotations
+
+from math import asin, degrees
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .common import handled, say, show_table
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False))
+@click.option("--equations", is_flag=True, help="Print the equations, as the FMU carries them, and nothing else.")
+@click.option(
+    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the picture."
+)
+@click.option("--animation", is_flag=True, help="Write an animation too.")
+@handled
+def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
+    """Describe the linkage of a FILE: structure, freedoms, dyads in order, range of motion; and draw it.
+
+    \b
+    Examples:
+      linkwork new linkage
+      linkwork linkage linkage.toml
+      linkwork linkage linkage.toml --equations > equations.py
+    """
+    from ..linkages import load_linkage
+
+    made = load_linkage(file)
+    if equations:
+        click.echo(Path(str(made.modules[-1].__file__)).read_text(encoding="utf-8"), nl=False)
+        return
+    _print_structure(file, made)
+    _print_reach(made)
+    from ..figures import animate, plot
+    from ..files import save_figure
+
+    folder = Path(out)
+    say(f"wrote {save_figure(plot(made), folder / f'{Path(file).stem}.png')}")
+    if animation:
+        say(f"wrote {animate(made, folder / f'{Path(file).stem}.gif')}")
+
+
+def _print_structure(file: str, made: Any) -> None:
+    """Print the joints, the freedoms and the steps by which the bodies follow."""
+    from ..files import read_tables
+    from ..linkages import Dyad, Geared, Package, described
+
+    package = Package(described(read_tables(file)["linkage"]))
+    d, structure = package.description, package.structure
+    lost = 3 * len(structure.bodies) - len(structure.freedoms)
+    say(
+        f"{made.title}: {len(d.bodies)} moving bodies, {len(structure.joints)} joints; "
+        f"3 x {len(structure.bodies)} - {lost} = {len(structure.freedoms)} freedoms by Gruebler's count"
+    )
+    rows = []
+    for step in structure.steps:
+        if isinstance(step, Dyad):
+            outer = " and ".join(side.joint.name for side in step.sides)
+            bodies = ", ".join(body for side in step.sides for body in side.bodies)
+            rows.append((bodies, f"dyad {step.kind}", f"held at {outer}, joined at {step.inner.name}"))
+        elif isinstance(step, Geared):
+            rows.append((step.body, "gear", f"pinned at {step.pin.name}, geared to {step.mate}"))
+        else:
+            freedom = package.interface.drives[step.freedom]
+            driven = f", driven as {freedom.table}" if freedom.table else ""
+            rows.append((step.body, f"freedom {freedom.name}", f"from {step.parent} at {step.joint.name}{driven}"))
+    show_table("how the bodies follow", ("body", "by", "joints"), rows, words=("body", "by", "joints"))
+
+
+def _print_reach(made: Any) -> None:
+    """Print the range of each freedom."""
+    from ..linkages import reach
+
+    rows = []
+    for number, freedom in enumerate(made.freedoms):
+        found = reach(made, number)
+        factor, unit = (degrees(1.0), "deg") if freedom.coordinate.endswith("angle") else (1e3, "mm")
+        span = "turns" if found.turns else f"{factor * found.low:.4g} to {factor * found.high:.4g} {unit}"
+        rows.append((freedom.coordinate, span, f"{degrees(asin(min(1.0, found.least))):.3g}"))
+    columns = ("freedom", "range of motion", "least transmission angle [deg]")
+    show_table(
+        "range of motion, the other freedoms at their start", columns, rows, words=("freedom", "range of motion")
+    )

@@ -1,0 +1,199 @@
+"""The picture of any planar mechanism from its `Drawing`: links, bearings, guides, springs, and the paths of its points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+from numpy.typing import NDArray
+
+from linkwork.mechanism import Mechanism, Part
+
+from ..linkages import reach
+from ..linkages.reach import start
+from ..mechanisms import mechanism_of
+from ..run import Trajectory
+from .animation import check_frames, gif
+from .dispatch import animate, last_samples, plot
+from .style import (
+    BLOCK,
+    COLOURS,
+    DOT,
+    GROUND,
+    HAIR,
+    LINE,
+    MARKED,
+    SMALL,
+    THIN,
+    TRACE,
+    Figure,
+    finish,
+    styled,
+    write_title,
+)
+
+Array = NDArray[np.float64]
+_SIDE = 5.0
+#: Configurations along a path.
+_TRACED = 240
+
+
+def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[str, Array]:
+    """Return the places of the drawing's joints in mm by name, (n, 2), at coordinates of the freedoms (n, freedoms).
+
+    Where the bodies cannot be joined they are NaN, a gap in a path.
+    """
+    drawing = mechanism.drawing
+    assert drawing is not None
+    p = parameters.constants()
+    acting = mechanism.equations.applied((0.0,) * len(mechanism.modes), (0.0,) * len(mechanism.channels), p)
+    found = np.full((len(coordinates), len(drawing.joints), 3), np.nan)
+    rest = (0.0,) * (mechanism.size - len(mechanism.freedoms))
+    for row, q in zip(found, coordinates):
+        try:
+            row[:] = np.reshape(drawing.positions((*map(float, q), *rest), acting, p), (-1, 3))
+        except (ArithmeticError, ValueError):
+            continue
+    return {joint.name: 1e3 * found[:, n, :2] for n, joint in enumerate(drawing.joints)}
+
+
+def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array], *, letters: bool = True) -> None:
+    """Draw a mechanism at the first of some configurations, and the paths of its points over all of them."""
+    drawing = mechanism.drawing
+    assert drawing is not None
+    now = {name: path[0] for name, path in at.items()}
+    everything = np.concatenate(list(at.values()))
+    unit = 0.03 * float(np.nanmax(np.ptp(everything[np.isfinite(everything).all(axis=1)], axis=0)))
+    for name in drawing.paths:
+        axis.plot(*at[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
+    colours = cycle(COLOURS)
+    for part in drawing.parts:
+        if not part.where or _value(mechanism, parameters, part.where) != 0.0:
+            _draw_part(axis, part, [now[name] for name in part.joints], unit, colours)
+    shown = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")} | set(
+        drawing.paths
+    )
+    for name in (joint.name for joint in drawing.joints if joint.name in shown):
+        x, y = now[name]
+        axis.plot(x, y, "o", markersize=DOT, markerfacecolor="white", markeredgecolor=GROUND, zorder=6)
+        if letters and not name.endswith("Block"):
+            axis.annotate(name, (x, y), (4, 4), textcoords="offset points", fontsize=SMALL, color=MARKED, zorder=7)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.margins(0.08)
+    axis.set_xlabel("x [mm]")
+    axis.set_ylabel("y [mm]")
+
+
+def _value(mechanism: Mechanism, parameters: Any, name: str) -> float:
+    return float(getattr(parameters, name.replace(".", "_", 1), 0.0))
+
+
+def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:
+    """Draw a part through its joints; ``unit`` is the size of symbols."""
+    first, last = through[0], through[-1]
+    if part.kind == "link":
+        colour = next(colours)
+        if len(through) > 2:
+            axis.add_patch(
+                Polygon(_around(through), facecolor=colour, alpha=0.15, edgecolor=colour, linewidth=THIN, zorder=3)
+            )
+        axis.plot(*np.array(through).T, color=colour, linewidth=2.0 * LINE, solid_capstyle="round", zorder=4)
+    elif part.kind == "pivot":
+        base = np.array([[0.0, 0.0], [-unit, -1.6 * unit], [unit, -1.6 * unit]])
+        axis.add_patch(Polygon(first + base, facecolor="0.85", edgecolor=GROUND, linewidth=THIN, zorder=1))
+    elif part.kind in ("guide", "axis"):
+        style = "-." if part.kind == "guide" else ":"
+        axis.plot(*np.array([first, last]).T, color="0.6", linewidth=HAIR, linestyle=style, zorder=1)
+    elif part.kind in ("slider", "spring"):
+        along = (through[2] - through[1]) / np.linalg.norm(through[2] - through[1])
+        across = np.array([-along[1], along[0]])
+        if part.kind == "slider":
+            signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+            corners = [first + 1.5 * a * unit * along + 0.9 * b * unit * across for a, b in signs]
+            axis.add_patch(Polygon(corners, facecolor=BLOCK, edgecolor=GROUND, linewidth=THIN, zorder=3))
+        else:
+            wave = 0.5 * unit * np.array([0.0, 0.0, *([1.0, -1.0] * 5), 0.0, 0.0])
+            coil = first + np.outer(np.linspace(0.0, 5.0 * unit, len(wave)), along) + np.outer(wave, across)
+            axis.plot(*coil.T, color="0.5", linewidth=THIN, zorder=2)
+
+
+def _around(points: Sequence[Array]) -> Array:
+    """Return points in the order of their angles about their middle."""
+    array = np.array(points)
+    spread = array - array.mean(axis=0)
+    return array[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))]
+
+
+def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
+    """Draw a mechanism as `dispatch.draw_mechanism` does."""
+    mechanism = mechanism_of(parameters)
+    samples, words = last_samples(run)
+    names = [freedom.coordinate for freedom in mechanism.freedoms]
+    coordinates = np.column_stack([run[name][samples] for name in names])
+    chosen = np.unique(np.linspace(0, len(coordinates) - 1, min(len(coordinates), 2000)).astype(int))
+    at = places(mechanism, parameters, coordinates[chosen])
+    draw(axis, mechanism, parameters, at)
+    drawing = mechanism.drawing
+    assert drawing is not None
+    return f"the {mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
+
+
+def _swept(mechanism: Mechanism) -> Array:
+    """Return coordinates from the start on through the range of the first freedom, the others at their start."""
+    found = reach(mechanism)
+    q = np.linspace(found.low, found.high, _TRACED)
+    middle = start(mechanism)
+    rows = np.tile(middle, (_TRACED + 1, 1))
+    rows[1:, 0] = q
+    return rows
+
+
+@plot.register
+def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
+    """Draw a planar mechanism at its start, and the paths of its points through the range of its first freedom."""
+    known = next(iter(mechanism.published.values()))
+    with styled():
+        figure = Figure(figsize=(1.3 * _SIDE, _SIDE))
+        axis = figure.add_subplot()
+        draw(axis, mechanism, known.parameters, places(mechanism, known.parameters, _swept(mechanism)))
+        write_title(figure, title or mechanism.title)
+        return finish(figure)
+
+
+@animate.register
+def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, title: str = "") -> Path:
+    """Write an animation (GIF) of a planar mechanism through the range of its first freedom, forth and back if it cannot turn.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two frames.
+    """
+    check_frames(frames)
+    known = next(iter(mechanism.published.values()))
+    swept = _swept(mechanism)[1:]
+    at = places(mechanism, known.parameters, swept)
+    order = np.linspace(0, len(swept) - 1, frames).astype(int)
+    if not reach(mechanism).turns:
+        order = np.concatenate([order, order[::-1]])
+    points = np.concatenate(list(at.values()))
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    room = 0.06 * float((high - low).max())
+    with styled():
+        figure = Figure(figsize=(_SIDE, _SIDE))
+        axis = figure.add_subplot()
+        with gif(figure, path, 25) as (file, add_frame):
+            for number in order:
+                axis.clear()
+                now = {name: np.concatenate([line[number : number + 1], line]) for name, line in at.items()}
+                draw(axis, mechanism, known.parameters, now, letters=False)
+                axis.set_aspect("equal", adjustable="box")
+                axis.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
+                axis.set_title(title or mechanism.title)
+                add_frame()
+    return file

@@ -1,0 +1,87 @@
+"""How far a linkage can move: where its bodies can be joined as one freedom runs through its range."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from linkwork.limits import LIMIT_SINE
+from linkwork.mechanism import Mechanism
+
+
+class Reach(NamedTuple):
+    """The range of a freedom about its start in which the bodies can be joined, the other freedoms at their start.
+
+    Attributes
+    ----------
+    freedom : int
+    low, high : float
+        Ends of the range (rad, m): dead centres, or the ends of a turn.
+    turns : bool
+        Whether the freedom can make a whole turn.
+    least : float
+        Least clearance of any dyad in the range, the sine of its transmission angle.
+    """
+
+    freedom: int
+    low: float
+    high: float
+    turns: bool
+    least: float
+
+
+def clearance(mechanism: Mechanism, x: NDArray[np.float64]) -> float:
+    """Return the clearance of the start at other coordinates; -1 where the bodies do not reach each other."""
+    known = next(iter(mechanism.published.values()))
+    p = known.parameters.constants()
+    acting = mechanism.equations.applied(
+        tuple(float(mode.default) for mode in mechanism.modes), (0.0,) * len(mechanism.channels), p
+    )
+    try:
+        return float(mechanism.equations.clearance((*x, *(0.0,) * (mechanism.size - len(x))), acting, p))
+    except (ArithmeticError, ValueError):
+        return -1.0
+
+
+def start(mechanism: Mechanism) -> NDArray[np.float64]:
+    """Return the coordinates at the start."""
+    known = next(iter(mechanism.published.values()))
+    return np.array(mechanism.state(known.initial)[: len(mechanism.freedoms)])
+
+
+def reach(mechanism: Mechanism, freedom: int = 0, *, most: float = 1.0, samples: int = 360) -> Reach:
+    """Find the range of a freedom.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    freedom : int
+    most : float
+        Of a freedom that does not turn, the distance from the start that is looked at (rad, m).
+    samples : int
+        Places looked at to either side.
+    """
+    period = mechanism.freedoms[freedom].period
+    most = 0.5 * period if period else most
+    ends, least = [], clearance(mechanism, start(mechanism))
+
+    def margin(q: float) -> float:
+        x = start(mechanism)
+        x[freedom] = q
+        return clearance(mechanism, x) - LIMIT_SINE
+
+    middle = float(start(mechanism)[freedom])
+    for sign in (-1.0, 1.0):
+        before = middle
+        for q in middle + sign * most * np.arange(1, samples + 1) / samples:
+            value = margin(float(q))
+            if value < 0.0:
+                before = float(brentq(lambda c: max(margin(c), -1.0), before, float(q), xtol=1e-9 * most))
+                break
+            least, before = min(least, value + LIMIT_SINE), float(q)
+        ends.append(before)
+    whole = bool(period) and ends[1] - ends[0] > period * (1.0 - 1e-9)
+    return Reach(freedom, ends[0], ends[1], whole, least)
