@@ -43,11 +43,6 @@ class Turn(Protocol):
     """One period of a motion at equal steps of the crank angle, without its end, such as `periodic.Turn`."""
 
     @property
-    def angle(self) -> FloatArray:
-        """Angle of the crank from the start, shape (n,)."""
-        ...
-
-    @property
     def time(self) -> FloatArray: ...
 
     @property
@@ -268,7 +263,8 @@ def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]
     """Resample a turn from equal steps of the crank angle to equal steps of time: states and channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
     ways = (turn.states[:, :count] - turn.states[0, :count]).T
-    crank = min(mechanism.cyclic, key=lambda k: float(np.abs(ways[k] - turn.angle).max()))
+    # the turn has equal steps of one crank
+    crank = min(mechanism.cyclic, key=lambda k: float(np.ptp(np.diff(ways[k]))))
     angle, way = ways[crank], ways[crank][-1] * n / (n - 1)
     wanted = period * np.arange(n) / n
     lead = trigonometric(turn.time - wanted, way)
