@@ -240,16 +240,18 @@ def closed_form_pictures() -> Iterator[Picture]:
 
 
 def linkage_pictures() -> Iterator[Picture]:
-    """Draw the picture of docs/linkages.md."""
+    """Draw the pictures of docs/linkages.md and docs/linkage-library.md."""
     import tempfile
 
-    from analysis.figures import plot
+    from analysis.figures import plot, plot_schemes
     from analysis.linkages import TEXT, load_linkage
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "four-bar.toml"
         path.write_text(TEXT.format(file=path.name), encoding="utf-8")
         yield "four-bar", plot(load_linkage(path)), 90
+    files = sorted((HERE.parent / "examples" / "linkages").glob("*.toml"))
+    yield "linkage-library", plot_schemes([load_linkage(path) for path in files]), 90
 
 
 def race_pictures() -> Iterator[Picture]:

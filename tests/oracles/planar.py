@@ -11,8 +11,17 @@ from typing import Any, NamedTuple
 
 import casadi
 import numpy as np
+import pint
 
 from analysis.linkages.description import GROUND, Description
+from linkwork.friction import FRICTION_RATE, FRICTION_SPEED
+
+_UNITS = pint.UnitRegistry()
+
+
+def number(value: Any) -> float:
+    """A number in SI of an entry that may be a text with a unit."""
+    return float(_UNITS.Quantity(value).to_base_units().magnitude) if isinstance(value, str) else float(value)
 
 
 class Solution(NamedTuple):
@@ -38,6 +47,7 @@ class Multipliers:
                 owners.setdefault(own, []).append(name)
         self.owners = owners
         self.rows: dict[str, tuple[int, int]] = {}
+        self._functions: dict[Any, Any] = {}
         rows: list[Any] = []
 
         def closed(name: str, *equations: Any) -> None:
@@ -62,6 +72,8 @@ class Multipliers:
             closed(name, b - g.ratio * a - g.phase)
         self.closure = casadi.vertcat(*rows)
         self.freedoms = casadi.vertcat(*(self.coordinate(f.joint) for f in description.freedoms.values()))
+        both = casadi.vertcat(self.closure, self.freedoms)
+        self.joints = casadi.Function("joints", [self.q], [both, casadi.jacobian(both, self.q)])
 
     def pose(self, body: str) -> Any:
         """Place of a body."""
@@ -107,10 +119,17 @@ class Multipliers:
         (ax, ay), (bx, by) = (self.at(self.moving(own), own) for own in s.between)
         return casadi.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
 
+    def mass(self, name: str) -> tuple[float, tuple[float, float], float]:
+        """Mass, centre of mass in the body and moment of inertia of a body."""
+        body = self.d.bodies[name]
+        if body.section is not None:
+            mass, centre, inertia = body.section.properties(body.length)
+            return (mass, centre, inertia) if body.mass is None else (body.mass, centre, inertia * body.mass / mass)
+        return body.mass or 0.0, body.cog if body.cog is not None else (0.5 * body.length, 0.0), body.inertia or 0.0
+
     def centre(self, name: str) -> tuple[Any, Any]:
         """Centre of mass of a body."""
-        body = self.d.bodies[name]
-        x, y = body.cog if body.cog is not None else (0.5 * body.length, 0.0)
+        x, y = self.mass(name)[1]
         px, py, angle = casadi.vertsplit(self.pose(name))
         return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
 
@@ -133,6 +152,56 @@ class Multipliers:
             if own in forces:
                 forces[own] = forces[own] + sign * force * (1.0 if self.owners[own][0] == body else -1.0)
 
+    def placed(self, coordinates: np.ndarray, guess: np.ndarray) -> np.ndarray:
+        """Places of the bodies at coordinates of the freedoms, by Newton's method."""
+        q = guess
+        for _ in range(20):
+            residual, jacobian = (np.asarray(a) for a in self.joints(q))
+            residual[len(residual) - len(coordinates) :, 0] -= coordinates
+            q = q - np.linalg.solve(jacobian, residual[:, 0])
+            if np.abs(residual).max() < 1e-13:
+                return q
+        return q
+
+    def function(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
+        """Derivatives of closure and freedoms, drift, mass matrix, forces and kinetic energy, as a function."""
+        key = (*points.items(), *forces.items())
+        if key not in self._functions:
+            self._functions[key] = self._made(points, forces)
+        return self._functions[key]
+
+    def _made(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
+        jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
+        drift = casadi.jtimes(
+            casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
+        )
+        kinetic = casadi.SX(0)
+        for n, name in enumerate(self.bodies):
+            mass, _, inertia = self.mass(name)
+            vx, vy = (casadi.jtimes(c, self.q, self.v) for c in self.centre(name))
+            kinetic += 0.5 * mass * (vx**2 + vy**2) + 0.5 * inertia * self.v[3 * n + 2] ** 2
+        momentum = casadi.gradient(kinetic, self.v)
+        force = casadi.gradient(kinetic, self.q) - casadi.jtimes(momentum, self.q, self.v)
+        g = self.d.gravity * np.array([np.cos(self.d.gravity_direction), np.sin(self.d.gravity_direction)])
+        for name in self.bodies:
+            for component, c in zip(g, self.centre(name)):
+                force += self.mass(name)[0] * component * casadi.gradient(c, self.q)
+        for name, s in self.d.springs.items():
+            measure = self.stretch(s)
+            x, v = measure - number(s.free), casadi.jtimes(measure, self.q, self.v)
+            law = eval(s.law, {"x": x, "v": v, "fabs": casadi.fabs}) if s.law else 0.0
+            slow = FRICTION_RATE if s.at and s.at not in self.d.slides else FRICTION_SPEED
+            law += number(s.friction) * casadi.tanh(v / slow)
+            pull = number(s.stiffness) * x + number(s.damping) * v + law - forces.get(name, 0.0)
+            force -= pull * casadi.gradient(measure, self.q)
+        for name in self.d.torques:
+            force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
+        for own, (fx, fy) in points.items():
+            x, y = self.at(self.moving(own), own)
+            force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
+        inertia_of = casadi.jacobian(momentum, self.v)
+        return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
+
     def solve(
         self,
         q: np.ndarray,
@@ -146,34 +215,7 @@ class Multipliers:
 
         ``points`` are forces on points, ``forces`` torques on bodies and forces of driven springs by their names.
         """
-        jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
-        drift = casadi.jtimes(
-            casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
-        )
-        kinetic = casadi.SX(0)
-        for n, name in enumerate(self.bodies):
-            body = self.d.bodies[name]
-            vx, vy = (casadi.jtimes(c, self.q, self.v) for c in self.centre(name))
-            kinetic += 0.5 * (body.mass or 0.0) * (vx**2 + vy**2) + 0.5 * (body.inertia or 0.0) * self.v[3 * n + 2] ** 2
-        momentum = casadi.gradient(kinetic, self.v)
-        force = casadi.gradient(kinetic, self.q) - casadi.jtimes(momentum, self.q, self.v)
-        g = self.d.gravity * np.array([np.cos(self.d.gravity_direction), np.sin(self.d.gravity_direction)])
-        for name in self.bodies:
-            for component, c in zip(g, self.centre(name)):
-                force += (self.d.bodies[name].mass or 0.0) * component * casadi.gradient(c, self.q)
-        for name, s in self.d.springs.items():
-            measure = self.stretch(s)
-            x, v = measure - float(s.free), casadi.jtimes(measure, self.q, self.v)
-            law = eval(s.law, {"x": x, "v": v, "fabs": casadi.fabs}) if s.law else 0.0
-            pull = float(s.stiffness) * x + float(s.damping) * v + law - forces.get(name, 0.0)
-            force -= pull * casadi.gradient(measure, self.q)
-        for name in self.d.torques:
-            force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
-        for own, (fx, fy) in points.items():
-            x, y = self.at(self.moving(own), own)
-            force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
-        mass = casadi.jacobian(momentum, self.v)
-        f = casadi.Function("f", [self.q, self.v], [jacobian, drift, mass, force, kinetic])
+        f = self.function(points, forces)
         j = np.asarray(f(q, np.zeros(len(q)))[0])
         size, count = self.closure.numel(), self.freedoms.numel()
         v = np.linalg.solve(j, np.concatenate([np.zeros(size), rates]))
