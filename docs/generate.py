@@ -119,6 +119,13 @@ def probe(of: str, page: str) -> str:
     )
 
 
+def accuracy(of: str, page: str) -> str:
+    """Return the table of work and precision of a mechanism's FMUs."""
+    from analysis.export.accuracy import HEADINGS, known, texts
+
+    return _markdown(f"| {' | '.join(HEADINGS)} |", (tuple(texts(row)) for row in known(MECHANISMS[of])))
+
+
 def race(of: str, page: str) -> str:
     """Return a table of the searches' results in docs/race.csv."""
     from benchmarks.race import markdown, read
@@ -138,7 +145,7 @@ CHAPTERS = (*"345678", "R", "ours")
 #: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
-    "crossing": crossing,
+    "crossing": crossing, "accuracy": accuracy,
 }  # fmt: skip
 
 
@@ -233,16 +240,18 @@ def closed_form_pictures() -> Iterator[Picture]:
 
 
 def linkage_pictures() -> Iterator[Picture]:
-    """Draw the picture of docs/linkages.md."""
+    """Draw the pictures of docs/linkages.md and docs/linkage-library.md."""
     import tempfile
 
-    from analysis.figures import plot
+    from analysis.figures import plot, plot_schemes
     from analysis.linkages import TEXT, load_linkage
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "four-bar.toml"
         path.write_text(TEXT.format(file=path.name), encoding="utf-8")
         yield "four-bar", plot(load_linkage(path)), 90
+    files = sorted((HERE.parent / "examples" / "linkages").glob("*.toml"))
+    yield "linkage-library", plot_schemes([load_linkage(path) for path in files]), 90
 
 
 def race_pictures() -> Iterator[Picture]:

@@ -94,11 +94,13 @@ def examples(dest: str, force: bool) -> None:
     """
     source = next(folder for folder in EXAMPLES if folder.is_dir())
     folder = Path(dest)
-    files = sorted(path for path in source.iterdir() if path.is_file())
-    there = [path.name for path in files if (folder / path.name).exists()]
+    files = sorted(
+        path.relative_to(source) for path in source.rglob("*") if path.is_file() and path.parent.name != "__pycache__"
+    )
+    there = [str(path) for path in files if (folder / path).exists()]
     if there and not force:
         raise click.UsageError(f"{folder} has {', '.join(there)} already: give --force to write over them, or --dest")
-    folder.mkdir(parents=True, exist_ok=True)
     for path in files:
-        shutil.copyfile(path, folder / path.name)
-    say(f"wrote {len(files)} files to {folder}: {', '.join(path.name for path in files)}")
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source / path, folder / path)
+    say(f"wrote {len(files)} files to {folder}: {', '.join(map(str, files))}")

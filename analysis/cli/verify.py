@@ -14,18 +14,26 @@ from .common import CHECK_FAILED, console, handled, print_error, show_table, tol
 @tolerance_option(
     help="Greatest relative difference; by default what the FMU states, or 100 times the solver's tolerance."
 )
+@click.option("--rebuild", is_flag=True, help="Compile an FMU of Linkwork again from its own sources, and compare.")
 @handled
-def verify(fmu: str, tolerance: float | None) -> None:
+def verify(fmu: str, tolerance: float | None, rebuild: bool) -> None:
     """Run the experiments that an FMU of any make carries (FMI-LS-REF), and compare with its reference results.
 
     The largest difference of each experiment is shown, relative to the variable's scale. The exit code is 4 if one is too
     large.
 
+    With --rebuild the files of an FMU of Linkwork are compared with its bill of materials, and its libraries with those that
+    its sources give here.
+
     \b
     Examples:
       linkwork verify build/FiveBarSlider-native.fmu
       linkwork verify other.fmu --tolerance 1e-4
+      linkwork verify build/FiveBarSlider-native.fmu --rebuild
     """
+    if rebuild:
+        _rebuild(fmu)
+        return
     from ..run import verify as verify_fmu
 
     rows, failed, interface = [], [], ""
@@ -56,3 +64,20 @@ def verify(fmu: str, tolerance: float | None) -> None:
         sys.exit(CHECK_FAILED)
     count = len({row[0] for row in rows})
     console.print(f"{count} of {count} experiments pass", style="green", highlight=False)
+
+
+def _rebuild(fmu: str) -> None:
+    """Print whether each part of an FMU comes again from its sources; exits where one does not."""
+    from ..export import rebuild as rebuild_fmu
+
+    with console.status("building"):
+        parts = list(rebuild_fmu(fmu))
+    rows = [(part.what, part.text, "same" if part.same else "DIFFERS") for part in parts]
+    show_table(
+        fmu, ("part", "compared with", "verdict"), rows, words=("part", "compared with", "verdict"),
+        styles=[None if part.same else "red" for part in parts],
+    )  # fmt: skip
+    if not all(part.same for part in parts):
+        print_error("rebuild failed: the FMU does not come of its sources with the programs installed here", "red")
+        sys.exit(CHECK_FAILED)
+    console.print("the FMU comes of its sources", style="green", highlight=False)

@@ -7,6 +7,7 @@ from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .interface import Entry, interface, with_starts
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
+from .rebuild import Compared, rebuild
 from .web import build_web, crank_number
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "SOURCES",
     "BuildError",
     "Built",
+    "Compared",
     "Entry",
     "Kind",
     "build",
@@ -29,6 +31,7 @@ __all__ = [
     "interface",
     "kinds_here",
     "publish",
+    "rebuild",
     "source_files",
     "this_platform",
     "try_out",

@@ -18,6 +18,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
 from ..run import unpacking_folder
+from .accuracy import to_html
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The source root: beside the analysis package in a checkout, inside it where Linkwork is installed as a wheel.
@@ -59,7 +60,7 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
             for name in sorted(entries, key=lambda entry: (entry != "modelDescription.xml", entry)):
                 info = zipfile.ZipInfo(name, EPOCH)
                 info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = 0o644 << 16
+                info.external_attr, info.create_system = 0o644 << 16, 3  # those of Unix, on Windows too
                 archive.writestr(info, entries[name])
         problems = validate_fmu(str(part))
         if problems:
@@ -102,7 +103,7 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
 <h1><img src="../model.png" alt="" height="60"> {html.escape(mechanism.title)}</h1>
 <p>{html.escape(made)}, Linkwork {linkwork.__version__}. MIT licence.</p>
 {paragraphs}
-<h2>Variables</h2>
+{to_html(mechanism)}<h2>Variables</h2>
 <table>
 <tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th>range</th><th>description</th></tr>
 {body}

@@ -125,7 +125,7 @@ def token(mechanism: Mechanism, kind: Kind) -> str:
 def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -> bytes:
     """Return ``modelDescription.xml`` of an FMU.
 
-    The same mechanism gives the same bytes, but for the date of generation, which ``SOURCE_DATE_EPOCH`` sets.
+    The same mechanism gives the same bytes; there is a date of generation only where ``SOURCE_DATE_EPOCH`` sets it.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -
             "modelName": mechanism.fmu,
             "guid" if kind.fmi == 2 else "instantiationToken": token(mechanism, kind),
             "generationTool": kind.tool,
-            "generationDateAndTime": _date(),
+            **_date(),
             "variableNamingConvention": "structured",
             "description": mechanism.description,
             "author": AUTHOR,
@@ -177,10 +177,12 @@ def _entries(mechanism: Mechanism, kind: Kind) -> tuple[Entry, ...]:
     return entries if kind.native else entries[: len(mechanism.variables)]
 
 
-def _date() -> str:
+def _date() -> dict[str, str]:
+    """Return the date of generation, which would make every build another, only if ``SOURCE_DATE_EPOCH`` sets it."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    moment = datetime.now(UTC) if epoch is None else datetime.fromtimestamp(int(epoch), UTC)
-    return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
+    if not epoch:
+        return {}
+    return {"generationDateAndTime": datetime.fromtimestamp(int(epoch), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")}
 
 
 def _written(root: Element) -> bytes:

@@ -5,9 +5,10 @@ The files are those of the layered standard FMI-LS-REF; `analysis.run.experiment
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
+from math import floor, log10
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -17,10 +18,11 @@ from linkwork.plant import Plant
 
 from ..mechanisms import MECHANISMS
 from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, held_inputs, standard_cases
+from .bill import BILL, TYPE
 from .compatibility import table
 
-#: Communication steps of an experiment, and rows of its reference.
-STEPS, ROWS = 100, 10
+#: Communication steps of an experiment, rows of its reference, and digits of its numbers.
+STEPS, ROWS, DIGITS = 100, 10, 12
 #: Tolerances of the reference and of the experiment; the greatest relative difference between them.
 REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
 _LAYERED = "http://fmi-standard.org/fmi-ls-manifest"
@@ -32,7 +34,7 @@ _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 
 @cache
 def experiments(mechanism: Mechanism) -> dict[str, bytes]:
-    """Return the files of a mechanism's experiments, by their places in the archive.
+    """Return the files of a mechanism's experiments and their manifest, by their places in the archive.
 
     An unregistered mechanism, or one without cases, has its default experiment alone.
     """
@@ -68,11 +70,11 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         constant = {name: float(starts[name]) for name in mechanism.input_names}
         add("default", "default experiment", starts, mechanism.experiment[1], lambda number, outputs: constant)
     files[_EXPERIMENTS[0]] = _xml(root)
-    return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()}
+    return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()} | {MANIFEST: _manifest()}
 
 
-def manifest(related: Iterable[tuple[str, str, str, str]] = ()) -> dict[str, bytes]:
-    """Return the manifest of FMI-LS-REF by its place: the experiments, and other files by source, type, role, description."""
+def _manifest() -> bytes:
+    """Return the manifest of FMI-LS-REF: the experiments, and the bill of materials."""
     root = Element(
         "fmiReferences",
         {
@@ -83,9 +85,10 @@ def manifest(related: Iterable[tuple[str, str, str, str]] = ()) -> dict[str, byt
         },
     )
     own = (*_EXPERIMENTS, "experiment/smoke-test", "Standard cases with reference results")
-    for source, kind, role, text in (own, *related):
+    bill = (f"../{BILL.partition('/')[2]}", TYPE, "meta-data", "Bill of materials")
+    for source, kind, role, text in (own, bill):
         SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": text})
-    return {MANIFEST: _xml(root)}
+    return _xml(root)
 
 
 #: The inputs of a step by name, from its number and the outputs at its start.
@@ -108,7 +111,11 @@ def _reference(
     mechanism: Mechanism, values: Mapping[str, Any], times: Sequence[float], inputs: _Inputs
 ) -> tuple[list[list[float]], list[list[float]]]:
     """Return the inputs of all steps, and the outputs at the end of some, before the next inputs, both after the time."""
-    first = inputs(0, None)
+
+    def rounded(number: int, outputs: Sequence[float] | None) -> dict[str, float]:
+        return {name: float(f"{value:.{DIGITS}g}") for name, value in inputs(number, outputs).items()}
+
+    first = rounded(0, None)
     starts = {v.name: v.start for v in mechanism.variables}
     plant = Plant.of_values(mechanism, {**starts, **values, **first}, tolerance=REFERENCE, time=times[0])
     stimuli = [[times[0], *(first[name] for name in mechanism.input_names)]]
@@ -119,12 +126,24 @@ def _reference(
         plant.step(times[n - 1], time - times[n - 1])
         outputs = list(plant.outputs())
         if n * ROWS % STEPS == 0:
-            rows.append([time, *(float(f"{outputs[place]:.12g}") for place in places)])
-        now = inputs(n, outputs)
+            rows.append([time, *(outputs[place] for place in places)])
+        now = rounded(n, outputs)
         stimuli.append([time, *(now[name] for name in mechanism.input_names)])
         for name, value in now.items():
             plant.set_input(name, value)
-    return stimuli, rows
+    return stimuli, _rounded(mechanism, rows)
+
+
+def _rounded(mechanism: Mechanism, rows: list[list[float]]) -> list[list[float]]:
+    """Round results, after the time, to `DIGITS` of the largest of their unit: another C library gives the same texts."""
+    units = [v.unit for v in mechanism.variables if v.name in mechanism.output_names]
+    units = ["", *(units[place] for place in _results(mechanism))]
+    largest: dict[str, float] = {}
+    for unit, column in zip(units, zip(*rows)):
+        largest[unit] = max(*map(abs, column), largest.get(unit, 0.0))
+    places = {unit: DIGITS - 1 - floor(log10(size)) if size > 0.0 else 0 for unit, size in largest.items()}
+    # adding zero makes -0.0 zero
+    return [[row[0], *(round(v, places[unit]) + 0.0 for v, unit in zip(row[1:], units[1:]))] for row in rows]
 
 
 def _parameter_set(name: str, values: Mapping[str, Any]) -> bytes:

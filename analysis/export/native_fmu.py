@@ -25,9 +25,10 @@ from ..mechanisms import check
 from ..numerics.cache import code_folder, hashes_below, keep_hashes, read_hashes
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
+from .bill import with_bill
 from .description import Kind, build_description, description, terminals
 from .equations_c import generated
-from .experiments import experiments, manifest
+from .experiments import experiments
 from .interface import interface
 
 
@@ -123,7 +124,7 @@ def build_native(
     sources = source_files(mechanism, kind)
     identifier = kind.identifier(mechanism)
     entries = {f"sources/{name}": text.encode() for name, text in sources.items()}
-    entries |= _binaries(identifier, kind, sources, platforms)
+    entries |= compile_binaries(identifier, kind, sources, platforms)
     entries["modelDescription.xml"] = description(mechanism, kind, COMPILED)
     entries["sources/buildDescription.xml"] = build_description(identifier, COMPILED)
     if kind.fmi == 3:
@@ -131,8 +132,9 @@ def build_native(
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
     entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES)
-    entries |= experiments(mechanism) | manifest()
-    return write(entries, dest / kind.file_name(mechanism))
+    entries |= experiments(mechanism)
+    target = dest / kind.file_name(mechanism)
+    return write(with_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
 
 
 def source_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
@@ -160,7 +162,9 @@ def _with_prefix(fmi2: str, fmi3: str) -> str:
     return fmi2[:first] + lines.replace("FMI3", "FMI2").replace("fmi3", "fmi2") + fmi2[fmi2.index(last) + len(last) :]
 
 
-def _binaries(identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]) -> dict[str, bytes]:
+def compile_binaries(
+    identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]
+) -> dict[str, bytes]:
     """Compile the libraries and return them by place in the archive; two architectures of macOS share one file."""
     found: dict[str, list[bytes]] = {}
     with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:

@@ -24,8 +24,9 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
 from .archive import SOURCES, BuildError, documentation, write
+from .bill import with_bill
 from .description import PYTHON, description, token
-from .experiments import experiments, manifest
+from .experiments import experiments
 
 #: The oldest Python that what travels in the FMUs runs on.
 OLDEST = (3, 10)
@@ -81,8 +82,9 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     entries["modelDescription.xml"] = described
     made = f"FMI 2.0 co-simulation, made with {PYTHON.tool}"
     entries |= documentation(mechanism, mechanism.variables, mechanism.title, made, (_NEEDS_PYTHON,))
-    entries |= experiments(mechanism) | manifest()
-    return write(entries, dest / PYTHON.file_name(mechanism))
+    entries |= experiments(mechanism)
+    target = dest / PYTHON.file_name(mechanism)
+    return write(with_bill(target.stem, entries, native=False, fmi=2), target)
 
 
 _SLAVE = """import sys

@@ -20,6 +20,7 @@ from .linkage import draw_linkage as draw_linkage
 from .response import plot_branches as plot_branches
 from .runs import plot_comparison as plot_comparison
 from .runs import plot_outputs as plot_outputs
+from .scheme import plot_schemes as plot_schemes
 from .slider import plot_drive as plot_drive
 from .slider import plot_tracking as plot_tracking
 from .slider_crank import plot_forces as plot_forces

@@ -247,7 +247,7 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
     what, unit = beside.swing
     shown, factor = display_of(unit)
     sizes = {
-        f"amplitude of {what}, {word} stable motion [{shown}]": factor * amplitude
+        f"amplitude of {spoken(what)}, {word} stable motion [{shown}]": factor * amplitude
         for word, amplitude in (("smallest", beside.least), ("largest", beside.greatest))
     }
     hover: dict[str, ArrayLike] = {"motions found": beside.count, "stable motions": beside.stable}

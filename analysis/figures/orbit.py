@@ -100,4 +100,8 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
                 label=f"{orbit.verdict().stability.value}, largest multiplier {orbit.largest:.3g}",
             )
         )
+    if not title and found.orbits:
+        orbit = found.orbits[0]
+        speed = orbit.flow.period * orbit.turns / orbit.turn(2).period / RAD_S_PER_RPM
+        title = f"Periodic motions found at {speed:.5g} rpm"
     return plot_curves([Panel(x_label="crank angle [deg]", y_label=label, curves=curves)], title=title)

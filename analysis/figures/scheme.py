@@ -165,6 +165,22 @@ def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
         return finish(figure)
 
 
+def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: str = "") -> Figure:
+    """Draw several planar mechanisms, each with the paths of its points through the range of its first freedom."""
+    rows = -(-len(mechanisms) // columns)
+    with styled():
+        figure = Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
+        for number, mechanism in enumerate(mechanisms):
+            axis = figure.add_subplot(rows, columns, number + 1)
+            known = next(iter(mechanism.published.values()))
+            at = places(mechanism, known.parameters, _swept(mechanism))
+            draw(axis, mechanism, known.parameters, at, letters=False)
+            axis.set_axis_off()
+            axis.set_title(mechanism.name, fontsize=SMALL)
+        write_title(figure, title)
+        return finish(figure)
+
+
 @animate.register
 def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, title: str = "") -> Path:
     """Write an animation (GIF) of a planar mechanism through the range of its first freedom, forth and back if it cannot turn.

@@ -480,7 +480,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
             _panel(axis, scene, size=1.8, letters=False)
-            axis.set_title(scene.title, fontsize=SMALL)
+            axis.set_title("\n".join(fill(line, 46) for line in scene.title.splitlines()), fontsize=SMALL)
         names = [("crank", CRANK), ("coupler", COUPLER), ("rocker", ROCKER), ("target", TARGET), ("path", TRACE)]
         if all(isinstance(scene.linkage, SliderCrank) for scene in scenes):
             del names[2]

@@ -20,7 +20,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
-from math import inf
+from math import inf, isfinite
 from typing import Any, NamedTuple, TypeVar
 
 from linkwork.errors import MissingParameterError, ParameterError, UnknownNameError
@@ -138,7 +138,7 @@ def unchanged(value: Any, name: str) -> Any:
 
 def text(value: Any, name: str) -> str:
     """Read a text; a number or a truth value is converted to text."""
-    if isinstance(value, (list, Mapping)):
+    if isinstance(value, (list, Mapping)) or (isinstance(value, float) and not isfinite(value)):
         raise ParameterError(name, value, "be a text")
     return str(value)
 

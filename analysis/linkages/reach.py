@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -52,20 +53,21 @@ def start(mechanism: Mechanism) -> NDArray[np.float64]:
     return np.array(mechanism.state(known.initial)[: len(mechanism.freedoms)])
 
 
-def reach(mechanism: Mechanism, freedom: int = 0, *, most: float = 1.0, samples: int = 360) -> Reach:
+def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, samples: int = 360) -> Reach:
     """Find the range of a freedom.
 
     Parameters
     ----------
     mechanism : Mechanism
     freedom : int
-    most : float
-        Of a freedom that does not turn, the distance from the start that is looked at (rad, m).
+    most : float, optional
+        The distance from the start that is looked at: by default half a turn, of a slide 1 m.
     samples : int
         Places looked at to either side.
     """
     period = mechanism.freedoms[freedom].period
-    most = 0.5 * period if period else most
+    if most is None:
+        most = pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0
     ends, least = [], clearance(mechanism, start(mechanism))
 
     def margin(q: float) -> float:

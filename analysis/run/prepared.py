@@ -84,7 +84,7 @@ class Run:
         AssemblyError
             If the links cannot be joined there.
         InputError
-            If an input is not a finite number.
+            If an input is not a finite number, or energy or accelerations are not.
         """
         x = np.array(self.mechanism.state(self.initial))
         u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.laws)
@@ -93,7 +93,17 @@ class Run:
         state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
         self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
-        return Start(np.array(state), self.mechanism.equations.energy(state, self.p), scale)
+        energy = self.mechanism.equations.energy(state, self.p)
+        rates = self.mechanism.equations.derivative(state, self.applied(u), self.p)
+        if not np.isfinite([energy, *rates]).all():
+            names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
+            values = dict(zip([*names[::2], *names[1::2]], state))
+            name = max(values, key=lambda name: abs(values[name]))
+            raise InputError(
+                f"energy or accelerations at the start are not finite: {name} is {values[name]:g}; it, an input or a "
+                "parameter must be far smaller"
+            )
+        return Start(np.array(state), energy, scale)
 
     def applied(self, u: NDArray[np.float64]) -> Any:
         """Return the inputs in the form that the equations take."""

@@ -187,6 +187,7 @@ step = "1 ms"
             r"not come together with run\.stop_time",
         ),
         ('published = "table-3.1"\n[initial]\nangle = 1', r"initial\.angle"),
+        ('published = "table-3.1"\ntitle = nan', "title is nan"),
         ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [1, 0]\nvalues = [1, 2]', "must increase"),

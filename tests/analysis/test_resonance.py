@@ -133,7 +133,10 @@ def test_approximations_hidden_under_the_true_motion_are_drawn_by_their_errors()
     near = frequency_response(RIG["c"], 500.0 * RPM, 700.0 * RPM)
     main, _, errors, *rest = figures.plot(near, beside=approximations(near, points=5)).axes
     assert rest[-1].get_xlabel() == "crank speed [rpm]"
-    assert [text.get_text() for text in main.get_legend().get_texts()] == ["avoid: resonance, above 0.71 of the peak"]
+    assert [text.get_text() for text in main.get_legend().get_texts()] == [
+        "stable motion",
+        "avoid: resonance, above 0.71 of the peak",
+    ]
     drawn = {line.get_label(): line for line in errors.lines}
     assert list(drawn) == ["two harmonics", "ten harmonics"]
     x, error = drawn["two harmonics"].get_data()

@@ -519,6 +519,13 @@ def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: 
     assert other["slider.position"][-1] == pytest.approx(whole["slider.position"][-1], rel=1e-5)
 
 
+@pytest.mark.parametrize("method", ["compiled", "RK45"])
+@pytest.mark.parametrize("speed", [1e155, 1e308])
+def test_a_speed_beyond_all_numbers_is_refused(speed: float, method: str) -> None:
+    with pytest.raises(InputError, match=r"finite: crank\.speed is 1e\+"):
+        simulate(TABLE_3_1, Inputs(speed=speed), stop_time=1.0, method=method)
+
+
 @pytest.mark.parametrize(("mass", "warned"), [(0.59, False), (1e9, True)])
 def test_a_balance_of_energy_worse_than_the_tolerance_promises_is_noted(mass: float, warned: bool) -> None:
     run = simulate(replace(TABLE_3_1, slider_mass=mass), Inputs(speed=SPEED), stop_time=1.0)

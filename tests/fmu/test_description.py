@@ -183,6 +183,8 @@ def test_vdmcheck_finds_nothing(mechanism: Mechanism, kind: str, tmp_path: Path)
 def test_what_is_written_is_the_same_each_time(
     model: Model, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    assert b"generationDateAndTime" not in writer.description(FMUS[model.name], KINDS[kind])
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     first, second = (writer.description(FMUS[model.name], KINDS[kind]) for _ in range(2))
     assert first == second

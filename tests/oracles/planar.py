@@ -11,8 +11,17 @@ from typing import Any, NamedTuple
 
 import casadi
 import numpy as np
+import pint
 
 from analysis.linkages.description import GROUND, Description
+from linkwork.friction import FRICTION_RATE, FRICTION_SPEED
+
+_UNITS = pint.UnitRegistry()
+
+
+def number(value: Any) -> float:
+    """A number in SI of an entry that may be a text with a unit."""
+    return float(_UNITS.Quantity(value).to_base_units().magnitude) if isinstance(value, str) else float(value)
 
 
 class Solution(NamedTuple):
@@ -107,10 +116,17 @@ class Multipliers:
         (ax, ay), (bx, by) = (self.at(self.moving(own), own) for own in s.between)
         return casadi.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
 
+    def mass(self, name: str) -> tuple[float, tuple[float, float], float]:
+        """Mass, centre of mass in the body and moment of inertia of a body."""
+        body = self.d.bodies[name]
+        if body.section is not None:
+            mass, centre, inertia = body.section.properties(body.length)
+            return (mass, centre, inertia) if body.mass is None else (body.mass, centre, inertia * body.mass / mass)
+        return body.mass or 0.0, body.cog if body.cog is not None else (0.5 * body.length, 0.0), body.inertia or 0.0
+
     def centre(self, name: str) -> tuple[Any, Any]:
         """Centre of mass of a body."""
-        body = self.d.bodies[name]
-        x, y = body.cog if body.cog is not None else (0.5 * body.length, 0.0)
+        x, y = self.mass(name)[1]
         px, py, angle = casadi.vertsplit(self.pose(name))
         return px + x * casadi.cos(angle) - y * casadi.sin(angle), py + x * casadi.sin(angle) + y * casadi.cos(angle)
 
@@ -152,28 +168,30 @@ class Multipliers:
         )
         kinetic = casadi.SX(0)
         for n, name in enumerate(self.bodies):
-            body = self.d.bodies[name]
+            mass, _, inertia = self.mass(name)
             vx, vy = (casadi.jtimes(c, self.q, self.v) for c in self.centre(name))
-            kinetic += 0.5 * (body.mass or 0.0) * (vx**2 + vy**2) + 0.5 * (body.inertia or 0.0) * self.v[3 * n + 2] ** 2
+            kinetic += 0.5 * mass * (vx**2 + vy**2) + 0.5 * inertia * self.v[3 * n + 2] ** 2
         momentum = casadi.gradient(kinetic, self.v)
         force = casadi.gradient(kinetic, self.q) - casadi.jtimes(momentum, self.q, self.v)
         g = self.d.gravity * np.array([np.cos(self.d.gravity_direction), np.sin(self.d.gravity_direction)])
         for name in self.bodies:
             for component, c in zip(g, self.centre(name)):
-                force += (self.d.bodies[name].mass or 0.0) * component * casadi.gradient(c, self.q)
+                force += self.mass(name)[0] * component * casadi.gradient(c, self.q)
         for name, s in self.d.springs.items():
             measure = self.stretch(s)
-            x, v = measure - float(s.free), casadi.jtimes(measure, self.q, self.v)
+            x, v = measure - number(s.free), casadi.jtimes(measure, self.q, self.v)
             law = eval(s.law, {"x": x, "v": v, "fabs": casadi.fabs}) if s.law else 0.0
-            pull = float(s.stiffness) * x + float(s.damping) * v + law - forces.get(name, 0.0)
+            slow = FRICTION_RATE if s.at and s.at not in self.d.slides else FRICTION_SPEED
+            law += number(s.friction) * casadi.tanh(v / slow)
+            pull = number(s.stiffness) * x + number(s.damping) * v + law - forces.get(name, 0.0)
             force -= pull * casadi.gradient(measure, self.q)
         for name in self.d.torques:
             force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
         for own, (fx, fy) in points.items():
             x, y = self.at(self.moving(own), own)
             force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
-        mass = casadi.jacobian(momentum, self.v)
-        f = casadi.Function("f", [self.q, self.v], [jacobian, drift, mass, force, kinetic])
+        inertia_of = casadi.jacobian(momentum, self.v)
+        f = casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
         j = np.asarray(f(q, np.zeros(len(q)))[0])
         size, count = self.closure.numel(), self.freedoms.numel()
         v = np.linalg.solve(j, np.concatenate([np.zeros(size), rates]))

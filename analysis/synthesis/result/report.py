@@ -361,8 +361,9 @@ def headline(solution: Solution) -> str:
     scale, length = error_unit(solution.task)
     v = solution.verdicts
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
+    error = factor * solution.error
     return (
-        f"{quality_name(solution.task)} {factor * solution.error:.4g} {unit}\n"
+        f"{quality_name(solution.task)} {f'{error:.4g}' if error < 1e4 else f'{error:.0f}'} {unit}\n"
         f"worst error {scale * solution.evaluation.worst:.3g} {length}, largest link {1e3 * solution.largest_link:.4g} mm\n"
         f"transmission angle {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")

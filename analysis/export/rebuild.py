@@ -1,0 +1,112 @@
+"""Build the binaries of an FMU of Linkwork again from the sources that it carries, and compare."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from importlib import metadata, resources
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+from ..files import check_fmu, first_line
+from .archive import BuildError
+from .bill import BILL
+from .description import NATIVE, NATIVE_FMI3
+from .native_fmu import PLATFORMS, compile_binaries
+
+_FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
+
+
+class Compared(NamedTuple):
+    """What was compared, whether it is the same, and what it was compared with."""
+
+    what: str
+    same: bool
+    text: str
+
+
+def rebuild(fmu: Path | str) -> Iterator[Compared]:
+    """Compare an FMU with its bill of materials, and its libraries with what its sources give here.
+
+    The libraries of a native FMU are compiled again; library and modules of PythonFMU in a Python FMU are compared with the
+    installed package. The same bytes come of the same versions of the programs that the bill names.
+
+    Yields
+    ------
+    Compared
+
+    Raises
+    ------
+    BuildError
+        If the FMU has no bill of materials of Linkwork, or its sources do not compile.
+    InputError
+        If the file is not an FMU.
+    """
+    check_fmu(fmu)
+    with ZipFile(fmu) as archive:
+        if BILL not in archive.namelist():
+            raise BuildError(f"{fmu} has no {BILL}: only FMUs of Linkwork that carry it can be built again")
+        try:
+            files = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+            bill = json.loads(files[BILL])
+            stated = {c["name"]: c["hashes"][0]["content"] for c in bill["components"] if c["type"] == "file"}
+            tools = {c["name"]: c["version"] for c in bill["metadata"]["tools"]["components"]}
+        except Exception as error:  # zipfile and zlib raise their own
+            raise BuildError(f"{fmu}: {BILL} cannot be read: {first_line(error)}") from error
+    found = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != BILL}
+    wrong = sorted(name for name in {*stated, *found} if stated.get(name) != found.get(name))
+    text = "SHA-256 of every file" if not wrong else f"differing, missing or not listed: {', '.join(wrong[:5])}"
+    yield Compared(f"{len(found)} files, with the bill of materials", not wrong, text)
+    yield from _compiled(files, tools) if "ziglang" in tools else _packed(files, tools)
+
+
+def _versions(tools: dict[str, str], name: str) -> str:
+    """Say by which version of a program the FMU was made, and which is here."""
+    here = metadata.version(name)
+    return f"{name} {here}" if tools.get(name) == here else f"made by {name} {tools.get(name)}, here is {here}"
+
+
+def _compiled(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compared]:
+    """Compile the sources for every platform of the binaries."""
+    root = ElementTree.fromstring(files["modelDescription.xml"])
+    kind = NATIVE_FMI3 if root.get("fmiVersion", "").startswith("3") else NATIVE
+    part = root.find("CoSimulation")
+    identifier = "" if part is None else part.get("modelIdentifier", "")
+    sources = {
+        name.removeprefix("sources/"): content.decode()
+        for name, content in files.items()
+        if name.startswith("sources/") and name.endswith((".c", ".h"))
+    }
+    for place in sorted(name for name in files if name.startswith("binaries/")):
+        wanted = [
+            name
+            for name, platform in PLATFORMS.items()
+            if place.split("/")[1] == (platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3)
+        ]
+        head = files[place][:8]
+        if len(wanted) > 1 and head[:4] != _FAT:  # of the two of macOS one alone
+            wanted = [name for name in wanted if head[4:] == (_ARM if name.startswith("aarch64") else _X86)]
+        if not wanted:
+            yield Compared(place, False, "is for none of the platforms that Linkwork compiles for")
+            continue
+        made = compile_binaries(identifier, kind, sources, wanted)
+        yield Compared(place, made.get(place) == files[place], _versions(tools, "ziglang"))
+
+
+def _packed(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compared]:
+    """Compare library and modules of PythonFMU with those of the installed package."""
+    package: Any = resources.files("pythonfmu")
+    for folder, suffix, name in (
+        ("linux64", ".so", "libpythonfmu-export.so"),
+        ("win64", ".dll", "pythonfmu-export.dll"),
+    ):
+        content = (package / "resources" / "binaries" / folder / name).read_bytes()
+        for place in (p for p in files if p.startswith(f"binaries/{folder}/") and p.endswith(suffix)):
+            yield Compared(place, files[place] == content, _versions(tools, "pythonfmu"))
+    prefix = "resources/pythonfmu/"
+    modules = {place.removeprefix(prefix): text for place, text in files.items() if place.startswith(prefix)}
+    same = all((package / name).is_file() and (package / name).read_bytes() == text for name, text in modules.items())
+    yield Compared(prefix, same, _versions(tools, "pythonfmu"))

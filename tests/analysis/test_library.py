@@ -1,0 +1,125 @@
+"""The library of described linkages in examples/linkages: each against multipliers, by its energy, and what it is known for."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.linkages import described, load_linkage, reach
+from analysis.run import Trajectory, load_case, simulate
+from tests.oracles.planar import Multipliers
+
+FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
+FILES = sorted(FOLDER.glob("*.toml"))
+pytestmark = pytest.mark.usefixtures("own_linkages")
+
+
+def run(name: str, **changes: Any) -> Trajectory:
+    """Run a file of the library as it is, or with other entries."""
+    case = load_case(FOLDER / f"{name}.toml", changes)
+    return simulate(
+        case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step, tolerance=1e-11
+    )
+
+
+def test_the_library_is_there():
+    assert len(FILES) >= 19
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_a_linkage_of_the_library_moves_as_with_multipliers(path):
+    """Its run is whole and keeps its energy; at places along it accelerations, loads and joint forces are the multipliers'."""
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    made = load_linkage(path)
+    found = run(path.stem)
+    assert found.status == 0, found.message
+    energy = abs(found["energy.kinetic"]).max() + abs(found["energy.supplied"]).max()
+    assert abs(found["energy.residual"]).max() < 1e-8 * (1e-3 + energy)
+    d = described({**tables["linkage"], "freedoms": tables["linkage"]["freedoms"]})
+    oracle, equations = Multipliers(d), made.modules[-1]
+    known = made.published[made.name]
+    p, n = known.parameters.constants(), len(made.freedoms)
+    u = tuple(float(v.start) for v in made.variables if v.causality == "input")
+    modes = tuple(float(mode.default) for mode in made.modes)
+    i = made.equations.applied(modes, u, p)
+    commanded = {made.channels[k].freedom: 0.0 for k in made.commands({mode.name: mode.default for mode in made.modes})}
+    for sample in np.linspace(1, len(found) - 1, 4).astype(int):
+        x = (
+            *(found[f.coordinate][sample] for f in made.freedoms),
+            *(found[f.rate][sample] for f in made.freedoms),
+            0.0,
+            0.0,
+        )
+        x = tuple(map(float, x))
+        m = equations.motion(x, i, p)
+        frames = [getattr(m.places, f"{body}_frame") for body in d.bodies]
+        q = np.array([c for f in frames for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
+        wanted = oracle.solve(q, np.array(x[n : 2 * n]), np.zeros(n), commanded, dict.fromkeys(d.loads, (0.0, 0.0)), {})
+        scale = 1.0 + np.abs(wanted.accelerations).max()
+        np.testing.assert_allclose(m.accelerations, wanted.accelerations, atol=1e-8 * scale)
+        np.testing.assert_allclose(m.loads, wanted.loads, atol=1e-8 * (1.0 + np.abs(wanted.loads).max()))
+        outputs = dict(zip(made.output_names, made.equations.outputs(x, i, 0.0, p)))
+        for name, force in wanted.forces.items():
+            if len(oracle.owners.get(name, ())) == 2:
+                size = np.hypot(outputs[f"{name}.fx"], outputs[f"{name}.fy"])
+                assert size == pytest.approx(np.hypot(*force), rel=1e-8, abs=1e-8), name
+
+
+def test_peaucelliers_point_is_on_a_straight_line():
+    line = (200.0**2 - 80.0**2) / (2.0 * 90.0) * 1e-3
+    found = run("peaucellier")
+    assert np.ptp(found["P.y"]) > 0.05
+    np.testing.assert_allclose(found["P.x"], line, atol=1e-12)
+
+
+def test_harts_point_is_on_a_straight_line():
+    found = run("hart")
+    assert np.ptp(found["Q.y"]) > 0.01
+    np.testing.assert_allclose(-found["Q.x"], 0.4 * 0.6 * (200.0**2 - 120.0**2) / (2.0 * 50.0) * 1e-3, atol=1e-12)
+
+
+def test_whitworths_lever_is_fast_on_one_side():
+    """The lever is level where the crank pin is as high as its shaft: sin(angle) = -30/80."""
+    found = run("whitworth", **{"run.step": "0.1 ms"})
+    slow = np.mean(np.sin(found["lever.angle"]) > 0.0)
+    assert slow == pytest.approx(0.5 + np.arcsin(30.0 / 80.0) / np.pi, abs=3e-4)
+
+
+@pytest.mark.parametrize(("name", "span", "height"), [("klann", 75.0, 4.0), ("jansen", 45.0, 2.5)])
+def test_a_foot_is_flat_on_the_ground(name, span, height):
+    found = run(name)
+    x, y = 1e3 * found["P.x"], 1e3 * found["P.y"]
+    assert np.ptp(x[y < y.min() + height]) > span
+
+
+def test_gears_turn_at_their_ratio():
+    found = run("geared-five-bar")
+    wanted = -2.0 * found["crank.angle"] + np.deg2rad(60.0)
+    np.testing.assert_allclose(np.sin(found["second.angle"] - wanted), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("start", ["5 deg", "-5 deg"])
+def test_the_folding_linkage_has_two_rests(start):
+    """It comes to rest where the spring is free: cos = (80^2 + 140^2 - 100^2)/(2 80 140), on the side where it began."""
+    found = run("bistable", **{"initial.arm_angle": start, "run.stop_time": "6 s"})
+    rest = np.arccos((80.0**2 + 140.0**2 - 100.0**2) / (2.0 * 80.0 * 140.0))
+    assert found["arm.angle"][-1] == pytest.approx(rest if start == "5 deg" else -rest, abs=1e-4)
+
+
+def test_the_described_five_bar_runs_as_the_hand_written_one():
+    found = run("described-five-bar")
+    by_hand = simulate("table-3.1", samples=found.time, tolerance=1e-11)
+    np.testing.assert_allclose(found["slider.position"], by_hand["slider.position"], atol=1e-10)
+    np.testing.assert_allclose(found["C.fx"], by_hand["pin.C.fx"], atol=1e-6)
+
+
+def test_ranges_of_motion():
+    assert reach(load_linkage(FOLDER / "watt-1.toml")).turns
+    found = reach(load_linkage(FOLDER / "peaucellier.toml"))
+    # O C = 2 x 90 cos(angle/2) mm is at least 200 - 80 mm, where upper and inner link are in line
+    assert not found.turns
+    assert found.high == pytest.approx(2.0 * np.arccos(120.0 / 180.0), abs=1e-4)
