@@ -208,7 +208,6 @@ _TYPES = {
     2: {"Real": "Real", "Integer": "Integer", "String": "String"},
     3: {"Real": "Float64", "Integer": "Int32", "String": "String"},
 }
-_VARIABILITY = {"parameter": "fixed"}
 # approx, not calculated: only so may an output carry the start value that people look for in the XML
 _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
@@ -226,9 +225,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
             "valueReference": str(entry.reference),
             "description": variable.description,
             "causality": variable.causality,
-            "variability": _VARIABILITY.get(
-                variable.causality, "continuous" if variable.kind == "Real" else "discrete"
-            ),
+            "variability": _variability(variable),
         }
         if variable.causality in _INITIAL:
             attributes["initial"] = _INITIAL[variable.causality]
@@ -251,6 +248,12 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if start is not None:
             SubElement(node, "Start", {"value": start})
     return listed
+
+
+def _variability(variable: Variable) -> str:
+    if variable.causality == "parameter":
+        return "tunable" if variable.tunable else "fixed"
+    return "continuous" if variable.kind == "Real" else "discrete"
 
 
 def _value(variable: Variable, start: float | int | str) -> dict[str, str]:

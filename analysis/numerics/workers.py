@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
@@ -101,7 +101,12 @@ def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool, Any]:
 
     check_jobs(n_jobs)
     backend, default = joblib.parallel.get_active_backend(prefer="threads" if threads else None)
-    count = int(backend.effective_n_jobs((default or 1) if n_jobs is None else n_jobs))
+    if hasattr(backend, "client"):
+        _ask(backend.client)  # joblib would wait for ever
+    try:
+        count = int(backend.effective_n_jobs((default or 1) if n_jobs is None else n_jobs))
+    except TimeoutError as error:
+        raise WorkersLost(f"the cluster has no worker: {error}") from error
     return count, count > 1 and not getattr(backend, "supports_sharedmem", False), backend
 
 
@@ -245,17 +250,22 @@ def _round(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, list[_T
     return given_up
 
 
+def _ask(client: Any) -> Mapping[str, Any]:
+    """Return the workers that the scheduler of a cluster knows; raises WorkersLost if it does not answer in time."""
+    try:
+        workers: Mapping[str, Any] = client.sync(client.scheduler.identity, callback_timeout=_PATIENCE)["workers"]
+    except Exception as error:
+        raise WorkersLost(f"the scheduler of the cluster has not answered for {_PATIENCE:g} s") from error
+    return workers
+
+
 def _patiently(client: Any, wait: Callable[[], Any]) -> Any:
     """Return what ``wait`` waits for, as long as the scheduler of a cluster answers and has workers."""
     while True:
         try:
             return wait()
         except (Empty, TimeoutError):
-            try:
-                workers = client.sync(client.scheduler.identity, callback_timeout=_PATIENCE)["workers"]
-            except Exception as error:
-                raise WorkersLost(f"the scheduler of the cluster has not answered for {_PATIENCE:g} s") from error
-            if not workers:
+            if not _ask(client):
                 raise WorkersLost(f"the cluster has had no worker for {_PATIENCE:g} s") from None
 
 

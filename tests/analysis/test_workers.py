@@ -447,7 +447,8 @@ def test_a_cluster_that_does_not_answer_is_given_up(
     monkeypatch.setattr(joblib.parallel, "get_active_backend", lambda **_: (backend, None))
     with pytest.raises(WorkersLost, match=said):
         list(over_workers(square, range(3)))
-    assert client.cancelled == 3
+    # a scheduler that is silent from the beginning has no tasks
+    assert client.cancelled == (3 if workers is not None else 0)
 
 
 @pytest.mark.slow

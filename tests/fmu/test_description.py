@@ -213,7 +213,8 @@ def test_variable(
     value = scalar.attributes
     assert value["causality"] == causality
     assert scalar.kind == type_name
-    assert value["variability"] == {"parameter": "fixed"}.get(
+    tunable = name.endswith(("stiffness", "damping", "friction", "friction_coefficient", "friction_radius"))
+    assert value["variability"] == {"parameter": "tunable" if tunable else "fixed"}.get(
         causality, "continuous" if type_name == "Real" else "discrete"
     )
     assert value.get("initial") == {"parameter": "exact", "output": "approx", "local": "calculated"}.get(causality)
