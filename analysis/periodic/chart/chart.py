@@ -25,13 +25,22 @@ from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import shown, takes_published
 from ...units import RAD_S_PER_RPM, Amount, si
-from ..motion.drive import Drive, published_drive
-from ..motion.floquet import Crossing
-from ..motion.orbit import PeriodicOrbit
-from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, speed_names, unit_of, value_of
-from ..response.branch import distance
-from ..response.frequency import first_freedom, natural_frequency
-from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
+from ..motion import (
+    Crossing,
+    Drive,
+    PeriodicOrbit,
+    Plane,
+    default_variable,
+    format_value,
+    plane,
+    published_drive,
+    require_variable,
+    speed_names,
+    unit_of,
+    value_of,
+)
+from ..response import distance, first_freedom, natural_frequency
+from ..stability import Confirmation, SpecialPoint, confirm
 from .boundary import (
     BRANCH_POINTS,
     Monodromy,
@@ -266,7 +275,7 @@ def stability_chart(
     mechanism = mechanism_of(parameters)
     if drive is None:
         raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
-    names = names or (speed_name(mechanism, drive) or "drive.speed", damping_name(mechanism))
+    names = names or (default_variable(mechanism, drive), damping_name(mechanism))
     spans = tuple(
         default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
         for n, name in enumerate(names)

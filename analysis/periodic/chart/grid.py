@@ -22,13 +22,11 @@ from ...numerics.cache import cache_root
 from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, interruptible, over_workers
 from ...run import shown
+from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, starts_of
 from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, collocation_serves, operating_point
-from ..motion.drive import Drive, starts_of
-from ..motion.floquet import TOLERANCE, Stability, multipliers
 from ..motion.flow import GAP, PLAIN, VARIATIONAL
 from ..motion.kernels import REASONS, Status
 from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, first_guess
-from ..motion.variables import Plane
 from . import kernels
 from .kernels import Points, Row, Search
 

@@ -69,6 +69,20 @@ def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
     return None if command is None else mechanism.channels[command].name
 
 
+def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
+    """Return the FMI name of the parameter that varies if none is named: the prescribed speed of the crank.
+
+    Raises
+    ------
+    InputError
+        If it cannot be prescribed; or if the mechanism has several cranks, and there is no drive that says which.
+    """
+    name = speed_name(mechanism, drive)
+    if name is None:
+        raise InputError(f"the crank of a {mechanism.name} has no speed that can be prescribed: name what varies")
+    return name
+
+
 @takes_published()
 def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """Check that a parameter of this name can vary in this drive.
@@ -245,7 +259,7 @@ class Family:
     drive : Drive
     vary : str or callable
         FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
-        as ``slider.damping``; or a function from a number to (parameters, Drive).
+        as ``slider.damping``; or a function from a number to (parameters, Drive). By default the speed of the crank.
     name, unit : str
         Of the parameter, for tables and plots; they follow from an FMI name.
 
@@ -259,7 +273,7 @@ class Family:
 
     parameters: Parameters
     drive: Drive
-    vary: Vary = "drive.speed"
+    vary: Vary = ""
     name: str = ""
     unit: str = ""
 
@@ -267,9 +281,11 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        require_variable(self.parameters, self.drive, self.vary)
-        object.__setattr__(self, "name", self.name or self.vary)
-        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), self.vary))
+        vary = self.vary or default_variable(mechanism_of(self.parameters), self.drive)
+        object.__setattr__(self, "vary", vary)
+        require_variable(self.parameters, self.drive, vary)
+        object.__setattr__(self, "name", self.name or vary)
+        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), vary))
 
     def at(self, value: float) -> Operation:
         """Return the mechanism and drive at a value of the parameter."""

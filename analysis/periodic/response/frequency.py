@@ -29,14 +29,23 @@ from ...numerics.continuation import ContinuationError
 from ...numerics.workers import interruptible
 from ...run import at_rest, shown, takes_published
 from ...units import Amount, si
-from ..motion.discretisation import OrbitError
-from ..motion.drive import SAME, Drive, published_drive
-from ..motion.floquet import Crossing
-from ..motion.flow import cranks_of
-from ..motion.orbit import PeriodicOrbit, orbit_of, require_turns
-from ..motion.search import orbits_of
-from ..motion.variables import Family, unit_of
-from ..stability.nonlinear import SpecialPoint
+from ..motion import (
+    SAME,
+    Crossing,
+    Drive,
+    Family,
+    OrbitError,
+    PeriodicOrbit,
+    cranks_of,
+    default_variable,
+    orbit_of,
+    orbits_of,
+    published_drive,
+    require_turns,
+    speed_names,
+    unit_of,
+)
+from ..stability import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
 from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
 
@@ -233,7 +242,7 @@ def frequency_response(
     high: Amount,
     *,
     drive: Drive | None = None,
-    vary: str = "drive.speed",
+    vary: str = "",
     start: ArrayLike | None = None,
     doublings: int = 1,
     most_points: int = 5000,
@@ -251,8 +260,8 @@ def frequency_response(
     drive : Drive, optional
         Needed if another parameter than the speed varies. A published set is driven at its speed.
     vary : str
-        ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or any
-        parameter that `Family` can vary.
+        The speed of the crank by default, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is
+        needed), or any parameter that `Family` can vary.
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
     doublings : int
@@ -286,10 +295,12 @@ def frequency_response(
     >>> [f"{100.0 * peak.amplitude:.3f} cm" for peak in response.maxima()]
     ['1.715 cm']
     """
-    unit = unit_of(mechanism_of(parameters), vary)
+    mechanism = mechanism_of(parameters)
+    vary = vary or default_variable(mechanism, drive)
+    unit = unit_of(mechanism, vary)
     low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
     if drive is None:
-        if vary != "drive.speed":
+        if vary not in speed_names(mechanism):
             raise InputError(
                 f"{vary} varies: say what drives the plant with drive=Drive(speed=...) or Drive(torque=...)"
             )
