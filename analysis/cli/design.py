@@ -129,10 +129,12 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
     solution = best.solution
     linkage = solution.linkage
     if linkage.kind == "four-bar":
-        written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(linkage)))
+        written.append(
+            save_parameters(folder / "five-bar-parameters.toml", make.five_bar(linkage), head=make.masses_in_words())
+        )
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
-        written.append(write_tables(case, solution.run_case(make, title)))
+        written.append(write_tables(case, solution.run_case(make, title), head=make.masses_in_words()))
     if linkage.kind == "geared-five-bar":
         say("no case to run: a geared five-bar cannot be simulated yet; its drawings, sheet and curve are written")
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)

@@ -331,14 +331,13 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
 
 def _model_name(path: Path) -> str | None:
     """Return the name of the model in an FMU; None if it cannot be read, which the check reports."""
-    from fmpy import read_model_description
-
     from ..files import check_fmu
+    from ..run import read_description
 
     try:
         check_fmu(path)
-        return str(read_model_description(str(path), validate=False).modelName)
-    except Exception:  # FMPy raises plain ones
+        return str(read_description(path).modelName)
+    except InputError:
         return None
 
 
@@ -465,18 +464,15 @@ def _print_parameters(title: str, parameters: Any) -> None:
 
 def _print_fmu(path: Path) -> None:
     """Print the variables of an FMU and whether it is valid; exits where it is not."""
-    from fmpy import read_model_description
     from fmpy.validation import validate_fmu
 
-    from ..files import check_fmu, first_line
+    from ..files import check_fmu
+    from ..run import read_description
 
     if not path.is_file():
         raise click.UsageError(f"there is no file {path}: build it with 'linkwork build'")
     check_fmu(path)
-    try:
-        description = read_model_description(str(path))
-    except Exception as error:  # FMPy raises plain ones
-        raise InputError(f"{path} is not an FMU: {first_line(error)}") from error
+    description = read_description(path, validate=True)
 
     def start(variable: Any) -> str:
         if variable.start is None or variable.causality == "output":

@@ -47,7 +47,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 
 @click.command()
 @about_a_case
-@click.option("--vary", default="drive.speed", show_default=True, metavar="NAME", help="What varies, by its FMI name.")
+@click.option("--vary", metavar="NAME", help="What varies, by its FMI name; by default the crank speed.")
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
 )
@@ -78,7 +78,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 @click.option("--sensitivity", is_flag=True, help="Report which parameters move each maximum, fold and the like most.")
 def resonance(
     chosen: Chosen,
-    vary: str,
+    vary: str | None,
     low: str | None,
     high: str | None,
     doublings: int,
@@ -105,11 +105,19 @@ def resonance(
     """
     from .. import figures
     from ..files import write_csv
-    from ..periodic import ResponseInterrupted, frequency_response, speed_names, unit_of, with_isolas
+    from ..periodic import (
+        ResponseInterrupted,
+        default_variable,
+        frequency_response,
+        speed_names,
+        unit_of,
+        with_isolas,
+    )
     from ..youssef import approximations
 
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = mechanism_of(parameters)
+    vary = vary or default_variable(mechanism)
     over_speed = vary in speed_names(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(
@@ -282,7 +290,7 @@ def stability(
 
     The verdict is on the motion at one speed, with its margin. The chart has the largest Floquet multiplier of the true orbit
     at every point, the boundaries of instability traced, that of the linear equation beside it, and three points confirmed by
-    long nonlinear runs. Computed rows are kept: a chart that was interrupted goes on.
+    long nonlinear runs. The picture of the grid is written first. Computed rows are kept: a chart that was interrupted goes on.
 
     \b
     Examples:
@@ -291,13 +299,13 @@ def stability(
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
     from .. import figures
-    from ..periodic import damping_name, require_variable, speed_name, stability_chart
+    from ..periodic import damping_name, default_variable, require_variable, stability_chart
     from ..youssef import linear_motion
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
     mechanism = mechanism_of(parameters)
-    names = (x or speed_name(mechanism, drive) or "drive.speed", y or damping_name(mechanism))
+    names = (x or default_variable(mechanism, drive), y or damping_name(mechanism))
     for name in (x, y):
         if name is not None:
             require_variable(parameters, drive, name)

@@ -63,9 +63,12 @@ def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a text in UTF-8 without changing its line ends, and return its path."""
+    """Write a text in UTF-8 without changing its line ends, and return its path.
+
+    Bytes of file names that are not UTF-8 become escapes, such as \\udcff.
+    """
     with output(path) as (part, path):
-        part.write_bytes(text.encode())
+        part.write_bytes(text.encode(errors="backslashreplace"))
     return path
 
 
@@ -90,8 +93,8 @@ def record_output(path: Path) -> None:
     line = _line(path, writing.command)
     if _recorded(path) != line:
         # one short line at a time, so that commands in one folder do not disturb each other; if it fails, nothing is lost
-        with suppress(OSError), path.with_name(RECORD).open("a", encoding="utf-8") as file:
-            file.write(f"{line}\n")
+        with suppress(OSError), path.with_name(RECORD).open("ab") as file:
+            file.write(os.fsencode(f"{line}\n"))
 
 
 def _is_own(path: Path, command: str) -> bool:
@@ -111,7 +114,7 @@ def _line(path: Path, command: str) -> str:
 def _recorded(path: Path) -> str:
     """Return the last line of the record about a file."""
     try:
-        lines = path.with_name(RECORD).read_text(encoding="utf-8").splitlines()
+        lines = os.fsdecode(path.with_name(RECORD).read_bytes()).splitlines()
     except (OSError, UnicodeDecodeError):
         return ""
     return next((line for line in reversed(lines) if line.partition(": ")[2] == path.name), "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from fractions import Fraction
 from math import isfinite, pi
 from typing import Protocol, runtime_checkable
 
@@ -32,6 +33,8 @@ from .model import (
 
 #: Least samples of a period that carry its harmonics.
 LEAST_SAMPLES = 16
+#: Turns of a crank at most in the common period with another.
+MOST_TURNS = 64
 #: Newton steps at most from an angle to the time at which it is reached.
 MOST_ITERATIONS = 60
 
@@ -144,7 +147,7 @@ class PeriodicModel(Matrices):
         Raises
         ------
         InputError
-            If they are not, with the freedom.
+            If they are not; the message names the freedom.
         """
         mechanism, n, secular = self.mechanism, len(self), self._secular()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
@@ -259,25 +262,36 @@ def _turn_time(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
 def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
     """Resample a turn from equal steps of the crank angle to equal steps of time: states and channels."""
     n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
-    crank = next(k for k, freedom in enumerate(mechanism.freedoms) if freedom.period)
-    angle = turn.states[:, crank] - turn.states[0, crank]
-    way = angle[-1] * n / (n - 1)
+    ways = (turn.states[:, :count] - turn.states[0, :count]).T
+    # the turn has equal steps of one crank
+    crank = min(mechanism.cyclic, key=lambda k: float(np.ptp(np.diff(ways[k]))))
+    angle, way = ways[crank], ways[crank][-1] * n / (n - 1)
     wanted = period * np.arange(n) / n
     lead = trigonometric(turn.time - wanted, way)
     columns = np.hstack([turn.states[:, : 2 * count], turn.inputs])
     columns[:, crank] = 0.0
+    # of another crank, what is periodic: its angle less whole turns
+    ratios = {
+        k: mechanism.freedoms[k].period * round(ways[k][-1] * n / (n - 1) / mechanism.freedoms[k].period) / way
+        for k in mechanism.cyclic
+        if k != crank
+    }
+    for k, ratio in ratios.items():
+        columns[:, k] -= ratio * angle
     values = trigonometric(columns, way)
     found = np.empty_like(columns)
-    for k, t in enumerate(wanted):
-        x = angle[k]
+    for place, t in enumerate(wanted):
+        x = angle[place]
         for _ in range(MOST_ITERATIONS):
             # dt/d(angle) = 1 / rate
             step = (period * x / way + float(lead(x)) - t) * float(values(x)[count + crank])
             x -= step
             if abs(step) <= 1e-13 * way:
                 break
-        found[k] = values(x)
-        found[k, crank] = turn.states[0, crank] + x
+        found[place] = values(x)
+        found[place, crank] = turn.states[0, crank] + x
+        for k, ratio in ratios.items():
+            found[place, k] += ratio * x
     return full_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
@@ -290,7 +304,7 @@ def settled_motion(
     samples: int = 128,
     turns: int = 200,
 ) -> FloatArray:
-    """Run a mechanism at constant speed until its motion repeats, and return the last turn.
+    """Run a mechanism at constant speed until its motion repeats; return the last turn, or common period of several cranks.
 
     Parameters
     ----------
@@ -330,6 +344,16 @@ def settled_motion(
     if not speed:
         raise InputError(f"{channel.argument} is {speed}: it must be a finite number that is not zero")
     turn = mechanism.freedoms[crank].period / abs(speed)
+    # all cranks have made whole turns after the common period
+    for k in its.commanded:
+        other, period = speeds[k][1], mechanism.freedoms[k].period
+        if period and other:
+            ratio = Fraction(abs(other) * turn / period).limit_denominator(MOST_TURNS)
+            if abs(ratio * period - abs(other) * turn) > 1e-9 * abs(other) * turn:
+                raise InputError(
+                    f"{speeds[k][0].argument} is {other}, {channel.argument} {speed}: their ratio must be one of whole numbers"
+                )
+            turn *= ratio.denominator
     last = turn * (turns - 2 + np.arange(2 * samples + 1) / samples)
     run = simulate(
         parameters,

@@ -62,6 +62,7 @@ from .motion.search import sweep as sweep
 from .motion.variables import Family as Family
 from .motion.variables import Operation as Operation
 from .motion.variables import Plane as Plane
+from .motion.variables import default_variable as default_variable
 from .motion.variables import driving_names as driving_names
 from .motion.variables import format_value as format_value
 from .motion.variables import gradient_names as gradient_names

@@ -145,12 +145,14 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
 
 def _extract(fmu: Path, folder: Path) -> Any:
     """Extract an FMU and return its description."""
-    from fmpy import extract, read_model_description
+    from fmpy import extract
+
+    from ..run import read_description
 
     check_fmu(fmu)
+    description = read_description(fmu)
     try:
         extract(str(fmu), str(folder))
-        description = read_model_description(str(folder), validate=False)
     except (BadZipFile, OSError) as error:
         raise InputError(f"{fmu} is not an FMU: {error}") from error
     if not description.fmiVersion.startswith(("2.", "3.")):

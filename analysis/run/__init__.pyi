@@ -12,6 +12,7 @@ from .case_files import acting_on as acting_on
 from .case_files import case_from as case_from
 from .case_files import load_case as load_case
 from .case_files import load_parameters as load_parameters
+from .case_files import mechanism_in as mechanism_in
 from .case_files import parameters_from as parameters_from
 from .case_files import parameters_to as parameters_to
 from .case_files import save_parameters as save_parameters
@@ -50,6 +51,7 @@ from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel
 from .fmu import FmuRun as FmuRun
 from .fmu import offered as offered
+from .fmu import read_description as read_description
 from .fmu import unpacking_folder as unpacking_folder
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs

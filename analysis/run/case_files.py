@@ -75,9 +75,9 @@ def parameters_to(parameters: Parameters) -> dict[str, Any]:
     return data
 
 
-def save_parameters(path: str | Path, parameters: Parameters) -> Path:
-    """Write parameters to a TOML or JSON file, as the path's ending says."""
-    return files.write_tables(path, parameters_to(parameters))
+def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "") -> Path:
+    """Write parameters to a TOML or JSON file, as the path's ending says; ``head`` is a comment of a TOML file."""
+    return files.write_tables(path, parameters_to(parameters), head=head)
 
 
 def load_parameters(path: str | Path) -> Parameters:
@@ -106,6 +106,14 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
 
 
 # Cases
+
+
+def mechanism_in(data: Mapping[str, Any]) -> Mechanism:
+    """Return the mechanism of a case: that of its published set, or the one that the file names or has parameters of."""
+    if "published" in data:
+        return mechanism_of(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
+    return _find_mechanism(data)
+
 
 #: Entries of every case file that are not parameters of the mechanism, beside those that say what acts on it.
 COMMON = ("mechanism", "title", "published", "initial", "run")
@@ -189,8 +197,8 @@ def case_from(
     """Build a case from the tables of a case file; its CSV tables, and a linkage of a file, are read from ``folder``."""
     data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
-    published = PUBLISHED[Choice(PUBLISHED)(named["published"], "published")] if "published" in named else None
-    mechanism = _find_mechanism(named) if published is None else mechanism_of(published.parameters)
+    mechanism = mechanism_in(named)
+    published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
     acting = acting_on(mechanism)

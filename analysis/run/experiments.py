@@ -21,10 +21,10 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import LinkworkError
 
 from ..files import check_fmu, first_line
-from .fmu import unpacking_folder
+from .fmu import read_description, unpacking_folder
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 EXPERIMENTS = f"extra/{STANDARD}"
@@ -253,13 +253,10 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
     >>> all(outcome.passed for outcome in verify("build/FiveBarSlider-native.fmu"))
     True
     """
-    from fmpy import extract, read_model_description
+    from fmpy import extract
 
     experiments = read_experiments(fmu)
-    try:
-        description = read_model_description(str(fmu), validate=False)
-    except Exception as error:  # FMPy raises plain ones
-        raise InputError(f"{fmu} is not an FMU: {first_line(error)}") from error
+    description = read_description(fmu)
     folder = tempfile.mkdtemp(dir=unpacking_folder())
     try:
         extract(str(fmu), folder)

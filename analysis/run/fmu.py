@@ -13,6 +13,8 @@ from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
+from xml.etree import ElementTree
+from zipfile import ZipFile
 
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
@@ -59,12 +61,33 @@ def _description(fmu: str | Path) -> Any:
         raise CosimulationError(f"there is no file {fmu}: build it with 'linkwork build'")
     try:
         check_fmu(fmu)
+        return read_description(fmu, validate=True)
     except InputError as error:
         raise CosimulationError(str(error)) from error
+
+
+def read_description(fmu: str | Path, *, validate: bool = False) -> Any:
+    """Read the model description of an FMU with FMPy.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or leaves out the name of a variable.
+    """
     try:
-        return read_model_description(str(fmu))
-    except Exception as error:
-        raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
+        with ZipFile(fmu) as archive:
+            root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+        description = read_model_description(str(fmu), validate=validate)
+    except Exception as error:  # FMPy raises plain ones
+        # a validation has its findings below its first line
+        lines = [line.strip("- ") for line in str(error).splitlines()] or [type(error).__name__]
+        said = " ".join(lines[:2]) if lines[0].endswith(":") else lines[0]
+        raise InputError(f"{fmu} is not an FMU: {said}") from error
+    for variable in root.iterfind("ModelVariables/*"):
+        if not variable.get("name"):  # FMPy leaves it out, and numbers the others wrongly
+            reference = variable.get("valueReference")
+            raise InputError(f"{fmu} is not an FMU: the variable with the value reference {reference} has no name")
+    return description
 
 
 def offered(fmu: str | Path) -> dict[str, str]:

@@ -13,6 +13,8 @@ from linkwork.errors import ParameterError
 
 from ..display import format_count
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
+from ..mechanisms import mechanism_of
+from ..periodic import default_variable
 from ..run import Case, case_from
 from ..slider import inverse_dynamics, motion_of_plant, slider_motion
 from ..studio import state_of
@@ -145,9 +147,10 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
 
 
 def _state(solution: Solution, title: str) -> Answer:
-    state = state_of(case_from(solution.run_case(Make(), title), folder=Path(), title=title))
+    case = case_from(solution.run_case(Make(), title), folder=Path(), title=title)
+    state, speed = state_of(case), default_variable(mechanism_of(case.parameters))
     # the path says nothing of the way in which the crank turns, and the page seeks periodic motions of one way
-    state["values"]["drive.speed"] = abs(state["values"]["drive.speed"])
+    state["values"][speed] = abs(state["values"][speed])
     return state
 
 

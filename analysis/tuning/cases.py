@@ -12,9 +12,10 @@ import numpy as np
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
+from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
-from ..periodic import Drive, drive_of, unit_of
-from ..run import Case, case_from
+from ..periodic import Drive, default_variable, drive_of, unit_of
+from ..run import Case, case_from, mechanism_in
 from ..units import with_unit
 from .result import Tuned
 from .wishes import Limit, Wish
@@ -119,15 +120,15 @@ def tuning_case_from(
     if "tune" not in tables:
         raise MissingParameterError("tune")
     wanted = read(TuneTable, tables.pop("tune"), "tune")
-    overrides = {"run": {"stop_time": 1.0}}
+    overrides, linked = {"run": {"stop_time": 1.0}}, with_linkage(tables, folder)
     if wanted.speeds is not None:
         if isinstance(tables.get("drive"), Mapping) and "torque" in tables["drive"]:
             raise InputError(
                 "drive.torque drives the crank, so that its speed follows: leave out tune.speeds and give what "
                 "is set, such as over = 'drive.torque' and between = ['0.1 N*m', '0.2 N*m']; or leave out drive.torque"
             )
-        overrides["drive.speed"] = with_unit(wanted.speeds[0], "rad/s")
-    case = case_from(tables, folder=folder, title=title, overrides=overrides)
+        overrides[default_variable(mechanism_in(linked))] = with_unit(wanted.speeds[0], "rad/s")
+    case = case_from(linked, folder=folder, title=title, overrides=overrides)
     drive = drive_of(case.parameters, case.inputs, case.initial)
     wish = Wish(
         parameters=case.parameters,

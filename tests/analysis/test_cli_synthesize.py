@@ -78,6 +78,9 @@ def test_it_reports_and_writes_what_it_found(run) -> None:
 
 def test_the_five_bar_runs_and_its_point_traces_the_path(run, linkwork) -> None:
     _, folder = run
+    assert (
+        "bars 20 x 5 mm of 7850 kg/m³" in (folder / "out" / "five-bar.toml").read_text(encoding="utf-8").splitlines()[0]
+    )
     chosen = load_case(folder / "out" / "five-bar.toml")
     assert load_parameters(folder / "out" / "five-bar-parameters.toml") == chosen.parameters
     motion = simulate(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analysis import cosimulate, simulate
-from analysis.cli.common import print_error, say, show_table
+from analysis.cli.common import WRONG, print_error, say, show_table
 from analysis.figures.style import Figure
 from analysis.files import (
     WritingError,
@@ -412,3 +412,29 @@ def test_a_title_with_broken_mathematics_is_drawn(tmp_path):
     figure = Figure()
     figure.suptitle("costs $x^ and $5")
     assert save_figure(figure, tmp_path / "x.png").stat().st_size > 1000
+
+
+@pytest.mark.fmu
+@pytest.mark.parametrize("name", ["crank.angle", "solver.message"])
+@pytest.mark.parametrize("command", [("info",), ("probe", "--calls", "1"), ("verify",), ("check", "--fmu")])
+def test_a_variable_without_a_name_is_a_sentence(tmp_path, linkwork, fmu, name, command):
+    with zipfile.ZipFile(fmu) as archive, zipfile.ZipFile(tmp_path / "nameless.fmu", "w") as copy:
+        for member in archive.namelist():
+            text = archive.read(member)
+            if member == "modelDescription.xml":
+                text = text.replace(f'<ScalarVariable name="{name}"'.encode(), b"<ScalarVariable")
+            copy.writestr(member, text)
+    result = linkwork(*command, "nameless.fmu")
+    assert result.exit_code == WRONG
+    assert "nameless.fmu is not an FMU" in result.stderr
+    assert "name" in result.stderr.replace("nameless", "")
+
+
+def test_names_of_files_need_not_be_utf_8(tmp_path, linkwork):
+    odd = os.fsdecode(b"bad\xff")
+    (tmp_path / f"{odd}.toml").write_text('published = "table-3.1"\nrun.stop_time = 0.01\n')
+    for _ in range(2):  # the second time it knows its own files again, and writes over them
+        result = linkwork("run", f"{odd}.toml", "--no-plot")
+        assert result.exit_code == 0, result.stderr
+    assert [path.name for path in (tmp_path / "out").glob("*.csv")] == [f"{odd}.csv"]
+    assert write_text(tmp_path / "note.md", odd).read_text() == "bad\\udcff"

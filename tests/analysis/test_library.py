@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linkages import described, load_linkage, reach
-from analysis.run import Trajectory, load_case, simulate
+from analysis.periodic import Drive, orbit_of
+from analysis.run import Trajectory, compare, cosimulate, load_case, simulate
 from tests.oracles.planar import Multipliers
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
@@ -115,6 +118,62 @@ def test_the_described_five_bar_runs_as_the_hand_written_one():
     by_hand = simulate("table-3.1", samples=found.time, tolerance=1e-11)
     np.testing.assert_allclose(found["slider.position"], by_hand["slider.position"], atol=1e-10)
     np.testing.assert_allclose(found["C.fx"], by_hand["pin.C.fx"], atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("elastic-bearing", {"across.damping": "4 N*s/m", "upright.damping": "6 N*s/m"}),
+        ("described-five-bar", {"slider.damping": "5 N*s/m"}),
+    ],
+)
+def test_multipliers_are_those_of_the_multipliers_of_lagrange(name, changes):
+    """The monodromy matrix by finite differences of runs of the oracle, which knows nothing of freedoms in closed form."""
+    case = load_case(FOLDER / f"{name}.toml", changes)
+    made = load_linkage(FOLDER / f"{name}.toml")
+    tables = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))["linkage"]
+    springs = {own: dict(spring) for own, spring in tables["springs"].items()}
+    for own, value in changes.items():
+        springs[own.partition(".")[0]][own.partition(".")[2]] = value
+    oracle, speed = Multipliers(described({**tables, "springs": springs})), made.published[name].drive["speed"]
+    orbit = orbit_of(case.parameters, Drive(speed=speed))
+    turn, n = orbit.turn(4), len(made.freedoms)
+    y = np.array([turn[f.coordinate][0] for f in made.freedoms[1:]] + [turn[f.rate][0] for f in made.freedoms[1:]])
+    angle = turn["crank.angle"][0]
+    frames = made.modules[-1].places((angle, *y[: n - 1], speed, *y[n - 1 :], 0.0, 0.0), case.parameters.constants())
+    bodies = [getattr(frames, f"{body}_frame") for body in oracle.bodies]
+    guess = np.array([c for f in bodies for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
+
+    def after(start: np.ndarray) -> np.ndarray:
+        last = [guess]
+
+        def rates(t: float, z: np.ndarray) -> np.ndarray:
+            last[0] = oracle.placed(np.array([angle + speed * t, *z[: n - 1]]), last[0])
+            found = oracle.solve(last[0], np.array([speed, *z[n - 1 :]]), np.zeros(n), {0: 0.0}, {}, {})
+            return np.concatenate([z[n - 1 :], found.accelerations[1:]])
+
+        return solve_ivp(rates, (0.0, 2.0 * np.pi / speed), start, method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+
+    np.testing.assert_allclose(after(y), y, atol=1e-8)
+    steps = np.repeat([1e-6, 1e-4], n - 1)
+    columns = [(after(y + h * e) - after(y - h * e)) / (2.0 * h) for h, e in zip(steps, np.eye(len(y)))]
+    found = np.sort_complex(np.linalg.eigvals(np.array(columns).T))
+    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), found, atol=1e-5)
+    assert np.abs(found).max() > 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.fmu
+@pytest.mark.parametrize("name", ["klann", "elastic-bearing", "shaper"])
+def test_the_fmus_of_a_linkage_run_as_in_process(name, tmp_path):
+    case = load_case(FOLDER / f"{name}.toml")
+    made = load_linkage(FOLDER / f"{name}.toml")
+    given = {"initial": case.initial, "stop_time": 0.1, "step": 2e-3, "tolerance": 1e-12}
+    found = simulate(case.parameters, case.inputs, **given)
+    for file in (build(made, tmp_path), *(build_native(made, kind, tmp_path) for kind in (NATIVE, NATIVE_FMI3))):
+        other = cosimulate(file, case.parameters, case.inputs, **given)
+        assert compare(found, other).worst.relative < 1e-8, file.name
 
 
 def test_ranges_of_motion():

@@ -31,9 +31,9 @@ from analysis import (
     tune,
 )
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
-from analysis.linear import find_equilibrium, linearise
+from analysis.linear import find_equilibrium, linearise, linearise_along, settled_motion
 from analysis.mechanisms import MECHANISMS, register
-from analysis.periodic import Drive, natural_frequency, orbit_of, stability_chart
+from analysis.periodic import Drive, Family, natural_frequency, orbit_of, stability_chart
 from analysis.run import load_case
 from analysis.studio.tables import tables_of
 from linkwork.errors import InputError
@@ -92,6 +92,32 @@ def test_a_run_settles_on_it_and_the_balance_closes() -> None:
     wanted = _cart((20.0, 30.0), (0.0, 0.0), run.time[late])
     np.testing.assert_allclose(run["cart.position"][late], wanted, atol=1e-6 * np.abs(wanted).max())
     assert np.abs(run["energy.residual"]).max() < 1e-9
+
+
+def test_what_varies_by_default_is_the_speed_of_the_crank_of_the_drive() -> None:
+    drive = Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1})
+    assert Family(parameters=P, drive=drive).vary == "right.speed"
+    assert Family(parameters=P, drive=_drive(20.0, Fraction(1))).vary == "left.speed"
+
+
+def test_linear_models_along_a_motion_go_through_the_common_period_of_both_cranks() -> None:
+    """Of an orbit over the angle of either crank, and of a long run; the steady position is the closed form."""
+    speed, ratio = 20.0, Fraction(3, 2)
+    inputs = Inputs(left_speed=speed, right_speed=30.0)
+    settled = settled_motion(P, inputs, turns=100, samples=64)
+    period = 2.0 * pi * ratio.denominator / speed
+    wanted = _cart((speed, 30.0), (0.0, 0.0), np.arange(64) * period / 64)
+    place = [f.coordinate for f in MECHANISM.freedoms].index("cart.position")
+    np.testing.assert_allclose(settled[:, place], wanted, atol=1e-6 * np.abs(wanted).max())
+    for orbit in (
+        orbit_of(P, _drive(speed, ratio)),
+        orbit_of(P, Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),
+    ):
+        model = linearise_along(P, orbit, samples=64)
+        assert model.period == pytest.approx(period)
+        np.testing.assert_allclose(model.states[:, place], wanted, atol=1e-8 * np.abs(wanted).max())
+        angles = model.states[:, :2] - model.states[0, :2]
+        np.testing.assert_allclose(angles[:, 1], 1.5 * angles[:, 0], atol=1e-9)
 
 
 def _slope(t: float, x: np.ndarray, torque: Any) -> np.ndarray:

@@ -47,6 +47,7 @@ class Multipliers:
                 owners.setdefault(own, []).append(name)
         self.owners = owners
         self.rows: dict[str, tuple[int, int]] = {}
+        self._functions: dict[Any, Any] = {}
         rows: list[Any] = []
 
         def closed(name: str, *equations: Any) -> None:
@@ -71,6 +72,8 @@ class Multipliers:
             closed(name, b - g.ratio * a - g.phase)
         self.closure = casadi.vertcat(*rows)
         self.freedoms = casadi.vertcat(*(self.coordinate(f.joint) for f in description.freedoms.values()))
+        both = casadi.vertcat(self.closure, self.freedoms)
+        self.joints = casadi.Function("joints", [self.q], [both, casadi.jacobian(both, self.q)])
 
     def pose(self, body: str) -> Any:
         """Place of a body."""
@@ -149,19 +152,25 @@ class Multipliers:
             if own in forces:
                 forces[own] = forces[own] + sign * force * (1.0 if self.owners[own][0] == body else -1.0)
 
-    def solve(
-        self,
-        q: np.ndarray,
-        rates: np.ndarray,
-        loads: np.ndarray,
-        commanded: Mapping[int, float],
-        points: Mapping[str, tuple[float, float]],
-        forces: Mapping[str, float],
-    ) -> Solution:
-        """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations.
+    def placed(self, coordinates: np.ndarray, guess: np.ndarray) -> np.ndarray:
+        """Places of the bodies at coordinates of the freedoms, by Newton's method."""
+        q = guess
+        for _ in range(20):
+            residual, jacobian = (np.asarray(a) for a in self.joints(q))
+            residual[len(residual) - len(coordinates) :, 0] -= coordinates
+            q = q - np.linalg.solve(jacobian, residual[:, 0])
+            if np.abs(residual).max() < 1e-13:
+                return q
+        return q
 
-        ``points`` are forces on points, ``forces`` torques on bodies and forces of driven springs by their names.
-        """
+    def function(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
+        """Derivatives of closure and freedoms, drift, mass matrix, forces and kinetic energy, as a function."""
+        key = (*points.items(), *forces.items())
+        if key not in self._functions:
+            self._functions[key] = self._made(points, forces)
+        return self._functions[key]
+
+    def _made(self, points: Mapping[str, tuple[float, float]], forces: Mapping[str, float]) -> Any:
         jacobian = casadi.jacobian(casadi.vertcat(self.closure, self.freedoms), self.q)
         drift = casadi.jtimes(
             casadi.jtimes(casadi.vertcat(self.closure, self.freedoms), self.q, self.v), self.q, self.v
@@ -191,7 +200,22 @@ class Multipliers:
             x, y = self.at(self.moving(own), own)
             force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
         inertia_of = casadi.jacobian(momentum, self.v)
-        f = casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
+        return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
+
+    def solve(
+        self,
+        q: np.ndarray,
+        rates: np.ndarray,
+        loads: np.ndarray,
+        commanded: Mapping[int, float],
+        points: Mapping[str, tuple[float, float]],
+        forces: Mapping[str, float],
+    ) -> Solution:
+        """Solve at places q for the rates of the freedoms, the loads along them or their commanded accelerations.
+
+        ``points`` are forces on points, ``forces`` torques on bodies and forces of driven springs by their names.
+        """
+        f = self.function(points, forces)
         j = np.asarray(f(q, np.zeros(len(q)))[0])
         size, count = self.closure.numel(), self.freedoms.numel()
         v = np.linalg.solve(j, np.concatenate([np.zeros(size), rates]))

@@ -25,13 +25,22 @@ from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import shown, takes_published
 from ...units import RAD_S_PER_RPM, Amount, si
-from ..motion.drive import Drive, published_drive
-from ..motion.floquet import Crossing
-from ..motion.orbit import PeriodicOrbit
-from ..motion.variables import Plane, format_value, plane, require_variable, speed_name, speed_names, unit_of, value_of
-from ..response.branch import distance
-from ..response.frequency import first_freedom, natural_frequency
-from ..stability.nonlinear import Confirmation, SpecialPoint, confirm
+from ..motion import (
+    Crossing,
+    Drive,
+    PeriodicOrbit,
+    Plane,
+    default_variable,
+    format_value,
+    plane,
+    published_drive,
+    require_variable,
+    speed_names,
+    unit_of,
+    value_of,
+)
+from ..response import distance, first_freedom, natural_frequency
+from ..stability import Confirmation, SpecialPoint, confirm
 from .boundary import (
     BRANCH_POINTS,
     Monodromy,
@@ -101,12 +110,12 @@ class Traced:
     motion : str
         `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`; or the name of a motion given in ``beside``.
     kind : Crossing
-        At -1 a period doubling; at +1 a fold, beyond which the orbit does not exist; under a torque a complex pair may cross
-        the unit circle, at a torus.
+        Period doubling (multiplier -1); fold (+1), beyond which the orbit does not exist; or, under a torque, torus (a complex
+        pair on the unit circle).
     ends : (End, End)
         At the first and at the last point.
     starts : ndarray, shape (n, m), or None
-        y at crank angle 0 of the motions on it, if they were followed.
+        y at crank angle 0 of the motions on the boundary, if they were followed.
     """
 
     points: NDArray[np.float64]
@@ -137,7 +146,7 @@ class StabilityChart(Shown):
     grid : Grid
         Largest Floquet multiplier of the true orbit.
     boundaries : tuple of Traced
-        Of the true orbit, of other motions, and of those given in ``beside``.
+        Boundaries of the true orbit, of other motions, and of the motions given in ``beside``.
     removals : tuple of str
         For each region the damping that removes it, in words; empty unless damping is an axis.
     runs : tuple of Run
@@ -231,18 +240,18 @@ def stability_chart(
     ranges : ((float, float), (float, float)), optional
         Their ranges, in SI or as text such as "420 rpm"; see `default_range`.
     points : int
-        Of the grid, along each axis.
+        Points of the grid along each axis.
     start : array_like, shape (n,), optional
         Guess of the orbits; under a torque it is needed: see `find_orbit`.
     beside : mapping, optional
-        Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: by name, a function from a
-        plane to their monodromy matrix over it.
+        Further motions whose boundaries are traced, such as `analysis.youssef.linear_motion`: by name, a function that takes a
+        plane and returns the motion's monodromy matrix as a function over it.
     coexisting : bool
         Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
     n_jobs, progress
         See `grid`.
     first : callable, optional
-        Receives the chart without boundaries and long runs as soon as its grid is there, such as to show it: these take longer.
+        Called with the chart as soon as its grid is there, for example to show it: boundaries and long runs take longer.
 
     Returns
     -------
@@ -266,7 +275,7 @@ def stability_chart(
     mechanism = mechanism_of(parameters)
     if drive is None:
         raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
-    names = names or (speed_name(mechanism, drive) or "drive.speed", damping_name(mechanism))
+    names = names or (default_variable(mechanism, drive), damping_name(mechanism))
     spans = tuple(
         default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
         for n, name in enumerate(names)
@@ -496,7 +505,7 @@ class _Survey:
 
 
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Return a line y = const through each part of a plane, with one number of stable motions, that nothing has met so far.
+    """Return lines y = const through the regions of equal number of stable motions that no line or boundary has met.
 
     Parameters
     ----------
@@ -504,7 +513,7 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
     lines : sequence of float
         Lines that were searched.
     boundaries : sequence of ndarray, shape (n, 2)
-        A part that one of them passes within a cell is known.
+        Known boundaries: a region that one of them passes within a cell needs no line.
     """
     cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
     found: list[float] = []
@@ -551,7 +560,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the damping of the first freedom beside the crank, or else of the first damping there is.
+    """Return the FMI name of the damping of the first freedom beside the crank, or else of any damping.
 
     Raises
     ------

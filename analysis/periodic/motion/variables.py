@@ -22,7 +22,7 @@ from ...units import RAD_S_PER_RPM
 from .drive import Direction, Drive, forces_of, require_acting
 from .flow import Flow, crank_of, cranks_of
 
-#: A mechanism and what drives it.
+#: A mechanism and its drive.
 Operation = tuple[Parameters, Drive]
 #: The operation at a point of a chart.
 Plane = Callable[[float, float], Operation]
@@ -67,6 +67,20 @@ def speed_name(mechanism: Mechanism, drive: Drive | None = None) -> str | None:
     """
     command = (crank_of(mechanism) if drive is None else drive.reference(mechanism)).command
     return None if command is None else mechanism.channels[command].name
+
+
+def default_variable(mechanism: Mechanism, drive: Drive | None = None) -> str:
+    """Return the FMI name of the parameter that varies if none is named: the prescribed speed of the crank.
+
+    Raises
+    ------
+    InputError
+        If it cannot be prescribed; or if the mechanism has several cranks, and there is no drive that says which.
+    """
+    name = speed_name(mechanism, drive)
+    if name is None:
+        raise InputError(f"the crank of a {mechanism.name} has no speed that can be prescribed: name what varies")
+    return name
 
 
 @takes_published()
@@ -121,7 +135,7 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
     Raises
     ------
     UnknownNameError
-        If there is no such thing.
+        If there is no such parameter.
     """
     names = variable_names(mechanism)
     if name not in names:
@@ -155,7 +169,7 @@ def format_value(name: str, value: float, unit: str) -> str:
 
 @lru_cache(maxsize=64)
 def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Parameters with others of these values; a row of a chart over the speed has one mechanism."""
+    """Return parameters with new values, cached: a row of a chart over the speed has one mechanism."""
     return replace(parameters, **dict(values))
 
 
@@ -245,7 +259,7 @@ class Family:
     drive : Drive
     vary : str or callable
         FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
-        as ``slider.damping``; or a function from a number to (parameters, Drive).
+        as ``slider.damping``; or a function from a number to (parameters, Drive). By default the speed of the crank.
     name, unit : str
         Of the parameter, for tables and plots; they follow from an FMI name.
 
@@ -259,7 +273,7 @@ class Family:
 
     parameters: Parameters
     drive: Drive
-    vary: Vary = "drive.speed"
+    vary: Vary = ""
     name: str = ""
     unit: str = ""
 
@@ -267,9 +281,11 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        require_variable(self.parameters, self.drive, self.vary)
-        object.__setattr__(self, "name", self.name or self.vary)
-        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), self.vary))
+        vary = self.vary or default_variable(mechanism_of(self.parameters), self.drive)
+        object.__setattr__(self, "vary", vary)
+        require_variable(self.parameters, self.drive, vary)
+        object.__setattr__(self, "name", self.name or vary)
+        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), vary))
 
     def at(self, value: float) -> Operation:
         """Return the mechanism and drive at a value of the parameter."""
@@ -297,8 +313,8 @@ FloatArray = NDArray[np.float64]
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
     """Return the FMI names of all parameters by which motions are differentiated: of the drive and of the mechanism.
 
-    A parameter that would switch on what is switched off, friction by contact forces, is left out: it can be named all the
-    same.
+    A parameter that would switch on equations that are off, as friction by contact forces, is left out; it can be named
+    explicitly.
     """
     mechanism, acting = mechanism_of(parameters), []
     for name in variable_names(mechanism):
@@ -314,7 +330,7 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
 
 
 class Along(NamedTuple):
-    """Derivatives of the constants with respect to parameters, and of these with respect to one more; shape (P, m)."""
+    """Derivatives of the constants by parameters, and the derivatives of these by a further parameter; shape (P, m)."""
 
     p: FloatArray
     p_along: FloatArray
@@ -357,7 +373,7 @@ def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> Fl
 
 @cache
 def _constants(mechanism: Mechanism) -> Any:
-    """Return a function of parameters and a direction that gives the constants' derivatives, and theirs along it."""
+    """Return a function of parameters and a direction: the constants' derivatives, and their derivatives along it."""
     casadi = symbolic.library()
     traced = of_parameters(mechanism)
     k = casadi.vertcat(*traced.parameters.constants())

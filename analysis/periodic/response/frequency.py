@@ -29,14 +29,23 @@ from ...numerics.continuation import ContinuationError
 from ...numerics.workers import interruptible
 from ...run import at_rest, shown, takes_published
 from ...units import Amount, si
-from ..motion.discretisation import OrbitError
-from ..motion.drive import SAME, Drive, published_drive
-from ..motion.floquet import Crossing
-from ..motion.flow import cranks_of
-from ..motion.orbit import PeriodicOrbit, orbit_of, require_turns
-from ..motion.search import orbits_of
-from ..motion.variables import Family, unit_of
-from ..stability.nonlinear import SpecialPoint
+from ..motion import (
+    SAME,
+    Crossing,
+    Drive,
+    Family,
+    OrbitError,
+    PeriodicOrbit,
+    cranks_of,
+    default_variable,
+    orbit_of,
+    orbits_of,
+    published_drive,
+    require_turns,
+    speed_names,
+    unit_of,
+)
+from ..stability import SpecialPoint
 from .advice import Avoided, Extremum, FoldJump, extrema, fold_jumps, ranges_to_avoid
 from .branch import GREATEST, GREATEST_MULTIPLIER, Branch, describe, follow, follow_both, passes, switch
 
@@ -97,15 +106,15 @@ def mean_effective_mass(parameters: Parameters) -> float:
 def natural_frequency(parameters: Parameters) -> float:
     """Compute the natural frequency of the first freedom beside the crank on its spring (rad/s), from its mean effective mass.
 
-    A spring's stiffness is that of the parameter of this name, such as ``slider.stiffness``; where the mechanism has none, it
-    is the mean over a turn of the second derivative of the energy.
+    The stiffness is the mechanism's parameter for it, such as ``slider.stiffness``; without such a parameter it is the mean
+    over a turn of the second derivative of the energy.
 
     Raises
     ------
     ParameterError
         If there is no spring.
     AssemblyError
-        If the mechanism, that freedom held at its zero, cannot make the turn.
+        If the crank cannot make a turn with that freedom held at its zero.
 
     Examples
     --------
@@ -142,8 +151,8 @@ class Response(Shown):
     Attributes
     ----------
     branches : tuple of Branch
-        First the one from the low end, then the one from the high end if it is another, then those of twice the period, of four
-        times and so on, then those connected with none of these.
+        First the branch from the low end, then the branch from the high end if it is another one, then the branches of twice
+        the period, of four times and so on, then the branches connected with none of these.
     low, high : float
         The range asked for.
     problems : tuple of str
@@ -233,7 +242,7 @@ def frequency_response(
     high: Amount,
     *,
     drive: Drive | None = None,
-    vary: str = "drive.speed",
+    vary: str = "",
     start: ArrayLike | None = None,
     doublings: int = 1,
     most_points: int = 5000,
@@ -251,8 +260,8 @@ def frequency_response(
     drive : Drive, optional
         Needed if another parameter than the speed varies. A published set is driven at its speed.
     vary : str
-        ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or any
-        parameter that `Family` can vary.
+        The speed of the crank by default, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is
+        needed), or any parameter that `Family` can vary.
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
     doublings : int
@@ -275,7 +284,7 @@ def frequency_response(
     OrbitError
         If there is no periodic motion to begin with at either end.
     InputError
-        If the range is not one.
+        If the range is not finite and increasing.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.
 
@@ -286,10 +295,12 @@ def frequency_response(
     >>> [f"{100.0 * peak.amplitude:.3f} cm" for peak in response.maxima()]
     ['1.715 cm']
     """
-    unit = unit_of(mechanism_of(parameters), vary)
+    mechanism = mechanism_of(parameters)
+    vary = vary or default_variable(mechanism, drive)
+    unit = unit_of(mechanism, vary)
     low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
     if drive is None:
-        if vary != "drive.speed":
+        if vary not in speed_names(mechanism):
             raise InputError(
                 f"{vary} varies: say what drives the plant with drive=Drive(speed=...) or Drive(torque=...)"
             )
@@ -363,7 +374,7 @@ class _Search:
                 break
 
     def follow_doublings(self, times: int) -> None:
-        """Follow the branches of twice the period, so many times in a row, each from one of its ends only."""
+        """Follow the branches of twice the period, and from these again, ``times`` deep, each from one of its ends only."""
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
@@ -404,7 +415,7 @@ class _Search:
                     return
 
     def seek(self, value: float, turns: int) -> None:
-        """Find the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
+        """Find the motions of ``turns`` turns at a value of the parameter, and follow each that lies on no branch."""
         parameters, drive = self.family.at(value)
         start = None
         if not drive.speed_drive:
@@ -431,7 +442,7 @@ class _Search:
                 self.problems.append(ending(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Return whether a branch passes through a motion, begun with any of its turns."""
+        """Return whether a branch passes through a motion, whichever of its turns comes first."""
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         starts = orbit.passages()
         return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)

@@ -1,3 +1,4 @@
+from .nonlinear import Confirmation as Confirmation
 from .nonlinear import NormalForm as NormalForm
 from .nonlinear import SpecialPoint as SpecialPoint
 from .nonlinear import confirm as confirm
