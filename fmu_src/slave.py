@@ -289,9 +289,16 @@ class LinkworkSlave(Fmi2Slave):
         for reference, value in zip(references, values):
             self._check_reference(reference, kind)
             causality = self._causalities[reference]
-            if running and causality != "input":
+            if running and causality != "input" and not self.variables[reference].tunable:
                 why = f"{self._names[reference]} is {_NOT_TAKEN[causality]}: the value {value!r} was not taken"
                 raise self._fail(StepError(why))
+        if running and self._plant is not None and any(self.variables[r].tunable for r in references):
+            try:
+                self._plant.tune(
+                    dict(zip(self._names, self._values)) | {self._names[r]: v for r, v in zip(references, values)}
+                )
+            except LinkworkError as error:
+                raise self._fail(error) from error
         for reference, value in zip(references, values):
             name = self._names[reference]
             causality = self._causalities[reference]
@@ -299,9 +306,9 @@ class LinkworkSlave(Fmi2Slave):
                 continue  # a guess for the initialisation, which is solved without one
             self._values[reference] = value
             self._stale = True
-            if causality == "parameter":
+            if causality == "parameter" and not running:
                 self._plant = None
-            elif self._plant is not None:
+            elif causality == "input" and self._plant is not None:
                 if running:
                     self._plant.set_input(name, value)
                 else:

@@ -195,11 +195,12 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
     if isinstance(pivot, SliderMotion):
         own = _motion_columns(pivot.series, drive.crank_angle - solution.linkage.crank_phase)
     end = {"time [s]": np.append(drive.time, drive.period), "slider.force [N]": np.append(drive.force, drive.force[0])}
+    head = chosen.synthesis.make.masses_in_words()
     written = [
         write_csv(folder / "motion.csv", own | dict(drive.columns())),
         write_csv(folder / "force.csv", end),
-        save_parameters(folder / "five-bar-parameters.toml", drive.parameters),
-        write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")),
+        save_parameters(folder / "five-bar-parameters.toml", drive.parameters, head=head),
+        write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv"), head=head),
     ]
     written += plotted(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:

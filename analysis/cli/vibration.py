@@ -290,7 +290,7 @@ def stability(
 
     The verdict is on the motion at one speed, with its margin. The chart has the largest Floquet multiplier of the true orbit
     at every point, the boundaries of instability traced, that of the linear equation beside it, and three points confirmed by
-    long nonlinear runs. Computed rows are kept: a chart that was interrupted goes on.
+    long nonlinear runs. The picture of the grid is written first. Computed rows are kept: a chart that was interrupted goes on.
 
     \b
     Examples:

@@ -72,9 +72,17 @@ def write(entries: Mapping[str, bytes], target: Path) -> Path:
 
 
 def documentation(
-    mechanism: Mechanism, variables: Sequence[Variable], title: str, made: str, notes: Sequence[str]
+    mechanism: Mechanism,
+    variables: Sequence[Variable],
+    title: str,
+    made: str,
+    notes: Sequence[str],
+    icon: str = "model.png",
 ) -> dict[str, bytes]:
-    """Return icon, licence and the HTML page of an FMU: the model, the way it is ``made``, and the table of its variables."""
+    """Return icon, licence and the HTML page of an FMU: the model, the way it is ``made``, the table of its variables.
+
+    ``icon`` is the place of the icon in the archive.
+    """
     rows = []
     for variable in variables:
         bounds = [
@@ -100,7 +108,7 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
 </style>
 </head>
 <body>
-<h1><img src="../model.png" alt="" height="60"> {html.escape(mechanism.title)}</h1>
+<h1><img src="../{icon}" alt="" height="60"> {html.escape(mechanism.title)}</h1>
 <p>{html.escape(made)}, Linkwork {linkwork.__version__}. MIT licence.</p>
 {paragraphs}
 {to_html(mechanism)}<h2>Variables</h2>
@@ -112,7 +120,7 @@ td:first-child {{ font-family: monospace; white-space: nowrap; }}
 </html>
 """
     return {
-        "model.png": ICON.read_bytes(),
+        icon: ICON.read_bytes(),
         "documentation/index.html": page.encode(),
         "documentation/licenses/license.txt": LICENSE.read_bytes(),
     }

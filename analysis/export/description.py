@@ -1,6 +1,6 @@
 """The descriptions inside FMUs, for every kind of them, from the mechanism's table of variables.
 
-``modelDescription.xml`` for all kinds; ``terminalsAndIcons.xml`` and ``buildDescription.xml`` of FMI 3.0.
+``modelDescription.xml`` for all kinds, ``buildDescription.xml`` of FMI 3.0.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -
     SubElement(root, "DefaultExperiment", dict(zip(names, map(repr, mechanism.experiment))))
     root.append(_variables(mechanism, kind, entries))
     root.append(_structure(mechanism, kind, entries))
-    return _written(root)
+    return written(root)
 
 
 def _entries(mechanism: Mechanism, kind: Kind) -> tuple[Entry, ...]:
@@ -185,7 +185,8 @@ def _date() -> dict[str, str]:
     return {"generationDateAndTime": datetime.fromtimestamp(int(epoch), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")}
 
 
-def _written(root: Element) -> bytes:
+def written(root: Element) -> bytes:
+    """Return the text of an XML file."""
     indent(root, "\t")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'.encode()
 
@@ -208,7 +209,6 @@ _TYPES = {
     2: {"Real": "Real", "Integer": "Integer", "String": "String"},
     3: {"Real": "Float64", "Integer": "Int32", "String": "String"},
 }
-_VARIABILITY = {"parameter": "fixed"}
 # approx, not calculated: only so may an output carry the start value that people look for in the XML
 _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
@@ -226,9 +226,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
             "valueReference": str(entry.reference),
             "description": variable.description,
             "causality": variable.causality,
-            "variability": _VARIABILITY.get(
-                variable.causality, "continuous" if variable.kind == "Real" else "discrete"
-            ),
+            "variability": _variability(variable),
         }
         if variable.causality in _INITIAL:
             attributes["initial"] = _INITIAL[variable.causality]
@@ -251,6 +249,12 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if start is not None:
             SubElement(node, "Start", {"value": start})
     return listed
+
+
+def _variability(variable: Variable) -> str:
+    if variable.causality == "parameter":
+        return "tunable" if variable.tunable else "fixed"
+    return "continuous" if variable.kind == "Real" else "discrete"
 
 
 def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
@@ -371,55 +375,6 @@ def _reinitialised(mechanism: Mechanism) -> tuple[int, ...]:
 # FMI 3.0
 
 
-def terminals(mechanism: Mechanism) -> bytes:
-    """Return ``terminalsAndIcons.xml`` with the terminals of shafts, sliders and loaded points.
-
-    A terminal for each freedom, with coordinate, rate and acceleration, its inputs, and the torque or force applied; one for
-    the inputs of each point that a load acts on, with its displacement.
-    """
-    root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
-    listed = SubElement(root, "Terminals")
-    for name, (text, members) in _terminals(mechanism).items():
-        node = SubElement(listed, "Terminal", {"name": name, "matchingRule": "bus", "description": text})
-        for member, variable in members.items():
-            SubElement(
-                node,
-                "TerminalMemberVariable",
-                {"variableName": variable, "memberName": member, "variableKind": "signal"},
-            )
-    return _written(root)
-
-
-def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
-    """Return the terminals by name: description, and variables by the name of the member."""
-    rate = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
-    found: dict[str, tuple[str, dict[str, str]]] = {}
-
-    def leaf(name: str) -> str:
-        return name.rpartition(".")[2]
-
-    def table(name: str) -> str:
-        return name.rpartition(".")[0]
-
-    def motion(of: str) -> dict[str, str]:
-        return {leaf(of): of} | (motion(rate[of]) if of in rate else {})
-
-    for number, freedom in enumerate(mechanism.freedoms):
-        members = motion(freedom.coordinate)
-        channels = [channel for channel in mechanism.channels if channel.freedom == number]
-        for channel in channels:
-            members[leaf(channel.name) if channel.kind == "force" else f"commanded_{leaf(channel.name)}"] = channel.name
-        applied = tuple({f"{table(channel.name)}.applied_" for channel in channels})
-        members |= {leaf(name): name for name in mechanism.output_names if name.startswith(applied)}
-        found[table(freedom.coordinate)] = (f"Motion of {freedom.coordinate} and what drives it", members)
-    for channel in mechanism.channels:
-        if channel.freedom < 0:
-            _, members = found.setdefault(table(channel.name), ("Load, and motion of the point that it acts on", {}))
-            members[leaf(channel.name)] = channel.name
-            members |= motion(channel.displacement) if channel.displacement else {}
-    return found
-
-
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:
     """Return ``buildDescription.xml``, by which the files below ``sources/`` are compiled as C11 without options."""
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
@@ -427,4 +382,4 @@ def build_description(identifier: str, sources: Sequence[str]) -> bytes:
     files = SubElement(configuration, "SourceFileSet", {"language": "C11"})
     for source in sources:
         SubElement(files, "SourceFile", {"name": source})
-    return _written(root)
+    return written(root)

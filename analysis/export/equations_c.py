@@ -380,6 +380,7 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
         causality,
         _number(v.start) if causality != "COMPUTED" else "0.0",  # type: ignore[arg-type]
         _place(mechanism, entry),
+        int(v.tunable),
         rule,
         _number(low),
         _number(high),

@@ -26,10 +26,11 @@ from ..numerics.cache import code_folder, hashes_below, keep_hashes, read_hashes
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import with_bill
-from .description import Kind, build_description, description, terminals
+from .description import Kind, build_description, description
 from .equations_c import generated
 from .experiments import experiments
 from .interface import interface
+from .terminals import terminal_files
 
 
 class Platform(NamedTuple):
@@ -128,10 +129,11 @@ def build_native(
     entries["modelDescription.xml"] = description(mechanism, kind, COMPILED)
     entries["sources/buildDescription.xml"] = build_description(identifier, COMPILED)
     if kind.fmi == 3:
-        entries["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
+        entries |= terminal_files(mechanism)
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
-    entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES)
+    icon = "model.png" if kind.fmi == 2 else "terminalsAndIcons/icon.png"
+    entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES, icon)
     entries |= experiments(mechanism)
     target = dest / kind.file_name(mechanism)
     return write(with_bill(target.stem, entries, native=True, fmi=kind.fmi), target)

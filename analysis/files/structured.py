@@ -22,8 +22,8 @@ ENDINGS = (".toml", ".json")
 _DEPTH, _TEXT, _NAME, _BITS = 50, 10_000, 200, 1024
 
 
-def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
-    """Write nested tables to a TOML or JSON file, according to the path's ending.
+def write_tables(path: str | Path, data: Mapping[str, Any], *, head: str = "") -> Path:
+    """Write nested tables to a TOML or JSON file, according to the path's ending; ``head`` is a comment of a TOML file.
 
     Raises
     ------
@@ -35,7 +35,8 @@ def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
         text = json.dumps(data, indent=2) + "\n"
     else:
         # TOML needs plain values before tables
-        text = tomli_w.dumps(dict(sorted(data.items(), key=lambda item: isinstance(item[1], dict))))
+        text = f"# {head}\n" if head else ""
+        text += tomli_w.dumps(dict(sorted(data.items(), key=lambda item: isinstance(item[1], dict))))
     return write_text(path, text)
 
 

@@ -75,9 +75,9 @@ def parameters_to(parameters: Parameters) -> dict[str, Any]:
     return data
 
 
-def save_parameters(path: str | Path, parameters: Parameters) -> Path:
-    """Write parameters to a TOML or JSON file, as the path's ending says."""
-    return files.write_tables(path, parameters_to(parameters))
+def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "") -> Path:
+    """Write parameters to a TOML or JSON file, as the path's ending says; ``head`` is a comment of a TOML file."""
+    return files.write_tables(path, parameters_to(parameters), head=head)
 
 
 def load_parameters(path: str | Path) -> Parameters:

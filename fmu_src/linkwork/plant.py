@@ -131,6 +131,21 @@ class Plant:
         self._modes = tuple(float(self.modes[mode.name]) for mode in self.mechanism.modes)
         self._commands = self.mechanism.commands(self.modes)
 
+    def tune(self, values: Mapping[str, Any]) -> None:
+        """Take other parameters, by FMI name; a spring does no work as its stiffness changes.
+
+        Raises
+        ------
+        ParameterError
+            If one of them is not valid; nothing changes then.
+        """
+        m = self.mechanism
+        parameters = m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables})
+        before = m.equations.energy(self.state, self._p)
+        self.parameters = parameters
+        self._derive()
+        self.start_energy += m.equations.energy(self.state, self._p) - before
+
     def _rate_names(self) -> set[str]:
         """Return the inputs that are commanded rates, in any mode."""
         return {channel.name for channel in self.mechanism.channels if channel.kind == "command"}

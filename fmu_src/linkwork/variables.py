@@ -109,6 +109,11 @@ class Variable(NamedTuple):
     of: str = ""
 
     @property
+    def tunable(self) -> bool:
+        """Return whether the variable is a parameter that may change between steps: stiffness, damping and friction."""
+        return self.causality == "parameter" and self.role in ("stiffness", "damping", "friction")
+
+    @property
     def wraps(self) -> bool:
         """Return whether the variable is an angle between -pi and pi, which jumps by a turn."""
         return self.minimum == -pi and self.maximum == pi

@@ -6,6 +6,7 @@
 #define FACE_H
 
 #include <fenv.h>
+#include <string.h>
 
 #include "instance.h"
 
@@ -53,8 +54,10 @@ static inline void restore_traps(fenv_t *kept) {
 #define SET_EACH(kind)                                                                                                         \
     for (size_t i = 0; i < count; i++)                                                                                         \
         if (!instance_may_set(c, __func__, references[i], kind)) return FMI(Error);                                            \
+    double before[VARIABLES];                                                                                                  \
+    memcpy(before, c->s.plant.given, sizeof before);                                                                           \
     for (size_t i = 0; i < count; i++) instance_set(c, references[i], values[i]);                                              \
-    return FMI(OK);
+    RETURN(instance_tune(c, __func__, references, count, before));
 
 enum {
     ANY_STATE = INSTANTIATED | SETTLED,

@@ -7,8 +7,6 @@
 
 #include "face.h"
 
-#include <string.h>
-
 typedef fmi2ValueReference Reference;
 
 static void log_message(const Instance *c, Status status, const char *category, const char *message) {
@@ -74,9 +72,11 @@ fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], si
         else if (!instance_may_set(c, __func__, references[i], REAL))
             return fmi2Error;
     Status status = free ? instance_set_states(c, __func__, x, STATES) : OK;
+    double before[VARIABLES];
+    memcpy(before, c->s.plant.given, sizeof before);
     for (size_t i = 0; i < count && status == OK; i++)
         if (!free || instance_state(references[i]) < 0) instance_set(c, references[i], values[i]);
-    RETURN(status);
+    RETURN(status == OK ? instance_tune(c, __func__, references, count, before) : status);
 }
 
 fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[], size_t count, const fmi2Integer values[]) {

@@ -242,8 +242,9 @@ bool instance_may_set(Instance *c, const char *function, unsigned reference, Kin
         instance_say(c, ERROR, "%s: %s is computed, it cannot be set", function, v->name);
         return false;
     }
-    if (v->causality == PARAMETER && !(phase & (INSTANTIATED | INITIALIZATION))) {
-        instance_say(c, ERROR, "%s: %s is a fixed parameter, it cannot be set %s", function, v->name, phase_name(phase));
+    if (v->causality == PARAMETER && !(phase & (INSTANTIATED | INITIALIZATION | (v->tunable ? EVENT | STEP : 0)))) {
+        instance_say(c, ERROR, "%s: %s is a %s parameter, it cannot be set %s", function, v->name,
+                     v->tunable ? "tunable" : "fixed", phase_name(phase));
         return false;
     }
     return true;
@@ -260,6 +261,15 @@ void instance_set(Instance *c, unsigned reference, double value) {
     else
         for (int k = 0; k < COMMANDS; k++)
             if (input_at[commands[k].input] == (int)reference) a->fresh[k] = 1.0;
+}
+
+Status instance_tune(Instance *c, const char *function, const unsigned references[], size_t count,
+                     const double before[VARIABLES]) {
+    char sentence[SENTENCE];
+    bool tuned = false;
+    for (size_t i = 0; i < count; i++) tuned |= variables[references[i]].tunable;
+    if (!tuned || !((int)c->s.phase & RUNNING) || plant_tune(&c->s.plant, before, sentence) == GOOD) return OK;
+    return instance_say(c, ERROR, "%s: %s", function, sentence);
 }
 
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope) {

@@ -84,6 +84,9 @@ LOCAL Status instance_get_integer(Instance *c, const char *function, unsigned re
 LOCAL Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
 LOCAL bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind);
 LOCAL void instance_set(Instance *c, unsigned reference, double value);
+/* After a set, before which these were given: take tunable parameters, or none of what was set. */
+LOCAL Status instance_tune(Instance *c, const char *function, const unsigned references[], size_t count,
+                           const double before[VARIABLES]);
 LOCAL Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
 LOCAL Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count,
                                     const int orders[], double values[]);

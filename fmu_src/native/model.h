@@ -31,6 +31,7 @@ typedef struct {
     Causality causality;
     double start; /* of a parameter or an input */
     int row;      /* of what is computed: its place among the rows, see below; of an input: its number */
+    int tunable;  /* of a parameter: whether it may change during a run */
     Rule rule;
     double least, most;
     const char *requirement; /* what would be right, as the end of the sentence "it must ..." */

@@ -258,6 +258,31 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
     return GOOD;
 }
 
+/* Constants of the parameters given, with the energy at the state. */
+static double energy_of(const Plant *a, double p[CONSTANTS]) {
+    double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)], x[STATES], scale[STATES];
+    what_begins(a, own, state, u);
+    memcpy(state, a->x, sizeof state);
+    call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){p, x, scale});
+    return p[CONSTANTS - 1];
+}
+
+Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTENCE]) {
+    Plant old = *a;
+    double p[CONSTANTS], unused[CONSTANTS];
+    memcpy(old.given, before, sizeof old.given);
+    Reason reason = check_parameters(a, sentence);
+    double change = energy_of(a, p) - energy_of(&old, unused);
+    if (reason == GOOD && !(all_finite(p, CONSTANTS - 1) && isfinite(change))) reason = blame_extreme(a, sentence);
+    if (reason != GOOD) {
+        *a = old;
+        return reason;
+    }
+    p[CONSTANTS - 1] = a->p[CONSTANTS - 1] + change;
+    memcpy(a->p, p, sizeof p);
+    return GOOD;
+}
+
 /* The integrator: see step.h */
 
 /* What the slope of the state needs beside it: the plant, whose inputs change over the step. */

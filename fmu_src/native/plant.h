@@ -56,6 +56,10 @@ LOCAL void plant_reset(Plant *a);
 /* Constants and state from what is given; on failure the reason, with the sentence. */
 LOCAL Reason plant_begin(Plant *a, char sentence[SENTENCE]);
 
+/* Take parameters that were changed during a run; a spring does no work as its stiffness changes. On failure the reason, with the
+   sentence, and those before return. */
+LOCAL Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTENCE]);
+
 /* Go forward by a step under the inputs in force. A step that fails leaves all as it was. Where `early`, a step into the limit
    of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
 LOCAL Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended,

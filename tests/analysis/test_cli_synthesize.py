@@ -59,7 +59,7 @@ def test_it_reports_and_writes_what_it_found(run) -> None:
     assert written == {
         "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "five-bar-parameters.toml",
         "five-bar.toml", "best-linkage.png", "alternatives.png", "trade-off.csv", "trade-off.png", "cognates.csv",
-        "best-plates.dxf", "best-plates.svg", "best-sheet.pdf",
+        "best-plates.dxf", "best-plates.svg", "best-sheet.pdf", "linkage.toml",
     }  # fmt: skip
     assert all(f"wrote {folder / 'out' / name}" in result.output for name in written)
     rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")
@@ -78,6 +78,9 @@ def test_it_reports_and_writes_what_it_found(run) -> None:
 
 def test_the_five_bar_runs_and_its_point_traces_the_path(run, linkwork) -> None:
     _, folder = run
+    assert (
+        "bars 20 x 5 mm of 7850 kg/m³" in (folder / "out" / "five-bar.toml").read_text(encoding="utf-8").splitlines()[0]
+    )
     chosen = load_case(folder / "out" / "five-bar.toml")
     assert load_parameters(folder / "out" / "five-bar-parameters.toml") == chosen.parameters
     motion = simulate(

@@ -38,7 +38,7 @@ from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK, MechanismErr
 from analysis.run import CASES, InductionMotor, expressions, simulate_many, standard_cases
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.published import TABLE_3_1
-from linkwork.mechanism import Mechanism
+from linkwork.mechanism import Link, Mechanism
 from linkwork.plant import Plant
 from linkwork.slider_crank.published import OFFSET_CASE
 from tests.mechanisms import pendulum, rotor_on_cart
@@ -368,6 +368,7 @@ FAULTS: dict[str, tuple[str, Any, str]] = {
     ),
     "kind": ("channels", (ROTOR.channels[0]._replace(kind="comand"), *ROTOR.channels[1:]), "is a 'comand'"),
     "order of channels": ("channels", ROTOR.channels[::-1], "must be the inputs in their order"),
+    "link": ("links", (Link("cart", "cart.length", "cart.mass", "cart.inertia", ()),), "link cart has 'cart.length'"),
     "no published set": ("published", {}, "no published set"),
     "length": ("equations", ROTOR.equations._replace(derivative=lambda x, i, p: (0.0,)), "derivative gives 1 numbers"),
     "mode": (

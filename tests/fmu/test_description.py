@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator
+from io import BytesIO
 from math import pi
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import fmpy
+import matplotlib.image as mpimg
 import pytest
 from fmpy.model_description import read_build_description, read_model_description
 from fmpy.validation import validate_fmu
@@ -17,6 +19,7 @@ from lxml import etree
 
 import linkwork
 from analysis.export import description as writer
+from analysis.export import terminals
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from build_fmu import FMUS
 from linkwork.mechanism import Mechanism
@@ -152,7 +155,7 @@ def written(mechanism: Mechanism, kind: str, folder: Path) -> Path:
     if KINDS[kind].fmi == 3:
         identifier = KINDS[kind].identifier(mechanism)
         xml["sources/buildDescription.xml"] = writer.build_description(identifier, ["all.c", "equations.c"])
-        xml["terminalsAndIcons/terminalsAndIcons.xml"] = writer.terminals(mechanism)
+        xml["terminalsAndIcons/terminalsAndIcons.xml"] = terminals.terminals(mechanism)
     for name, text in xml.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(text)
@@ -213,7 +216,8 @@ def test_variable(
     value = scalar.attributes
     assert value["causality"] == causality
     assert scalar.kind == type_name
-    assert value["variability"] == {"parameter": "fixed"}.get(
+    tunable = name.endswith(("stiffness", "damping", "friction", "friction_coefficient", "friction_radius"))
+    assert value["variability"] == {"parameter": "tunable" if tunable else "fixed"}.get(
         causality, "continuous" if type_name == "Real" else "discrete"
     )
     assert value.get("initial") == {"parameter": "exact", "output": "approx", "local": "calculated"}.get(causality)
@@ -399,13 +403,13 @@ TERMINALS = {
 
 def members(xml: bytes) -> Iterator[tuple[str, str, str]]:
     for terminal in root_of(xml).find("Terminals"):
-        for member in terminal:
+        for member in terminal.findall("TerminalMemberVariable"):
             yield terminal.get("name"), member.get("memberName"), member.get("variableName")
 
 
 def test_terminals_gather_what_is_connected_together(model: Model) -> None:
     found: dict[str, dict[str, str]] = {}
-    for terminal, member, variable in members(writer.terminals(FMUS[model.name])):
+    for terminal, member, variable in members(terminals.terminals(FMUS[model.name])):
         found.setdefault(terminal, {})[member] = variable
     assert found == TERMINALS[model.name]
 
@@ -424,8 +428,26 @@ def test_further_files_of_fmi_3_follow_their_schemas(mechanism: Mechanism, name:
     schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / SCHEMAS[name]))
     schema.assertValid(etree.parse(str(folder / name)))
     variables = set(scalars(root_of((folder / "modelDescription.xml").read_bytes())))
-    for _, _, variable in members(writer.terminals(mechanism)):
+    for _, _, variable in members(terminals.terminals(mechanism)):
         assert variable in variables
+
+
+def test_terminals_have_kinds_flows_and_icons(model: Model) -> None:
+    files = terminals.terminal_files(FMUS[model.name])
+    listed = root_of(files["terminalsAndIcons/terminalsAndIcons.xml"]).find("Terminals")
+    kinds = {terminal.get("name"): terminal.get("terminalKind").rpartition(".")[2] for terminal in listed}
+    assert (
+        kinds
+        == {
+            "FiveBarSlider": {"crank": "rotational", "slider": "translational", "load": "planar"},
+            "SliderCrank": {"crank": "rotational", "shift": "translational", "slider": "translational"},
+        }[model.name]
+    )
+    inflow = {m.get("variableName") for m in listed.iter("TerminalMemberVariable") if m.get("variableKind") == "inflow"}
+    assert inflow == {c.name for c in FMUS[model.name].channels if c.kind == "force"}
+    for terminal in listed:
+        icon = files[f"terminalsAndIcons/{terminal.find('TerminalGraphicalRepresentation').get('iconBaseName')}.png"]
+        assert len(mpimg.imread(BytesIO(icon), "png")) == 32
 
 
 def test_build_description(tmp_path: Path) -> None:

@@ -221,14 +221,15 @@ def changed(mechanism: Mechanism) -> dict[str, set[str]]:
             x = e.jump(x, i, u, p) if jumped else x
             return [*e.outputs(x, i, 0.3, p), *e.derivative(x, i, p), e.clearance(x, i, p)]
 
-        at = [*plant.state, *plant.inputs.values()]
+        # commands differ from the rates, as between events in model exchange
+        at = [*plant.state, *(1.1 * value + 0.01 for value in plant.inputs.values())]
         for place, name in enumerate(known):
-            jumped = place >= mechanism.size
             moved = list(at)
             moved[place] = moved[place] * 1.001 + 1e-5
-            for unknown, before, after in zip(unknowns, values(at, jumped), values(moved, jumped)):
-                if before != after:
-                    found[unknown].add(name)
+            for jumped in (False, True):
+                for unknown, before, after in zip(unknowns, values(at, jumped), values(moved, jumped)):
+                    if before != after:
+                        found[unknown].add(name)
     return found
 
 

@@ -354,8 +354,8 @@ def test_what_is_computed_or_fixed_cannot_be_set(library: Library) -> None:
     assert c.get("crank.angle") == [0.0]
     c = library.instance().start()
     before = c.get("crank.acceleration")
-    assert c.set(slider__damping=3.0) == ERROR
-    assert "slider.damping is a fixed parameter, it cannot be set in step mode" in c.log[-1][1]
+    assert c.set(crank__length=3.0) == ERROR
+    assert "crank.length is a fixed parameter, it cannot be set in step mode" in c.log[-1][1]
     assert c.get("crank.acceleration") == before
     assert c.step(0.0, 1e-3) == OK
 

@@ -443,6 +443,30 @@ def test_the_status_of_a_mended_start_is_good(library: Library) -> None:
         assert (c.status(), c.text()) == (0, "")
 
 
+TUNED = {"slider.stiffness": 5000.0, "slider.damping": 4.0, "slider.coulomb_friction": 0.5}
+
+
+@pytest.mark.parametrize("name", TUNED)
+def test_tunable_parameters_change_between_steps(library: Library, name: str) -> None:
+    mechanism = FMUS[model(library)]
+    plant = Plant.of_values(mechanism, {v.name: v.start for v in mechanism.variables})
+    c = library.instance().start()
+    for n in range(20):
+        if n == 10:
+            assert c.set(**{name.replace(".", "__"): TUNED[name]}) == OK
+            assert c.get("energy.residual")[0] == pytest.approx(0.0, abs=1e-6)  # a spring does no work as it changes
+            plant.tune({v.name: v.start for v in mechanism.variables} | {name: TUNED[name]})
+        assert c.step(n * 5e-3, 5e-3) == OK
+        plant.step(n * 5e-3, 5e-3)
+    assert c.get(*mechanism.output_names) == pytest.approx(list(plant.outputs()), rel=1e-8, abs=1e-9)
+    assert c.get("energy.residual")[0] == pytest.approx(0.0, abs=1e-6)
+    # what is not valid is refused, and nothing changes
+    assert c.set(**{name.replace(".", "__"): -1.0}) == ERROR
+    assert f"parameter {name} is -1: it must be a finite number, zero or greater" in c.log[-1][1]
+    assert c.get(name) == [TUNED[name]]
+    assert c.step(0.1, 5e-3) == OK
+
+
 # Inputs that move over a step, outputs that do
 
 

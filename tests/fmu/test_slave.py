@@ -138,3 +138,20 @@ def test_master_tolerance_outside_the_range_is_brought_into_it(kind: type[Linkwo
         slave.enter_initialization_mode()
         slave.exit_initialization_mode()
         assert slave._get_fmu_state()["plant"]["tolerance"] == taken
+
+
+def test_a_tunable_parameter_acts_from_the_next_step_on(slave: LinkworkSlave) -> None:
+    at = [v.name for v in slave.variables].index("slider.stiffness")
+    assert slave.do_step(0.0, 1e-2)
+    before = value(slave, "slider.acceleration")
+    slave.set_real([at], [1e5])
+    assert value(slave, "slider.stiffness") == 1e5
+    assert value(slave, "energy.residual") == pytest.approx(0.0, abs=1e-6)
+    assert (
+        value(slave, "slider.acceleration") != before or slave.mechanism.fmu == "SliderCrank"
+    )  # where both are commanded
+    with pytest.raises(ParameterError, match=r"slider\.stiffness is -1"):
+        slave.set_real([at], [-1.0])
+    assert value(slave, "slider.stiffness") == 1e5
+    assert slave.do_step(1e-2, 1e-2)
+    assert value(slave, "energy.residual") == pytest.approx(0.0, abs=1e-5)

@@ -96,6 +96,13 @@ class Make:
             f", {self.load[0]:g} and {self.load[1]:g} N at P" if any(self.load) else ""
         )
 
+    def masses_in_words(self) -> str:
+        """Say where the masses of a file come from, for its head."""
+        given = [f"{link}.mass" for link in (*WEIGHED, "slider") if getattr(self, f"{link}_mass") is not None]
+        weighed = f"; as given: {', '.join(given)}" if given else ""
+        bars = self.describe(forces=False).partition(",")[0]
+        return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
+
     def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
         """Replace the masses of `bodies` by those that are given; moments of inertia in proportion."""
         own: dict[str, Any] = {}

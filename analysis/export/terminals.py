@@ -1,0 +1,102 @@
+"""Terminals and icons of FMUs of FMI 3.0: what is connected together, by one line in a tool."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable, Mapping
+from xml.etree.ElementTree import Element, SubElement
+
+from linkwork.mechanism import Mechanism
+
+from .description import written
+
+#: Size of an icon (pixels), and of the drawing that terminals are placed in.
+_PIXELS, _SIZE = 32, 100
+#: Icons of terminals: whether a pixel is black, by its distance from the middle; a shaft, a slider, a loaded point.
+_ICONS: Mapping[str, Callable[[float, float], bool]] = {
+    "rotational": lambda x, y: x * x + y * y < 1.0,
+    "translational": lambda x, y: max(abs(x), abs(y)) < 0.9,
+    "planar": lambda x, y: min(abs(x), abs(y)) < 0.2,
+}
+
+
+def terminal_files(mechanism: Mechanism) -> dict[str, bytes]:
+    """Return ``terminalsAndIcons.xml`` and the icons that it names, by their places in the archive."""
+    files = {"terminalsAndIcons.xml": terminals(mechanism)}
+    files |= {f"{kind}.png": _icon(inside) for kind, inside in _ICONS.items()}
+    return {f"terminalsAndIcons/{name}": content for name, content in files.items()}
+
+
+def terminals(mechanism: Mechanism) -> bytes:
+    """Return ``terminalsAndIcons.xml`` with the terminals of shafts, sliders and loaded points.
+
+    A terminal for each freedom, with coordinate, rate and acceleration, its inputs, and the torque or force applied; one for
+    the inputs of each point that a load acts on, with its displacement. Forces and torques flow in, all else are signals.
+    """
+    root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
+    picture = SubElement(root, "GraphicalRepresentation")
+    extent = dict(zip(("x1", "y1", "x2", "y2"), map(str, (-_SIZE, -_SIZE, _SIZE, _SIZE))))
+    SubElement(picture, "CoordinateSystem", extent | {"suggestedScalingFactorTo_mm": "0.1"})
+    SubElement(picture, "Icon", extent)
+    listed = SubElement(root, "Terminals")
+    forces = {channel.name for channel in mechanism.channels if channel.kind == "force"}
+    units = {v.name: v.unit for v in mechanism.variables}
+    found = _terminals(mechanism)
+    for number, (name, (text, members)) in enumerate(found.items()):
+        lengths = [v for v in members.values() if units[v] == "m"]
+        kind = "planar" if len(lengths) > 1 else "translational" if lengths else "rotational"
+        terminal = {"name": name, "matchingRule": "bus", "terminalKind": f"linkwork.{kind}", "description": text}
+        node = SubElement(listed, "Terminal", terminal)
+        for member, variable in members.items():
+            flow = "inflow" if variable in forces else "signal"
+            places = {"variableName": variable, "memberName": member, "variableKind": flow}
+            SubElement(node, "TerminalMemberVariable", places)
+        # one below the other at the left edge
+        top = _SIZE - round(2 * _SIZE * (number + 0.5) / len(found))
+        place = dict(zip(("x1", "y1", "x2", "y2"), map(str, (-_SIZE - 10, top - 10, -_SIZE + 10, top + 10))))
+        colour = {"defaultConnectionColor": "0 0 0", "defaultConnectionStrokeSize": "1", "iconBaseName": kind}
+        SubElement(node, "TerminalGraphicalRepresentation", colour | place)
+    return written(root)
+
+
+def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
+    """Return the terminals by name: description, and variables by the name of the member."""
+    rate = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
+    found: dict[str, tuple[str, dict[str, str]]] = {}
+
+    def leaf(name: str) -> str:
+        return name.rpartition(".")[2]
+
+    def table(name: str) -> str:
+        return name.rpartition(".")[0]
+
+    def motion(of: str) -> dict[str, str]:
+        return {leaf(of): of} | (motion(rate[of]) if of in rate else {})
+
+    for number, freedom in enumerate(mechanism.freedoms):
+        members = motion(freedom.coordinate)
+        channels = [channel for channel in mechanism.channels if channel.freedom == number]
+        for channel in channels:
+            members[leaf(channel.name) if channel.kind == "force" else f"commanded_{leaf(channel.name)}"] = channel.name
+        applied = tuple({f"{table(channel.name)}.applied_" for channel in channels})
+        members |= {leaf(name): name for name in mechanism.output_names if name.startswith(applied)}
+        found[table(freedom.coordinate)] = (f"Motion of {freedom.coordinate} and what drives it", members)
+    for channel in mechanism.channels:
+        if channel.freedom < 0:
+            _, members = found.setdefault(table(channel.name), ("Load, and motion of the point that it acts on", {}))
+            members[leaf(channel.name)] = channel.name
+            members |= motion(channel.displacement) if channel.displacement else {}
+    return found
+
+
+def _icon(inside: Callable[[float, float], bool]) -> bytes:
+    """Return a PNG of grey and transparency, black inside (ISO/IEC 15948)."""
+    places = [(2 * n + 1) / _PIXELS - 1.0 for n in range(_PIXELS)]
+    rows = b"".join(b"\0" + b"".join(b"\0\xff" if inside(x, y) else b"\0\0" for x in places) for y in places)
+
+    def chunk(name: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+
+    header = struct.pack(">IIBBBBB", _PIXELS, _PIXELS, 8, 4, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b"")
