@@ -142,6 +142,22 @@ def test_map_of_four_poses_is_what_each_linkage_is_judged() -> None:
                 assert found.transmission[i, k] == pytest.approx(least, abs=2e-5)
 
 
+@pytest.mark.parametrize("seed", [474, 666])
+def test_a_search_does_not_miss_an_exact_linkage(seed: int) -> None:
+    """A wide turn of the crank between two poses is no whole turn: the search judges its answers as closed form does."""
+    random = np.random.default_rng(seed)
+    task = syn.PrecisionPoints(points=random.uniform(-1.0, 1.0, (5, 2)), angle=random.uniform(-1.0, 1.0, 5))
+    exact = syn.guidance(task)
+    assert any(s.verdicts.sound for s in exact.solutions)
+    for s in exact.solutions:
+        if s.verdicts.branch:
+            assert syn.Solution.of(task, s.linkage, s.evaluation.rotation).verdicts == s.verdicts
+    open_way = [syn.LeastTransmission(angle=0.0, over="task")]
+    found = syn.synthesize(task, constraints=open_way, search=syn.Search(starts=2, candidates=1 << 10)).best
+    assert found.verdicts.sound
+    assert found.error < 1e-20
+
+
 def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
     """Pose by pose left out, the dyads of five poses lie on the curve of the other four."""
     task = random_poses(0, 5)
@@ -356,7 +372,7 @@ def test_command_of_five_poses(linkwork: Callable[..., Result], tmp_path: Path) 
     assert result.exit_code == 0
     assert "6 four-bars, driven from either side: 7 of 12 sound" in result.output
     assert {p.name for p in (tmp_path / "out").iterdir()} - {".linkwork"} == {
-        "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg"
+        "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "linkage.toml"
     }  # fmt: skip
     rows = (tmp_path / "out" / "solutions.csv").read_text().splitlines()
     assert len(rows) == 13

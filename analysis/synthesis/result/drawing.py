@@ -77,7 +77,7 @@ class LinkageScene:
     def way(self) -> FloatArray:
         """Return crank rotations over which the task is done, densely spaced, shape (n,)."""
         at = self.solution.rotation
-        if self._closed or whole_turn(at):
+        if self._closed or whole_turn(self.solution.task, at):
             return self.turn
         return np.linspace(at.min(), at.min() + np.ptp(at), 2 * CURVE + 1)
 

@@ -293,7 +293,7 @@ class Solution(Shown):
         evaluation = evaluate(task, linkage, rotation)
         closed = isinstance(task, UntimedPath) and task.path.closed
         at = np.array([0.0, 2.0 * pi]) if evaluation.rotation is None else evaluation.rotation
-        closed = closed or whole_turn(at)
+        closed = closed or whole_turn(task, at)
         return cls(task=task, linkage=linkage, evaluation=evaluation, verdicts=judge(linkage, at, closed=closed))
 
     @property
@@ -436,8 +436,13 @@ class Solution(Shown):
         return write_csv(path, self.columns())
 
 
-def whole_turn(rotation: FloatArray) -> bool:
-    """Return whether stations cover a whole turn: as far apart across its end as elsewhere."""
+def whole_turn(task: Task, rotation: FloatArray) -> bool:
+    """Return whether the stations of a task cover a whole turn: as far apart across its end as elsewhere.
+
+    Untimed precision points never do: a wide step between two of them says nothing about the way from the last to the first.
+    """
+    if isinstance(task, PrecisionPoints) and task.rotation is None:
+        return False
     gap = 2.0 * pi - float(np.ptp(rotation))
     return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
 

@@ -25,6 +25,7 @@ from linkwork.errors import InputError
 from ..linkage.kernels import coupler_path_jacobian, link_jacobian
 from ..linkage.linkage import SliderCrank, wrapped
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
+from ..task.constraint import InfeasibleError
 from ..task.limits import Limits
 from ..task.task import Normal
 from .program import KEPT, Program
@@ -112,6 +113,18 @@ class Polished:
             interrupted=self.interrupted or other.interrupted,
             begun=self.begun + other.begun,
         )
+
+
+def infeasible(done: Polished) -> InfeasibleError:
+    """Return the error for a search that found nothing that keeps the constraints."""
+    if not done.others:
+        return InfeasibleError("no linkage keeps all bounds and constraints")
+    nearest: Answer = min(done.others, key=lambda a: a.violation)
+    return InfeasibleError(
+        f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
+        f"the {nearest.worst or 'quality'}{f' by {nearest.excess}' if nearest.excess else ''} "
+        f"({nearest.status.replace('_', ' ').lower()})"
+    )
 
 
 @ONE_THREAD

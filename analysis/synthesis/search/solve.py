@@ -35,9 +35,19 @@ from ..task.constraint import (
 )
 from ..task.limits import GEARS, Limits, as_asked, limits_by_kind, make_limits, usual_kinds
 from ..task.task import Normal, Task, UntimedPath, normal_form, reweighted
-from .polish import Polished, distinct, polish
+from .polish import Polished, distinct, infeasible, polish
 from .scan import scan
-from .start import QUICK_SEARCH, USUAL_SEARCH, Answer, Search, Start, make_linkage, make_start, random_pivot
+from .start import (
+    QUICK_SEARCH,
+    USUAL_SEARCH,
+    Answer,
+    Search,
+    Start,
+    closed_form,
+    make_linkage,
+    make_start,
+    random_pivot,
+)
 
 #: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
 STATIONS = 144
@@ -180,10 +190,11 @@ def synthesize(
                 f"guess {number} is a {guess.verdicts.grashof}: it must be of the kinds that are asked for"
             )
     found: list[tuple[Solution, ...]] = []
+    exact = closed_form(task) if pivot is None else ()
     done, refused, total = Polished.of((), (), False), None, 0
     for limits in every:
         own = pivot or limits.second_crank(normal.unit)
-        given = [guess for guess in guesses if limits.admits(guess.linkage)]
+        given = [guess for guess in (*guesses, *exact) if limits.admits(guess.linkage)]
         # the ratios of gears share the starts and the candidates of a kind
         share = 1 if limits.second is None else len(gears)
         how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
@@ -395,18 +406,6 @@ def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) 
         turned = np.append(rotation, rotation[0] + np.copysign(2.0 * np.pi, rotation[-1] - rotation[0]))
     rotations: NDArray[np.float64] = np.interp(own.shares, at, turned)
     return rotations
-
-
-def infeasible(done: Polished) -> InfeasibleError:
-    """Return the error for a search that found nothing that keeps the constraints."""
-    if not done.others:
-        return InfeasibleError("no linkage keeps all bounds and constraints")
-    nearest: Answer = min(done.others, key=lambda a: a.violation)
-    return InfeasibleError(
-        f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
-        f"the {nearest.worst or 'quality'}{f' by {nearest.excess}' if nearest.excess else ''} "
-        f"({nearest.status.replace('_', ' ').lower()})"
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -15,11 +15,14 @@ from linkwork.errors import InputError
 from ...numerics.fourier import FourierSeries
 from ...numerics.workers import check_jobs, interruptible, over_workers, worker_count
 from ...run import shown
+from ..exact.burmester import guidance
+from ..exact.four_bar import function_generators
 from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
+from ..result.solution import Solution
 from ..task.constraint import UNKNOWNS
 from ..task.limits import Limits
-from ..task.task import Normal
+from ..task.task import Motion, Normal, PrecisionPoints, RockerFunction, Task
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -263,6 +266,19 @@ def make_start(
             v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
     kind = SliderCrank if isinstance(linkage, SliderCrank) else Linkage
     return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
+
+
+def closed_form(task: Task) -> tuple[Solution, ...]:
+    """Return the sound four-bars that do a task exactly, where it has a closed form: untimed poses, points of a function."""
+    try:
+        if isinstance(task, RockerFunction):
+            return function_generators(task).sound
+        if isinstance(task, PrecisionPoints | Motion) and task.angle is not None and task.rotation is None:
+            return tuple(s for s in guidance(task).solutions if s.verdicts.sound)
+    except InputError:
+        # more or fewer targets than unknowns, or dependent ones
+        pass
+    return ()
 
 
 def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
