@@ -249,7 +249,7 @@ def design_lqr(
     Parameters
     ----------
     model : LinearModel
-        Of an equilibrium, or the mean one of a periodic motion.
+        Model of an equilibrium, or mean model of a periodic motion.
     q : mapping or array_like
         Weights by name of the state, zero if left out; or the diagonal of Q, or Q. A weight of 1e6 r of a position lets a
         deviation of 1 mm cost as much as a force of 1 N.

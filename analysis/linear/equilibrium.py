@@ -86,7 +86,7 @@ class Equilibrium:
     residual : float
         Largest imbalance, relative to the forces that balance.
     iterations : int
-        Of Newton's method.
+        Iterations of Newton's method.
 
     Notes
     -----

@@ -217,7 +217,7 @@ class LoopResult:
         Parameters
         ----------
         band : float
-            Of settling, either way (m).
+            Half width of the band of settling (m).
         start : float
             When the reference steps, or control begins (s).
         window : float, optional
@@ -412,7 +412,7 @@ def control_loop(
     fmu : path, optional
         The mechanism's FMU to be run instead of the plant in process.
     tolerance : float
-        Of the plant's integrator.
+        Tolerance of the plant's integrator.
 
     Returns
     -------

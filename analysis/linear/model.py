@@ -7,7 +7,7 @@ In the deviations q of the freedoms that are free, and w of the inputs,
 with the exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`): of the
 accelerations a(q, q', w) they give K = -M da/dq, C = -M da/dq' and F = M da/dw, where M is the Hessian of the energy with
 respect to the rates. Away from an equilibrium the accelerations are not zero, and K holds the derivative of M times them.
-A freedom whose rate is commanded is none of q but acts through three inputs: acceleration, speed and coordinate.
+A freedom whose rate is commanded is not part of q; it acts through three inputs: acceleration, speed and coordinate.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class Layout:
     Attributes
     ----------
     free, commanded : tuple of int
-        Numbers of the freedoms that forces move, and of those whose rates are commanded. Others, such as one that a groove
-        ties to another, are neither.
+        Numbers of the freedoms that forces move, and of the freedoms with commanded rates. A freedom that is tied to another,
+        as by a groove, is neither.
     forces : tuple of int
         Numbers of the channels whose forces act.
     input_names : tuple of str
@@ -176,7 +176,7 @@ class Matrices:
     """Arrays of a linear model, or of many models stacked along the first axis.
 
     n is the number of freedoms that are free: of a five-bar 2 in torque drive, with q = (crank angle, slider position), and
-    1 in speed drive, with q = (slider position); m is the number of inputs, l that of outputs, f of all freedoms. All are
+    1 in speed drive, with q = (slider position); m is the number of inputs, l of outputs, f of all freedoms. All are
     deviations from the operating point, in SI.
 
     Attributes

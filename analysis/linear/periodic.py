@@ -147,7 +147,7 @@ class PeriodicModel(Matrices):
         Raises
         ------
         InputError
-            If they are not, with the freedom.
+            If they are not; the message names the freedom.
         """
         mechanism, n, secular = self.mechanism, len(self), self._secular()
         scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))

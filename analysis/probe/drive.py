@@ -11,8 +11,8 @@ from typing import Any
 from fmpy import fmi2
 
 from .model import CONDITIONS, Variable
-from .session import Session
-from .walk import references, value
+from .session import ProbeError, Session
+from .walk import access, value
 
 #: What all variables are at one time: by group of functions their values, bit by bit.
 Values = dict[str, bytes]
@@ -34,36 +34,38 @@ class Run:
         Values to set before the initialization.
     stop : float, optional
         The time at which the run ends, if the FMU is told.
+    finish : bool
+        False to stay in initialization mode.
     """
 
     def __init__(
-        self, session: Session, *, instantiate: bool = True, start: Inputs | None = None, stop: float | None = None
+        self,
+        session: Session,
+        *,
+        instantiate: bool = True,
+        start: Inputs | None = None,
+        stop: float | None = None,
+        finish: bool = True,
     ) -> None:
         self.session, self.model = session, session.model
         self.time = self.model.start_time
         self.next_event = math.inf
-        if instantiate:
-            session.instantiate()
-            if not session.instance:
-                session.need("Instantiate")
+        if instantiate and not session.instantiate():
+            raise ProbeError(": ".join(["no instance is made", *session.messages[-1:]]))
         if start:
             self.set(start)
-        self.initialize(stop)
-        self.finish_initialization()
+        self._initialize(stop)
+        if finish:
+            session.need("ExitInitializationMode")
+            if self.model.interface == "me":
+                self._iterate()
 
-    def initialize(self, stop: float | None = None) -> None:
-        """Enter the initialization mode."""
+    def _initialize(self, stop: float | None) -> None:
         setup = [False, 0.0, self.time, stop is not None, stop or 0.0]
         if self.model.version == 2:
             self.session.need("SetupExperiment", *setup)
             setup = []
         self.session.need("EnterInitializationMode", *setup)
-
-    def finish_initialization(self) -> None:
-        """Leave the initialization mode and go to the mode in which steps are made."""
-        self.session.need("ExitInitializationMode")
-        if self.model.interface == "me":
-            self._iterate()
 
     def _iterate(self) -> None:
         for _ in range(_EVENT_ITERATIONS):
@@ -90,18 +92,13 @@ class Run:
         for group in dict.fromkeys(variable.group for variable in values):
             chosen = [variable for variable in values if variable.group == group and variable.size == 1]
             if chosen:
-                array = (self.model.c_types[group] * len(chosen))(*(values[variable] for variable in chosen))
-                extra = [len(chosen)] if self.model.version == 3 else []
-                self.session.need("Set" + group, references(chosen), len(chosen), array, *extra)
+                self.session.need("Set" + group, *access(self.model, chosen, [values[v] for v in chosen]))
 
     def get(self, variables: Sequence[Variable]) -> Any:
         """Return the values of variables of one group as a C array."""
-        group = variables[0].group
-        size = sum(variable.size for variable in variables)
-        array = (self.model.c_types[group] * size)()
-        extra = [size] if self.model.version == 3 else []
-        self.session.need("Get" + group, references(variables), len(variables), array, *extra)
-        return array
+        arguments = access(self.model, variables)
+        self.session.need("Get" + variables[0].group, *arguments)
+        return arguments[2]
 
     def values(self) -> Values:
         """Return the values of all variables, bit by bit."""
@@ -160,20 +157,20 @@ class Run:
     def _derivatives(self) -> str:
         return "Derivatives" if self.model.version == 2 else "ContinuousStateDerivatives"
 
-    def save(self, into: Any = None) -> Any:
+    def save(self) -> Any:
         """Save and return the state."""
-        state = ctypes.c_void_p() if into is None else into
-        self.session.need("GetFMUstate" if self.model.version == 2 else "GetFMUState", state)
+        state = ctypes.c_void_p()
+        self.session.need("GetFMUState", state)
         return state
 
     def restore(self, state: Any, time: float, next_event: float = math.inf) -> None:
         """Restore a saved state, which belongs to this time."""
-        self.session.need("SetFMUstate" if self.model.version == 2 else "SetFMUState", state)
+        self.session.need("SetFMUState", state)
         self.time, self.next_event = time, next_event
 
     def forget(self, state: Any) -> None:
         """Free a saved state."""
-        self.session.need("FreeFMUstate" if self.model.version == 2 else "FreeFMUState", state)
+        self.session.need("FreeFMUState", state)
 
 
 def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[Variable, Any]]:

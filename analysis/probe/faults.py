@@ -17,7 +17,7 @@ from typing import Any
 from fmpy import fmi2, fmi3
 
 from .findings import QUESTIONABLE, WRONG
-from .model import CONDITIONS, Model
+from .model import CONDITIONS, Model, Variable
 from .session import WARNING
 from .walk import Walk, access, byte_array, references
 
@@ -82,12 +82,18 @@ def _not_settable(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | No
     cell = walk.cell(name)
     allowed = CONDITIONS["5" if cell == "i" else cell]  # FMI 3.0 is of two minds about states in continuous-time mode
     forbidden = [v for v in walk.model.variables if v.group == name[3:] and not allowed(v)]
-    return access(walk, "Set", [walk.rng.choice(forbidden)]) if forbidden else None
+    return _setting(walk, forbidden)
+
+
+def _setting(walk: Walk, variables: list[Variable]) -> list[Any] | None:
+    """Return the arguments that set one of these variables."""
+    chosen = [walk.rng.choice(variables)] if variables else []
+    return access(walk.model, chosen, walk.values(chosen)) if chosen else None
 
 
 def _constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
     constants = [v for v in walk.model.variables if v.group == name[3:] and v.variability == "constant"]
-    return access(walk, "Set", [walk.rng.choice(constants)]) if constants else None
+    return _setting(walk, constants)
 
 
 def _longer(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
@@ -266,6 +272,3 @@ def bad_starts(model: Model) -> list[BadStart]:
 def refused(status: int) -> bool:
     """Whether a status refuses a call."""
     return status > WARNING
-
-
-__all__ = ["ACCEPT", "FAULTS", "BadStart", "Fault", "bad_starts", "catalogue", "refused"]

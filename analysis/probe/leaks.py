@@ -34,7 +34,7 @@ class _MallInfo(ctypes.Structure):
 
     _fields_ = [
         (name, ctypes.c_size_t)
-        for name in (
+        for name in [
             "arena",
             "ordblks",
             "smblks",
@@ -45,7 +45,7 @@ class _MallInfo(ctypes.Structure):
             "uordblks",
             "fordblks",
             "keepcost",
-        )
+        ]
     ]
 
 

@@ -10,7 +10,7 @@ from .context import Context
 from .drive import Run, step_size
 from .findings import QUESTIONABLE, WRONG
 from .model import Model
-from .session import Library, ProbeError, Session, uri
+from .session import Library, ProbeError, Session
 
 FOLDERS = (
     "with space",
@@ -106,6 +106,3 @@ def _try(context: Context, session: Session, severity: str | None, key: str, arg
         failed = "no instance is made" + (f": {session.messages[-1]}" if session.messages else "")
     if failed and severity is not None:
         context.note(severity, key, f"{key}: {failed}")
-
-
-__all__ = ["count", "places", "uri"]

@@ -125,8 +125,7 @@ def deserialize_there(context: Context, case: int) -> None:
     data = byte_array(run.session, bytes.fromhex(kept["data"]))
     state = run.save()
     run.forget(state)
-    name = "DeSerializeFMUstate" if context.model.version == 2 else "DeserializeFMUState"
-    run.session.need(name, data, len(data), state)
+    run.session.need("DeserializeFMUState", data, len(data), state)
     run.restore(state, kept["time"], math.inf if kept["event"] is None else kept["event"])
     expected = [{group: bytes.fromhex(value) for group, value in values.items()} for values in kept["values"]]
     what = "a run continued from a state of another process is not the run that was serialized"
@@ -171,6 +170,3 @@ def split(context: Context, case: int) -> None:
             "step and halves: difference",
             f"one step of {model.step:g} s and two halves differ by {worst:.1e} of {name}'s largest value",
         )
-
-
-__all__ = ["deserialize_there", "repeated", "restored", "serialize_here", "split"]

@@ -9,7 +9,7 @@ from functools import cached_property
 from .context import Context
 from .faults import ACCEPT, BadStart, Fault, bad_starts, catalogue, refused
 from .findings import QUESTIONABLE, WRONG
-from .session import ERROR, FATAL, OK, STATUS, Session
+from .session import ERROR, FATAL, OK, Session
 from .walk import Walk, access
 
 #: Calls of a legal life.
@@ -126,7 +126,7 @@ class Forbidden:
         outputs = [v for v in walk.model.variables if v.causality == "output" and v.group == fault.function[3:]]
         if not outputs or walk.state != "step" or not walk.call("DoStep"):
             return
-        arguments = access(walk, "Get", outputs)
+        arguments = access(walk.model, outputs)
         if walk.session.call(f"Get{outputs[0].group}", *arguments) == OK and not all(map(math.isfinite, arguments[2])):
             text = f"an input of {fault.what} is accepted, DoStep returns OK, and outputs are no numbers"
             self.context.note(QUESTIONABLE, f"{fault.key}: goes through", text)
@@ -144,14 +144,10 @@ def _aftermath(walk: Walk) -> None:
 
 def _end(walk: Walk) -> None:
     if not walk.session.journal.fatal:
-        name = {2: "FreeFMUstate", 3: "FreeFMUState"}[walk.model.version]
         for state, *_ in walk.saved:
-            walk.session.call(name, state)
+            walk.session.call("FreeFMUState", state)
         walk.session.free()
 
 
 def _said(session: Session) -> str:
     return f": {session.messages[-1]}" if session.messages else ""
-
-
-__all__ = ["STATUS", "Forbidden", "legal"]

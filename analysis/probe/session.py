@@ -145,6 +145,8 @@ class Session:
             self.instance = None
 
     def _make(self, name: str, arguments: list[Any], shown: int = 0) -> Any:
+        if self.model.version == 2:  # which spells some names otherwise
+            name = name.replace("FMUState", "FMUstate").replace("Deserialize", "DeSerialize")
         text = ", ".join(show(argument) for argument in arguments[shown:])
         self.journal.call(f"{self.prefix}{name}({text})")
         return self.library.function(name)(*arguments)

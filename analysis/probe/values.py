@@ -49,16 +49,10 @@ def _floor(unknown: Variable) -> float:
 
 def _at_a_point(context: Context, case: int) -> Run:
     """Return a run in a mode that allows derivatives: continuous-time mode, or initialization mode for co-simulation."""
-    if context.model.interface == "me":
-        run = Run(context.session())
-        for inputs in random_inputs(context.random(case), context.model, 5 * case):
-            run.step(step_size(context.model), inputs)
-        return run
-    run = Run.__new__(Run)
-    run.session, run.model, run.time = context.session(), context.model, context.model.start_time
-    if not run.session.instantiate():
-        raise ProbeError("no instance was made")
-    run.initialize()
+    exchange = context.model.interface == "me"
+    run = Run(context.session(), finish=exchange)
+    for inputs in random_inputs(context.random(case), context.model, 5 * case) if exchange else ():
+        run.step(step_size(context.model), inputs)
     return run
 
 
@@ -218,6 +212,3 @@ def out_of_bounds(context: Context, case: int) -> None:
     text = f"parameter {variable.name} = {chosen:g} is accepted, its declared range is {limits}"
     context.note(QUESTIONABLE, f"{variable.name}: accepted beyond its range", text)
     session.free()
-
-
-__all__ = ["bounded_parameters", "bounds", "derivatives", "out_of_bounds", "past_the_end", "starts"]

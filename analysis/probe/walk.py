@@ -12,8 +12,8 @@ from fmpy import fmi2
 
 from .findings import QUESTIONABLE, WRONG, Note
 from .machines import MACHINES
-from .model import TYPES, Variable
-from .session import DISCARD, ERROR, OK, STATUS, WARNING, Session
+from .model import TYPES, Model, Variable
+from .session import DISCARD, ERROR, STATUS, WARNING, Session
 
 #: How often a function is chosen, where it is not 1.
 _WEIGHTS = {
@@ -205,7 +205,12 @@ class Walk:
             variables = self.model.named(group)
         if not variables:
             return None
-        return access(self, verb, self.rng.sample(variables, min(len(variables), self.rng.randint(1, 4))))
+        chosen = self.rng.sample(variables, min(len(variables), self.rng.randint(1, 4)))
+        return access(self.model, chosen, self.values(chosen) if verb == "Set" else ())
+
+    def values(self, variables: Sequence[Variable]) -> list[Any]:
+        """Return random legal values of variables, as many for each as it has elements."""
+        return [value(self.rng, v) for v in variables for _ in range(v.size)]
 
     def pick(self, pairs: Sequence[tuple[Variable, tuple[Variable, ...]]]) -> tuple[Variable, Variable] | None:
         """Return a random unknown and a known on which it depends."""
@@ -217,14 +222,11 @@ class Walk:
         return (unknown, self.rng.choice(knowns)) if knowns else None
 
 
-def access(walk: Walk, verb: str, variables: Sequence[Variable]) -> list[Any]:
-    """Return the arguments that get or set these variables of one group."""
-    c_type = walk.model.c_types[variables[0].group]
+def access(model: Model, variables: Sequence[Variable], values: Sequence[Any] = ()) -> list[Any]:
+    """Return the arguments that get these variables of one group, or set them to values."""
     size = sum(v.size for v in variables)
-    values = (c_type * size)()
-    if verb == "Set":
-        values[:] = [value(walk.rng, v) for v in variables for _ in range(v.size)]
-    return [references(variables), len(variables), values, *([size] if walk.model.version == 3 else [])]
+    array = (model.c_types[variables[0].group] * size)(*values)
+    return [references(variables), len(variables), array, *([size] if model.version == 3 else [])]
 
 
 def _setup(walk: Walk) -> list[Any]:
@@ -249,11 +251,10 @@ def _get_state(walk: Walk) -> list[Any] | None:
 
 def serialized(session: Session, state: Any) -> bytes:
     """Return the bytes of a saved state."""
-    serialize = {2: "SerializeFMUstate", 3: "SerializeFMUState"}[session.model.version]
     size = ctypes.c_size_t()
-    session.need(serialize.replace("Serialize", "Serialized") + "Size", state, size)
+    session.need("SerializedFMUStateSize", state, size)
     buffer = byte_array(session, bytes(size.value))
-    session.need(serialize, state, buffer, size.value)
+    session.need("SerializeFMUState", state, buffer, size.value)
     return bytes(buffer)
 
 
@@ -268,16 +269,14 @@ def _serialize(walk: Walk) -> list[Any] | None:
         return None
     state = walk.rng.choice(walk.saved)[0]
     size = ctypes.c_size_t()
-    names = {2: "SerializedFMUstateSize", 3: "SerializedFMUStateSize"}
-    if walk.session.call(names[walk.model.version], state, size) > WARNING:
+    if walk.session.call("SerializedFMUStateSize", state, size) > WARNING:
         return None
     return [state, byte_array(walk.session, bytes(size.value)), size.value]
 
 
 def _deserialize(walk: Walk) -> list[Any] | None:
     arguments = _serialize(walk)
-    name = {2: "SerializeFMUstate", 3: "SerializeFMUState"}[walk.model.version]
-    if arguments is None or walk.session.call(name, *arguments) > WARNING:
+    if arguments is None or walk.session.call("SerializeFMUState", *arguments) > WARNING:
         return None
     return [arguments[1], arguments[2], arguments[0]]
 
@@ -464,5 +463,3 @@ _AFTER: dict[str, Callable[[Walk, Sequence[Any]], None]] = {
     "reset": _begun,
     "setdebuglogging": _logged,
 }
-
-__all__ = ["OK", "Walk", "access", "byte_array", "derivative_arguments", "references", "serialized", "value"]

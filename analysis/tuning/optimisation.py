@@ -450,7 +450,7 @@ def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey,
 
 
 def _counts(condition: Condition, answer: Answer) -> bool:
-    """Return whether a condition is violated by more than its requirement already is."""
+    """Return whether a condition's violation exceeds the known violation of its requirement."""
     return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
 
 

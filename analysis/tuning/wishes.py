@@ -401,7 +401,7 @@ def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
 
 
 def _checked(mechanism: Mechanism, limit: Limit) -> Limit:
-    """Return a limit in SI, with its unit and the outputs that it is about."""
+    """Return a limit in SI, with its unit and its outputs."""
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
     known = {output: (output,) for output in units} | (mechanism.joints if name == limit.output else {})

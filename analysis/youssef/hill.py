@@ -370,7 +370,7 @@ class Region:
 
 
 def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = None) -> Mapping[int, Region]:
-    """Return those of the first ``count`` regions of instability that damping has not removed, by their number.
+    """Return the regions of instability, among the first ``count``, that damping has not removed, by number.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ def test_it_reports_and_writes_what_it_found(run) -> None:
     assert written == {
         "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "five-bar-parameters.toml",
         "five-bar.toml", "best-linkage.png", "alternatives.png", "trade-off.csv", "trade-off.png", "cognates.csv",
-        "best-plates.dxf", "best-plates.svg", "best-sheet.pdf",
+        "best-plates.dxf", "best-plates.svg", "best-sheet.pdf", "linkage.toml",
     }  # fmt: skip
     assert all(f"wrote {folder / 'out' / name}" in result.output for name in written)
     rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")

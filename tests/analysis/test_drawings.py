@@ -154,6 +154,9 @@ def test_a_dimension_is_written_beside_its_way(turned: float) -> None:
     assert np.exp(1j * np.radians(-turned)) * complex(number.dxf.insert.x, number.dxf.insert.y) == pytest.approx(
         200.0 + 100.0j, abs=12.0
     )
+    # arrows at both ends, as large as the letters
+    arrows = [e for e in drawn.virtual_entities() if e.dxftype() == "INSERT"]
+    assert [e.dxf.xscale for e in arrows] == pytest.approx([number.dxf.char_height] * 2)
 
 
 def test_extents() -> None:

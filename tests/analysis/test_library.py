@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linkages import described, load_linkage, reach
 from analysis.periodic import Drive, orbit_of
-from analysis.run import Trajectory, compare, cosimulate, load_case, simulate
+from analysis.run import Trajectory, case_from, compare, cosimulate, load_case, simulate
+from analysis.synthesis.result.described import description
 from tests.oracles.planar import Multipliers
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
@@ -182,3 +184,43 @@ def test_ranges_of_motion():
     # O C = 2 x 90 cos(angle/2) mm is at least 200 - 80 mm, where upper and inner link are in line
     assert not found.turns
     assert found.high == pytest.approx(2.0 * np.arccos(120.0 / 180.0), abs=1e-4)
+
+
+FOUR_BAR = {
+    "pivot_x": 0.1,
+    "pivot_y": 0.05,
+    "ground_angle": 0.3,
+    "crank_phase": 0.4,
+    "point_distance": 0.09,
+    "point_angle": 0.5,
+}
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        syn.Linkage(**FOUR_BAR, ground_length=0.2, crank_length=0.06, coupler_length=0.18, rocker_length=0.15, branch=-1),
+        syn.SliderCrank(**FOUR_BAR, ground_length=0.03, crank_length=0.05, coupler_length=0.16),
+        syn.SliderCrank(**FOUR_BAR, ground_length=-0.03, crank_length=0.05, coupler_length=0.16, branch=-1),
+        syn.FiveBar(
+            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
+            pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7),
+        ),
+        syn.FiveBar(
+            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15, branch=-1,
+            pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2),
+        ),
+    ],
+    ids=["four-bar", "slider-crank", "slider-crank-other-side", "five-bar", "five-bar-half-speed"],
+)  # fmt: skip
+def test_a_linkage_that_was_found_is_described_and_runs(found):
+    """Its coupler point goes where the synthesis says, over two turns."""
+    make = syn.Make(speed=20.0)
+    case = case_from({"linkage": description(found, make, rotation=0.2), "run": {"revolutions": 2.0}}, folder=FOLDER)
+    done = simulate(
+        case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step, tolerance=1e-12
+    )
+    assert done.status == 0
+    wanted = found.path(0.2 + 20.0 * done.time / found.turns)
+    np.testing.assert_allclose(np.column_stack([done["P.x"], done["P.y"]]), wanted, atol=1e-9)
+    assert done["energy.kinetic"].min() > 0.0

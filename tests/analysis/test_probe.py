@@ -248,3 +248,18 @@ def test_a_library_that_is_missing_is_a_finding(fmu, tmp_path):
         target.writestr("modelDescription.xml", source.read("modelDescription.xml"))
     report = probe.probe(bare, interface="me")
     assert [finding.text[:17] for finding in report.findings] == ["cannot be loaded:"]
+
+
+def test_an_fmu_that_makes_no_instance_is_said(natives: dict[str, Path], tmp_path: Path) -> None:
+    """Its binary is of another FMU, which refuses the GUID: the checks that need a run say so."""
+    with (
+        zipfile.ZipFile(natives["SliderCrank-native"]) as archive,
+        zipfile.ZipFile(tmp_path / "other.fmu", "w") as copy,
+    ):
+        for name in archive.namelist():
+            text = archive.read(name)
+            copy.writestr(name, text.replace(b'guid="', b'guid="not-') if name == "modelDescription.xml" else text)
+    report = probe(tmp_path / "other.fmu", interface="cs", checks=["starts", "derivatives"])
+    assert [outcome.check for outcome in report.outcomes] == ["starts", "derivatives"]
+    assert all("not made: no instance is made" in outcome.said for outcome in report.outcomes)
+    assert probe(tmp_path / "other.fmu", interface="cs", checks=["legal"], calls=10).findings[0].severity == "wrong"

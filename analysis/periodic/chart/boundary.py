@@ -75,16 +75,16 @@ def follow_crossing(
     at : callable
         Mechanism and drive at a point of the plane.
     orbit : PeriodicOrbit
-        On the curve, or close to it.
+        An orbit on the curve, or close to it.
     kind : Crossing
     place : (float, float)
-        Where the orbit is.
+        The point of the plane at which the orbit is.
     x, y : (float, float)
         The box.
     first, greatest : float
         Steps in scaled arc length: each side of the box has length 1, and the crank's length counts as 1.
     most_points : int
-        To either side.
+        Points at most to either side.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: G
     start : array_like, shape (n,), optional
         Guess of the first: see `find_orbit`.
     near : Grid, optional
-        Of the same plane.
+        A grid over the same plane.
     """
     first = None if start is None else np.array(start, dtype=float)
     last = first
@@ -288,9 +288,9 @@ def removing_damping(
     damping : (float, float)
         Range in which the region vanishes: it exists at the lower end and not at the upper one.
     samples : int
-        Of x, from which the least value is sought.
+        Samples of x, from which the least value is sought.
     tolerance : float
-        Of the damping, relative to its upper end.
+        Tolerance of the damping, relative to its upper end.
 
     Raises
     ------

@@ -110,12 +110,12 @@ class Traced:
     motion : str
         `TRUE_ORBIT`, the motion of the grid; `OTHER_ORBIT`; or the name of a motion given in ``beside``.
     kind : Crossing
-        At -1 a period doubling; at +1 a fold, beyond which the orbit does not exist; under a torque a complex pair may cross
-        the unit circle, at a torus.
+        Period doubling (multiplier -1); fold (+1), beyond which the orbit does not exist; or, under a torque, torus (a complex
+        pair on the unit circle).
     ends : (End, End)
         At the first and at the last point.
     starts : ndarray, shape (n, m), or None
-        y at crank angle 0 of the motions on it, if they were followed.
+        y at crank angle 0 of the motions on the boundary, if they were followed.
     """
 
     points: NDArray[np.float64]
@@ -146,7 +146,7 @@ class StabilityChart(Shown):
     grid : Grid
         Largest Floquet multiplier of the true orbit.
     boundaries : tuple of Traced
-        Of the true orbit, of other motions, and of those given in ``beside``.
+        Boundaries of the true orbit, of other motions, and of the motions given in ``beside``.
     removals : tuple of str
         For each region the damping that removes it, in words; empty unless damping is an axis.
     runs : tuple of Run
@@ -240,18 +240,18 @@ def stability_chart(
     ranges : ((float, float), (float, float)), optional
         Their ranges, in SI or as text such as "420 rpm"; see `default_range`.
     points : int
-        Of the grid, along each axis.
+        Points of the grid along each axis.
     start : array_like, shape (n,), optional
         Guess of the orbits; under a torque it is needed: see `find_orbit`.
     beside : mapping, optional
-        Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: by name, a function from a
-        plane to their monodromy matrix over it.
+        Further motions whose boundaries are traced, such as `analysis.youssef.linear_motion`: by name, a function that takes a
+        plane and returns the motion's monodromy matrix as a function over it.
     coexisting : bool
         Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
     n_jobs, progress
         See `grid`.
     first : callable, optional
-        Receives the chart without boundaries and long runs as soon as its grid is there, such as to show it: these take longer.
+        Called with the chart as soon as its grid is there, for example to show it: boundaries and long runs take longer.
 
     Returns
     -------
@@ -505,7 +505,7 @@ class _Survey:
 
 
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Return a line y = const through each part of a plane, with one number of stable motions, that nothing has met so far.
+    """Return lines y = const through the regions of equal number of stable motions that no line or boundary has met.
 
     Parameters
     ----------
@@ -513,7 +513,7 @@ def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequenc
     lines : sequence of float
         Lines that were searched.
     boundaries : sequence of ndarray, shape (n, 2)
-        A part that one of them passes within a cell is known.
+        Known boundaries: a region that one of them passes within a cell needs no line.
     """
     cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
     found: list[float] = []
@@ -560,7 +560,7 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """Return the FMI name of the damping of the first freedom beside the crank, or else of the first damping there is.
+    """Return the FMI name of the damping of the first freedom beside the crank, or else of any damping.
 
     Raises
     ------

@@ -283,7 +283,7 @@ def basins(
     Raises
     ------
     InputError
-        If there is no stable motion, a range is none, or there are no cores.
+        If there is no stable motion, a range does not increase, or there are no cores.
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
 

@@ -45,7 +45,7 @@ def row_points(points: Sequence[OperatingPoint], start: FloatArray) -> Points:
 
 
 def row_search(points: Sequence[OperatingPoint], turns: int = 1) -> Search:
-    """Return how the orbits of a row are sought."""
+    """Return the settings of the search for the orbits of a row."""
     serves = collocation_serves([point.drive for point in points], [point.parameters for point in points])
     return Search(points[0].flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, serves)
 
@@ -201,7 +201,7 @@ def grid(
     tolerance : float
         Bound of the integrator's local error.
     folder : path, optional
-        Of the cache; `grid_folder` by default.
+        Folder of the cache; `grid_folder` by default.
     n_jobs : int, optional
         Processes, -1 for one per core; inside `joblib.parallel_config` of a cluster, all of its cores.
     progress : bool
@@ -300,18 +300,18 @@ def row_name(
 
 @dataclass(frozen=True, slots=True)
 class Keeping:
-    """How rows are computed over workers and kept on disk.
+    """Computation of rows over workers, and their storage on disk.
 
     Attributes
     ----------
     folder : path or None
-        Of the cache; `grid_folder` if None.
+        Folder of the cache; `grid_folder` if None.
     n_jobs : int or None
     progress : bool
     what : str
         Text before the progress bar.
     kernel : Kernel
-        What the rows are computed with: it is compiled once, before several workers need it.
+        Kernel that computes the rows: it is compiled once, before several workers need it.
     """
 
     folder: str | Path | None
@@ -327,12 +327,12 @@ class Keeping:
         names: Sequence[str],
         shape: tuple[int, ...],
     ) -> tuple[FloatArray, int]:
-        """Return the array that ``work`` makes of each item, from the cache or from a worker, and then keep it.
+        """Return the result of ``work`` for each item: from the cache, or computed by a worker and then cached.
 
         Parameters
         ----------
         names : sequence of str
-            Of the items in the cache: see `row_name`.
+            Names of the items in the cache: see `row_name`.
         shape : tuple of int
             Of each array.
 

@@ -1,4 +1,4 @@
-"""Compiled: the periodic motions of a row of mechanisms, one of each or all of them, and the basins of attraction.
+"""Compiled kernels for rows of mechanisms: one or all periodic motions of each, and basins of attraction.
 
 Along a row the orbits change evenly: the polynomial through the last ones predicts the next at every node, and collocation
 corrects it. If that fails (friction, a torque, the limit of assembly, a fold on the way) shooting finds the orbit, from its
@@ -52,7 +52,7 @@ class Points(NamedTuple):
 
 
 class Search(NamedTuple):
-    """How the orbits of a row are sought."""
+    """Settings of the search for the orbits of a row."""
 
     end: float  # crank angle at the end of the period (rad)
     turns: int  # turns in a period
@@ -257,7 +257,7 @@ def solve_row(section, points, search, guesses, found):
     Parameters
     ----------
     section : Section
-        What the mechanisms share.
+        Flow and settings that the mechanisms share.
     points : Points
     search : Search
     guesses : ndarray, shape (k, n)

@@ -1,4 +1,4 @@
-"""Compiled: Gauss collocation. A period from what is known of a neighbouring one.
+"""Compiled kernels of Gauss collocation: solve a period from a neighbouring motion.
 
 At prescribed speed the coordinates follow from the rates, and the rates from their slopes over the crank angle. The unknowns
 are therefore the slopes w at the Gauss nodes of each element of a period, and y at its beginning. Newton's method corrects all
@@ -34,7 +34,7 @@ BA = B @ A
 TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
 #: `tail` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
 DECAY = 200.0
-#: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
+#: Corrections at most, and the greatest first one, relative to the scale: a motion farther away is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 
 
@@ -299,7 +299,7 @@ def least_gap(section, angles, y, w, bench, gap):
 
 
 class Desk(NamedTuple):
-    """Work space of a period: of an element, what `condense` writes of each, and what `correct_period` writes."""
+    """Work space of a period: for one element, for the results of `condense` on each, and for those of `correct_period`."""
 
     bench: Bench
     ends: NDArray[np.float64]
@@ -326,7 +326,7 @@ def make_desk(n, most):
 
 @part
 def close(section, angles, y, w, desk, room):
-    """Newton's method for the beginnings y and slopes w of a period that closes; return a `Status`.
+    """Solve the beginnings y and slopes w of a closed period by Newton's method; return a `Status`.
 
     NO_STEP means that the elements are too few.
     """
@@ -414,7 +414,7 @@ class Walked(NamedTuple):
     purpose="the collocation of periodic motions",
 )
 def walk(section, angles, firsts, starts, change, known, neighbour, found):
-    """Solve y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
+    """Solve y with its derivatives over each piece of a period, starting from a neighbouring motion.
 
     Parameters
     ----------

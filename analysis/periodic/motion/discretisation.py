@@ -106,7 +106,7 @@ class Period(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatingPoint:
-    """A mechanism and its drive in numbers, computed once for all that is asked of a motion.
+    """A mechanism and its drive in numbers, computed once for all results of a motion.
 
     Attributes
     ----------
@@ -142,12 +142,12 @@ class OperatingPoint:
         along: float = 1.0,
         beside: Sequence[Parameters] = (),
     ) -> Section:
-        """Return what the kernels need.
+        """Return the flow and its numbers in the form that the kernels take.
 
         Parameters
         ----------
         start : ndarray, shape (n,)
-            For the magnitudes of y.
+            State that gives the magnitudes of y.
         *functions : int
             Numbers of the flow's functions that are called, beside GAP.
         direction : Direction, optional
@@ -155,10 +155,10 @@ class OperatingPoint:
         along : float
             Magnitude of lambda.
         beside : sequence of parameters
-            Whose constants will take the place of these: what one of them switches on is computed for all.
+            Parameters whose constants will replace these: an equation that one of them switches on is computed for all.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
-        # lambda may be what switches on
+        # a change of lambda may set the switch
         numbers = (self.constants.tolist(), d_p.tolist(), *(other.constants() for other in beside))
         switched = any(map(self.mechanism.switched, numbers))
         return Section(
@@ -247,7 +247,7 @@ def period_from(
 def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
     """Return whether collocation serves for motions under these drives: at prescribed speed and with smooth rates.
 
-    It takes the slopes of the coordinates for their rates over the speed, which they are not of a crank that turns freely
+    It assumes that the slope of a coordinate is its rate over the speed, which does not hold for a crank that turns freely
     with a ratio.
     """
     mechanisms = list(dict.fromkeys(mechanisms))
@@ -309,7 +309,7 @@ def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tupl
 
 
 class Discretisation:
-    """The pieces of a period along a family of motions: by collocation from the last motion, if that fails by shooting.
+    """Pieces of a period along a family of motions, solved by collocation from the last motion, or else by shooting.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ class Discretisation:
         return None
 
     def _divide(self, mesh: FloatArray, n: int) -> None:
-        """Take other elements, of which nothing is known."""
+        """Divide the pieces into new elements, without a solution to start from."""
         self._value = None
         self._mesh = mesh
         self._firsts = np.searchsorted(mesh, self.angles).astype(np.int64)

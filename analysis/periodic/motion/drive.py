@@ -55,9 +55,9 @@ def _ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
 class Drive:
     """The drive of a mechanism in periodic motion: speeds of its cranks or torques on them; all else is constant.
 
-    Of a mechanism with one crank, ``speed``, ``torque`` and ``motor`` are of this crank. Of one with several, ``speeds`` gives
-    all that are commanded; they keep their ratios where the speed varies. Where none is commanded, ``crank`` names the one
-    that ``torque`` and ``motor`` drive; torques on others are among ``forces`` and ``motors``.
+    With one crank, ``speed``, ``torque`` and ``motor`` refer to it. With several, ``speeds`` gives the speeds of all commanded
+    cranks, which keep their ratios as the speed varies. If no crank is commanded, ``crank`` names the crank that ``torque``
+    and ``motor`` drive; torques on other cranks are among ``forces`` and ``motors``.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Drive:
         return self.speed is not None
 
     def reference(self, mechanism: Mechanism) -> Crank:
-        """Return the crank whose angle is the independent variable: that of ``speed``, ``torque`` and ``motor``.
+        """Return the crank whose angle is the independent variable: the one that ``speed``, ``torque`` and ``motor`` drive.
 
         Raises
         ------
@@ -174,7 +174,7 @@ class Drive:
         Raises
         ------
         InputError
-            If the mechanism cannot be driven so, or nothing of it is free.
+            If the mechanism cannot be driven in this way, or no freedom is free.
         """
         crank, ratios = self.reference(mechanism), self.turning(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
@@ -344,9 +344,9 @@ def drive_of(
     parameters : parameters of a mechanism
     inputs : Inputs, optional
     initial : state at the start, optional
-        Where freedoms that are neither free nor the crank's are held.
+        Positions of the freedoms that are neither free nor the crank's: they are held there.
     speed, torque : optional
-        In the place of what drives the crank in the inputs; other commanded cranks keep their ratios to it.
+        Replace the drive of the crank in the inputs; other commanded cranks keep their ratios to it.
 
     Raises
     ------
@@ -456,8 +456,10 @@ def scale_in(
 
 
 def is_smooth(parameters: Parameters) -> bool:
-    """Whether the rates are smooth over a turn: friction changes fast where a motion turns round, which only an integrator with
-    steps of its own is sure to meet."""
+    """Return whether the rates are smooth over a turn.
+
+    Friction changes fast where a motion reverses, which only an integrator that chooses its own steps is sure to resolve.
+    """
     mechanism = mechanism_of(parameters)
     rough = mechanism.names("friction")
     return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.switched(
@@ -498,11 +500,11 @@ def starts_of(
     Parameters
     ----------
     guess : ndarray, shape (n,)
-        Its crank speed is the one about which others are taken under a torque.
+        Under a torque the crank speeds of the starts lie around its crank speed.
     count : int
         A power of two.
     number : int
-        Of the set; sets of different numbers have different starts.
+        Number of the set; each number gives other starts.
     """
     from scipy.stats import qmc  # takes half a second
 

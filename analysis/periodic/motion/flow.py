@@ -22,7 +22,7 @@ _NAMES = ("plain", "variational", "directional", "gap", "state")
 
 
 class Crank(NamedTuple):
-    """A freedom that turns: its number, and those of the channels of its rate and of the torque on it, or None."""
+    """A freedom that turns: its number, the channel of its commanded rate and that of the torque on it, None if missing."""
 
     freedom: int
     command: int | None
@@ -49,7 +49,7 @@ def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
     Raises
     ------
     InputError
-        If the mechanism has no crank, several and no name is given, or none of that name.
+        If the mechanism has no crank, if it has several and no name is given, or if none has that name.
     """
     cranks = cranks_of(mechanism)
     if not cranks:
@@ -75,8 +75,8 @@ def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
 class Flow:
     """A mechanism as a flow over its crank's angle, driven in one way.
 
-    Other cranks turn with a ratio to it: a commanded one exactly, one under a torque on average. Of the latter, y has the
-    angle less the ratio times the angle of the crank, so that y repeats itself.
+    Other cranks turn with a ratio to it: a commanded one exactly, one under a torque on average. For a crank under a torque, y
+    has its angle less the ratio times the angle of the crank, so that y repeats itself.
 
     Parameters
     ----------
@@ -93,17 +93,17 @@ class Flow:
     others : tuple of int
         Numbers of the other freedoms that turn.
     free : tuple of int
-        Numbers of the other freedoms that are part of y; what is commanded without a ratio is held where it is.
+        Numbers of the other freedoms that are part of y; a freedom commanded without a ratio is held in place.
     torque : bool
         Whether the crank's rate is part of y.
     motors : int
-        Place of the motors' numbers in those of the drive, after the channels: three for each of `Mechanism.torques`.
+        Index of the motors' numbers in the drive's vector, after the channels: three for each of `Mechanism.torques`.
     held : int
-        Place of the coordinates of what is held, or has a ratio, at the crank angle 0; after them the ratios of ``others``.
+        Index of the coordinates at crank angle 0 of freedoms that are held or have a ratio; the ratios of ``others`` follow.
     components : tuple of (str, str)
         FMI names and units of y.
     labels : tuple of str
-        What messages call them: by symbols where there are short ones.
+        Names of the components of y in messages: short symbols where there are any.
     places : tuple of int
         Components of the state of a run that make up y.
     size : int

@@ -1,4 +1,4 @@
-"""Compiled: shooting. A period of a mechanism with its variational equations, and Newton's method on the map over it.
+"""Compiled kernels of shooting: integrate a period with its variational equations, and solve for its start by Newton's method.
 
 The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that the period is known beforehand
 whatever drives it. The state y has the coordinates of the other free freedoms, their rates, and under a torque the crank's
@@ -52,7 +52,7 @@ _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
-    """A flow with numbers; lambda is a parameter by which derivatives are wanted."""
+    """A flow with its numbers, and the direction of a parameter lambda for derivatives."""
 
     equations: NDArray[np.int64]  # addresses of the flow's functions
     modes: NDArray[np.float64]
@@ -188,7 +188,7 @@ def move(start, fraction, correction, trial):
 
 @inner
 def magnitude(correction, scale):
-    """Return the largest component relative to the scale, NaN if one is."""
+    """Return the largest component relative to the scale; NaN if a component is NaN."""
     size = 0.0
     for i in range(scale.shape[0]):
         relative = abs(correction[i]) / scale[i]
@@ -237,7 +237,7 @@ def eliminate(system, size):
 def correct_start(start, end, z, system, correction):
     """Compute Newton's correction of a start for y(end) = y(0); return whether there is one.
 
-    The derivatives dy/dy0 are those in z, and y at the end that in ``end``, which may come from another start.
+    ``z`` gives the derivatives dy/dy0, and ``end`` gives y at the end; they may come from different starts.
     """
     n = start.shape[0]
     for i in range(n):
@@ -252,7 +252,7 @@ def correct_start(start, end, z, system, correction):
 
 @part
 def newton(section, end, most, start, z, room, carry, report):
-    """Newton's method for y(end) = y(0); see `solve`.
+    """Solve y(end) = y(0) by Newton's method; see `solve`.
 
     A correction is taken in part if the next one, found with the same matrix, would not be smaller (Deuflhard's natural
     monotonicity test), or if it leads out of the domain.
@@ -395,8 +395,8 @@ def search(section, end, most, reach, start, known, z):
     """Find a periodic orbit that is none of the known ones, by Newton's method with these divided out.
 
     The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known ones are no zeros any more
-    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). Its Newton correction is the one of the residual
-    itself times a number.
+    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). Its Newton correction is a multiple of the
+    correction of the residual itself.
 
     Parameters
     ----------

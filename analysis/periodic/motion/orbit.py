@@ -84,7 +84,7 @@ class Turn:
         Values of the mechanism's modes.
     names : tuple of str
     swing : str
-        The output whose amplitude is meant if none is named: the first free coordinate, such as ``slider.position``, or the
+        Output that the amplitude is of by default: the first free coordinate, such as ``slider.position``, or the
         crank's speed if nothing else is free.
 
     Notes

@@ -428,7 +428,7 @@ def orbits_of(
     for number in range(ROUNDS):
         for place in places:
             many.seek(place, divide=False)
-        # other starts than those of the first method
+        # starts that the first method does not use
         for place in (guess, *many.places(DEFLATED, ROUNDS + number), *deflated.between()):
             while deflated.seek(place, divide=True):
                 pass

@@ -22,7 +22,7 @@ from ...units import RAD_S_PER_RPM
 from .drive import Direction, Drive, forces_of, require_acting
 from .flow import Flow, crank_of, cranks_of
 
-#: A mechanism and what drives it.
+#: A mechanism and its drive.
 Operation = tuple[Parameters, Drive]
 #: The operation at a point of a chart.
 Plane = Callable[[float, float], Operation]
@@ -135,7 +135,7 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
     Raises
     ------
     UnknownNameError
-        If there is no such thing.
+        If there is no such parameter.
     """
     names = variable_names(mechanism)
     if name not in names:
@@ -169,7 +169,7 @@ def format_value(name: str, value: float, unit: str) -> str:
 
 @lru_cache(maxsize=64)
 def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
-    """Parameters with others of these values; a row of a chart over the speed has one mechanism."""
+    """Return parameters with new values, cached: a row of a chart over the speed has one mechanism."""
     return replace(parameters, **dict(values))
 
 
@@ -313,8 +313,8 @@ FloatArray = NDArray[np.float64]
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
     """Return the FMI names of all parameters by which motions are differentiated: of the drive and of the mechanism.
 
-    A parameter that would switch on what is switched off, friction by contact forces, is left out: it can be named all the
-    same.
+    A parameter that would switch on equations that are off, as friction by contact forces, is left out; it can be named
+    explicitly.
     """
     mechanism, acting = mechanism_of(parameters), []
     for name in variable_names(mechanism):
@@ -330,7 +330,7 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
 
 
 class Along(NamedTuple):
-    """Derivatives of the constants with respect to parameters, and of these with respect to one more; shape (P, m)."""
+    """Derivatives of the constants by parameters, and the derivatives of these by a further parameter; shape (P, m)."""
 
     p: FloatArray
     p_along: FloatArray
@@ -373,7 +373,7 @@ def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> Fl
 
 @cache
 def _constants(mechanism: Mechanism) -> Any:
-    """Return a function of parameters and a direction that gives the constants' derivatives, and theirs along it."""
+    """Return a function of parameters and a direction: the constants' derivatives, and their derivatives along it."""
     casadi = symbolic.library()
     traced = of_parameters(mechanism)
     k = casadi.vertcat(*traced.parameters.constants())

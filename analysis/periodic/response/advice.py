@@ -86,7 +86,7 @@ class Arc:
     Attributes
     ----------
     turns : int
-        Of the crank in a period.
+        Turns of the crank in a period.
     stable : bool
         Whether no deviation grows.
     parameter, amplitude : ndarray, shape (m,)
@@ -283,7 +283,7 @@ class Extremum:
     amplitude : float
         m.
     stability : Stability
-        Of the motion there.
+        Stability of the motion there.
     orbit : PeriodicOrbit
         That motion.
     """
@@ -297,8 +297,8 @@ class Extremum:
 def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
     """Find the local maxima (sign +1) or minima (-1) of the amplitude along a branch.
 
-    The place is that of `extremum_gradient`, where the exact derivative of the amplitude by the parameter is zero. If the
-    parameter is a function's, or the amplitude has a kink, Brent's method on the orbits finds it to 1e-4 of the parameter.
+    At the place that `extremum_orbit` finds, the exact derivative of the amplitude by the parameter is zero. If the family is
+    a function of a number, or the amplitude has a kink, Brent's method on the orbits finds the place to 1e-4 of the parameter.
     """
     amplitude = sign * branch.amplitude
     found = []
@@ -355,10 +355,10 @@ def special_gradient(
     Parameters
     ----------
     family : Family
-        Over a parameter with an FMI name.
+        A family over a parameter with an FMI name.
     point : SpecialPoint or Extremum
     names : sequence of str, optional
-        Of the other parameters; by default all, see `gradient_names`.
+        Names of the other parameters; by default all, see `gradient_names`.
 
     Raises
     ------

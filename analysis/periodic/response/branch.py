@@ -53,8 +53,8 @@ class Branch(Shown):
     orbits : tuple of PeriodicOrbit
     special : tuple of SpecialPoint
     reached, closed : bool
-        Whether it ended as it should: at an end of the range, at its own beginning, or at a branch of half its period; and
-        whether at its own beginning.
+        Whether the branch was followed to an end of the range, to its own beginning, or to a branch of half its period; and
+        whether it came back to its own beginning.
     reason : str
         Why it ended. If the branch was lost, its last point is the last good one.
     """
@@ -94,7 +94,7 @@ class Branch(Shown):
         return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
 
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
-        """Return what varies along the branch, by name with unit, each of shape (m,).
+        """Return the quantities along the branch, by name with unit, each of shape (m,).
 
         The parameter, mean speed, turns in a period; amplitude, mean and first harmonics of the first free coordinate, a
         five-bar's u; largest multiplier, stability; and of the outputs that the mechanism has, mean and greatest crank torque,

@@ -106,15 +106,15 @@ def mean_effective_mass(parameters: Parameters) -> float:
 def natural_frequency(parameters: Parameters) -> float:
     """Compute the natural frequency of the first freedom beside the crank on its spring (rad/s), from its mean effective mass.
 
-    A spring's stiffness is that of the parameter of this name, such as ``slider.stiffness``; where the mechanism has none, it
-    is the mean over a turn of the second derivative of the energy.
+    The stiffness is the mechanism's parameter for it, such as ``slider.stiffness``; without such a parameter it is the mean
+    over a turn of the second derivative of the energy.
 
     Raises
     ------
     ParameterError
         If there is no spring.
     AssemblyError
-        If the mechanism, that freedom held at its zero, cannot make the turn.
+        If the crank cannot make a turn with that freedom held at its zero.
 
     Examples
     --------
@@ -151,8 +151,8 @@ class Response(Shown):
     Attributes
     ----------
     branches : tuple of Branch
-        First the one from the low end, then the one from the high end if it is another, then those of twice the period, of four
-        times and so on, then those connected with none of these.
+        First the branch from the low end, then the branch from the high end if it is another one, then the branches of twice
+        the period, of four times and so on, then the branches connected with none of these.
     low, high : float
         The range asked for.
     problems : tuple of str
@@ -284,7 +284,7 @@ def frequency_response(
     OrbitError
         If there is no periodic motion to begin with at either end.
     InputError
-        If the range is not one.
+        If the range is not finite and increasing.
     ResponseInterrupted
         On Ctrl-C, with the branches followed so far.
 
@@ -374,7 +374,7 @@ class _Search:
                 break
 
     def follow_doublings(self, times: int) -> None:
-        """Follow the branches of twice the period, so many times in a row, each from one of its ends only."""
+        """Follow the branches of twice the period, and from these again, ``times`` deep, each from one of its ends only."""
         ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
@@ -415,7 +415,7 @@ class _Search:
                     return
 
     def seek(self, value: float, turns: int) -> None:
-        """Find the motions of so many turns at a value of the parameter, and follow those that are on no branch."""
+        """Find the motions of ``turns`` turns at a value of the parameter, and follow each that lies on no branch."""
         parameters, drive = self.family.at(value)
         start = None
         if not drive.speed_drive:
@@ -442,7 +442,7 @@ class _Search:
                 self.problems.append(ending(branch))
 
     def _knows(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Return whether a branch passes through a motion, begun with any of its turns."""
+        """Return whether a branch passes through a motion, whichever of its turns comes first."""
         own = [branch for branch in self.branches if branch.turns == orbit.turns]
         starts = orbit.passages()
         return any(passes(branch, value, start, self.high - self.low) for branch in own for start in starts)

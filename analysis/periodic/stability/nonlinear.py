@@ -75,7 +75,7 @@ class NormalForm:
     kind : Crossing
     coefficient : float
         In the scale of y: of a fold half the second derivative along the eigenvector; of a period doubling the cubic
-        coefficient, positive if it is supercritical; of a torus the first Lyapunov coefficient, negative if it is so.
+        coefficient, positive if supercritical; of a torus the first Lyapunov coefficient, negative if supercritical.
     uncertainty : float
         Change of the coefficient when the step of the differences is halved; infinite if the point is not located.
     words : str
@@ -410,7 +410,7 @@ def confirm(
     disturbance : float
         Distance from the orbit at the start relative to the crank's length, in the direction of greatest growth.
     tolerance : float
-        Of the verdict.
+        Tolerance of the verdict.
 
     Raises
     ------

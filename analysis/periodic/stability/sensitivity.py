@@ -103,7 +103,7 @@ class PointGradient:
 
 
 class MotionGradient:
-    """Derivatives of a periodic motion by parameters; see `motion_gradient`. Each is computed when it is asked for.
+    """Derivatives of a periodic motion by parameters; see `motion_gradient`. Each is computed on first use.
 
     Attributes
     ----------
@@ -283,7 +283,7 @@ class MotionGradient:
     def test(self, kind: Crossing) -> Gradient:
         """Return the gradient of a function that is zero where a multiplier crosses the unit circle: see `crossing_test`.
 
-        It is smooth where two multipliers meet too, as their moduli are not.
+        It is smooth even where two multipliers meet; their moduli are not.
         """
         matrix, by = _singular(self.orbit.monodromy, self.monodromy, kind)
         total = np.zeros(len(self.names))
@@ -376,7 +376,7 @@ def crossing_gradient(
         A motion near the point, from which Newton's method begins.
     kind : Crossing
     along : str
-        FMI name of that parameter.
+        FMI name of the parameter along which the point moves.
     names : sequence of str, optional
 
     Raises

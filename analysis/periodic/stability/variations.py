@@ -149,7 +149,7 @@ class Variations:
 
     @property
     def constants(self) -> int:
-        """Number of numbers of the drive and of constants."""
+        """Count of the numbers of the drive and of the constants together."""
         return self.flow.drive_size + len(self._p)
 
     def _first(self) -> tuple[FloatArray, FloatArray]:
@@ -322,7 +322,7 @@ def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
 
 
 class _Symbols(NamedTuple):
-    """Symbols, and a flow's functions of them."""
+    """Symbols of a flow's variables, and its functions of them."""
 
     y: Any
     dy: Any

@@ -1,3 +1,4 @@
+from .described import description as description
 from .drawing import LinkageScene as LinkageScene
 from .drawing import plates as plates
 from .report import Assessment as Assessment
