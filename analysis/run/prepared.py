@@ -28,6 +28,8 @@ from .trajectory import Occurrence, Trajectory
 STEPS_PER_CALL = 50_000
 #: Events of one kind that one compiled call can report before it hands them over.
 EVENTS_PER_CALL = 1_000
+#: Energy (J) and inputs from which on energy and accelerations at the start are looked at.
+_GREAT = 1e100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,8 +96,12 @@ class Run:
         self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         energy = self.mechanism.equations.energy(state, self.p)
-        rates = self.mechanism.equations.derivative(state, self.applied(u), self.p)
-        if not np.isfinite([energy, *rates]).all():
+        # only what is as great as this may overflow
+        great = not (abs(energy) < _GREAT and np.abs(u).max(initial=0.0) < _GREAT)
+        if (
+            great
+            and not np.isfinite([energy, *self.mechanism.equations.derivative(state, self.applied(u), self.p)]).all()
+        ):
             names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
             values = dict(zip([*names[::2], *names[1::2]], state))
             name = max(values, key=lambda name: abs(values[name]))
