@@ -124,6 +124,16 @@ class Run:
         """Return the error for an input that is not finite, by the number of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
 
+    def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
+        """Return empty samples at times, and the state from which the compiled solver goes on."""
+        from . import records as k
+
+        size, channels = self.mechanism.size, len(self.mechanism.channels)
+        samples = k.Samples(times, np.full((1, len(times), size), np.nan), np.full((1, len(times), channels), np.nan))
+        state = k.State(np.zeros(1, dtype=k.CARRY), x[None].copy(), np.zeros((1, channels)))
+        state.carries["begin"] = times[0]
+        return samples, state
+
     def compiled(self, progress: bool, balanced: bool = False) -> Trajectory:
         """Solve the run with the compiled solver; ``balanced`` restores the energy balance after each step.
 
@@ -148,14 +158,7 @@ class Run:
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
         times, most = self.settings.times, self.settings.max_steps
-        shape = (1, len(times))
-        samples = k.Samples(
-            times,
-            np.full((*shape, self.mechanism.size), np.nan),
-            np.full((*shape, len(self.mechanism.channels)), np.nan),
-        )
-        state = k.State(np.zeros(1, dtype=k.CARRY), start.x[None].copy(), np.zeros((1, len(self.mechanism.channels))))
-        state.carries["begin"] = times[0]
+        samples, state = self._records(times, start.x)
         carry, x, u = state.carries[0], state.x[0], state.u[0]
         status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
