@@ -200,8 +200,13 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
         ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
         ("workers.md", 1, 1, ()),
-        ("linkage-library.md", 3, 0, ("examples/linkages/jansen.toml", "out/jansen.png", "out/toggle-press.csv")),
-        ("linkages.md", 6, 1, ("out/four-bar.png", "out/MyLinkage-native.fmu")),
+        (
+            "linkage-library.md",
+            3,
+            0,
+            ("examples/linkages/jansen.toml", "out/jansen-linkage.png", "out/toggle-press.csv"),
+        ),
+        ("linkages.md", 6, 1, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
     ],
 )

@@ -40,9 +40,9 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
     from ..files import save_figure
 
     folder = Path(out)
-    say(f"wrote {save_figure(plot(made), folder / f'{Path(file).stem}.png')}")
+    say(f"wrote {save_figure(plot(made), folder / f'{Path(file).stem}-linkage.png')}")
     if animation:
-        say(f"wrote {animate(made, folder / f'{Path(file).stem}.gif')}")
+        say(f"wrote {animate(made, folder / f'{Path(file).stem}-linkage.gif')}")
 
 
 def _print_structure(file: str, made: Any) -> None:

@@ -90,7 +90,7 @@ def resonance(
 ) -> None:
     """Follow the periodic motions of a CASE file's or a published set's mechanism over the speed, or another parameter.
 
-    A branch that is connected with no other and closes is an isola: "closed" stands in the place of its end.
+    A closed branch that is connected with no other is an isola; its end reads "closed".
 
     Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
     period doublings, the speeds to avoid, and the classical approximations beside the true motion.

@@ -140,7 +140,7 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
     draw(axis, mechanism, parameters, at)
     drawing = mechanism.drawing
     assert drawing is not None
-    return f"the {mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
+    return f"{mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
 
 
 def _swept(mechanism: Mechanism) -> Array:

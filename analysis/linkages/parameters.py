@@ -182,46 +182,48 @@ def interface(description: Description, structure: Structure) -> Interface:
             centres[name] = (x, y)
     for name in description.slots:
         points[name] = {description.slots[name].pin: ("0.0", "0.0")}
-    for joint in structure.joints.values():
-        if isinstance(joint, Slider) and joint.inclined:
-            table = (description.slides | description.slots)[joint.name]  # type: ignore[operator]
-            text = f"Direction of the line of {joint.name} in the {joint.bodies[0]}"
-            found.append(Parameter(f"{joint.name}.direction", "rad", text, table.direction, "free"))
-    for name, gear in description.gears.items():
-        first, second = gear.bodies
-        if gear.ratio == 0.0:
-            raise ParameterError(f"linkage.gears.{name}.ratio", 0.0, "not be zero")
-        found.append(
-            Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
-        )
-        found.append(
-            Parameter(
-                f"{name}.phase", "rad", f"Angle of the {second} where that of the {first} is zero", gear.phase, "free"
-            )
-        )
+    found += _joined(description, structure)
     by_joint = {drive.joint: drive for drive in drives}
     for name, spring in description.springs.items():
         found += _spring(name, spring, structure, by_joint.get(spring.at))
     if description.gravity:
         found.append(Parameter("gravity", "m/s2", "Acceleration of gravity", description.gravity))
-        found.append(
-            Parameter("ground.gravity_direction", "rad", "Direction of gravity", description.gravity_direction, "free")
-        )
-    for dyad in structure.dyads:
-        if dyad.assembled:
-            sign = description.assembly.get(dyad.inner.name, 1)
-            if sign not in (1, -1):
-                raise ParameterError(f"linkage.assembly.{dyad.inner.name}", sign, "be +1 or -1")
-            one, other = (side.body for side in dyad.sides)
-            found.append(Parameter(f"{dyad.inner.name}.assembly", "", f"Assembly of {one} and {other}", sign, "sign"))
-    unused = set(description.assembly) - {dyad.inner.name for dyad in structure.dyads if dyad.assembled}
-    if unused:
-        joints = ", ".join(dyad.inner.name for dyad in structure.dyads if dyad.assembled) or "none here"
-        raise LinkageError(
-            f"linkage.assembly has {', '.join(sorted(unused))}: the joints with two assemblies are {joints}"
-        )
+        direction = description.gravity_direction
+        found.append(Parameter("ground.gravity_direction", "rad", "Direction of gravity", direction, "free"))
+    found += _assemblies(description, structure)
     _check_names(found)
     return Interface(tuple(found), drives, tuple(_loads(description, structure, points)), points, centres)
+
+
+def _joined(description: Description, structure: Structure) -> Iterator[Parameter]:
+    """Yield the parameters of slides, slots and gears."""
+    for joint in structure.joints.values():
+        if isinstance(joint, Slider) and joint.inclined:
+            table = (description.slides | description.slots)[joint.name]  # type: ignore[operator]
+            text = f"Direction of the line of {joint.name} in the {joint.bodies[0]}"
+            yield Parameter(f"{joint.name}.direction", "rad", text, table.direction, "free")
+    for name, gear in description.gears.items():
+        first, second = gear.bodies
+        if gear.ratio == 0.0:
+            raise ParameterError(f"linkage.gears.{name}.ratio", 0.0, "not be zero")
+        yield Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
+        text = f"Angle of the {second} where that of the {first} is zero"
+        yield Parameter(f"{name}.phase", "rad", text, gear.phase, "free")
+
+
+def _assemblies(description: Description, structure: Structure) -> Iterator[Parameter]:
+    """Yield the signs of the dyads that can be assembled in two ways."""
+    dyads = {dyad.inner.name: dyad for dyad in structure.dyads if dyad.assembled}
+    for name in description.assembly:
+        if name not in dyads:
+            there = ", ".join(dyads) or "none here"
+            raise LinkageError(f"linkage.assembly has {name}: the joints with two assemblies are {there}")
+    for name, dyad in dyads.items():
+        sign = description.assembly.get(name, 1)
+        if sign not in (1, -1):
+            raise ParameterError(f"linkage.assembly.{name}", sign, "be +1 or -1")
+        one, other = (side.body for side in dyad.sides)
+        yield Parameter(f"{name}.assembly", "", f"Assembly of {one} and {other}", sign, "sign")
 
 
 def _loads(

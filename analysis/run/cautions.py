@@ -48,7 +48,8 @@ def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance:
     """Return a sentence on a residual of the energy balance greater than a tolerance promises; empty if it is not."""
     if "energy.residual" not in names or not len(values):
         return ""
-    greatest = {name: float(np.abs(values[:, n]).max()) for n, name in enumerate(names) if name.startswith("energy.")}
+    places = [n for n, name in enumerate(names) if name.startswith("energy.")]
+    greatest = dict(zip([names[n] for n in places], np.abs(values[:, places]).max(axis=0).tolist()))
     residual = greatest.pop("energy.residual")
     size = max(greatest.values(), default=0.0)
     if residual <= min(_RESIDUAL * tolerance, _MOST) * size:

@@ -28,6 +28,8 @@ from .trajectory import Occurrence, Trajectory
 STEPS_PER_CALL = 50_000
 #: Events of one kind that one compiled call can report before it hands them over.
 EVENTS_PER_CALL = 1_000
+#: Energy (J) and inputs from which on energy and accelerations at the start are looked at.
+_GREAT = 1e100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,8 +96,12 @@ class Run:
         self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         energy = self.mechanism.equations.energy(state, self.p)
-        rates = self.mechanism.equations.derivative(state, self.applied(u), self.p)
-        if not np.isfinite([energy, *rates]).all():
+        # only what is as great as this may overflow
+        great = not (abs(energy) < _GREAT and np.abs(u).max(initial=0.0) < _GREAT)
+        if (
+            great
+            and not np.isfinite([energy, *self.mechanism.equations.derivative(state, self.applied(u), self.p)]).all()
+        ):
             names = [name for freedom in self.mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
             values = dict(zip([*names[::2], *names[1::2]], state))
             name = max(values, key=lambda name: abs(values[name]))
@@ -117,6 +123,16 @@ class Run:
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """Return the error for an input that is not finite, by the number of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
+
+    def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
+        """Return empty samples at times, and the state from which the compiled solver goes on."""
+        from . import records as k
+
+        size, channels = self.mechanism.size, len(self.mechanism.channels)
+        samples = k.Samples(times, np.full((1, len(times), size), np.nan), np.full((1, len(times), channels), np.nan))
+        state = k.State(np.zeros(1, dtype=k.CARRY), x[None].copy(), np.zeros((1, channels)))
+        state.carries["begin"] = times[0]
+        return samples, state
 
     def compiled(self, progress: bool, balanced: bool = False) -> Trajectory:
         """Solve the run with the compiled solver; ``balanced`` restores the energy balance after each step.
@@ -142,14 +158,7 @@ class Run:
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
         times, most = self.settings.times, self.settings.max_steps
-        shape = (1, len(times))
-        samples = k.Samples(
-            times,
-            np.full((*shape, self.mechanism.size), np.nan),
-            np.full((*shape, len(self.mechanism.channels)), np.nan),
-        )
-        state = k.State(np.zeros(1, dtype=k.CARRY), start.x[None].copy(), np.zeros((1, len(self.mechanism.channels))))
-        state.carries["begin"] = times[0]
+        samples, state = self._records(times, start.x)
         carry, x, u = state.carries[0], state.x[0], state.u[0]
         status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []

@@ -273,7 +273,7 @@ Reason plant_tune(Plant *a, const double before[VARIABLES], char sentence[SENTEN
     memcpy(old.given, before, sizeof old.given);
     Reason reason = check_parameters(a, sentence);
     double change = energy_of(a, p) - energy_of(&old, unused);
-    if (reason == GOOD && !(all_finite(p, CONSTANTS - 1) && isfinite(change))) reason = blame_extreme(a, sentence);
+    if (reason == GOOD && !all_finite(p, CONSTANTS)) reason = blame_extreme(a, sentence);
     if (reason != GOOD) {
         *a = old;
         return reason;

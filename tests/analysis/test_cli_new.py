@@ -113,7 +113,7 @@ def test_a_new_run_runs_as_it_is(linkwork, tmp_path, kind):
 def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tmp_path):
     assert linkwork("new", LINKAGE).output == "wrote linkage.toml; next: linkwork linkage linkage.toml\n"
     assert "coupler, rocker" in linkwork("linkage", "linkage.toml").output
-    assert (tmp_path / "out" / "linkage.png").is_file()
+    assert (tmp_path / "out" / "linkage-linkage.png").is_file()
     assert "def places(" in linkwork("linkage", "linkage.toml", "--equations").output
     assert linkwork("run", "linkage.toml", "--no-plot").exit_code == 0
     text = (tmp_path / "linkage.toml").read_text()

@@ -259,7 +259,9 @@ def test_an_fmu_that_makes_no_instance_is_said(natives: dict[str, Path], tmp_pat
         for name in archive.namelist():
             text = archive.read(name)
             copy.writestr(name, text.replace(b'guid="', b'guid="not-') if name == "modelDescription.xml" else text)
-    report = probe(tmp_path / "other.fmu", interface="cs", checks=["starts", "derivatives"])
+    report = probe.probe(tmp_path / "other.fmu", interface="cs", checks=["starts", "derivatives"])
     assert [outcome.check for outcome in report.outcomes] == ["starts", "derivatives"]
     assert all("not made: no instance is made" in outcome.said for outcome in report.outcomes)
-    assert probe(tmp_path / "other.fmu", interface="cs", checks=["legal"], calls=10).findings[0].severity == "wrong"
+    assert (
+        probe.probe(tmp_path / "other.fmu", interface="cs", checks=["legal"], calls=10).findings[0].severity == "wrong"
+    )

@@ -524,6 +524,8 @@ def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: 
 def test_a_speed_beyond_all_numbers_is_refused(speed: float, method: str) -> None:
     with pytest.raises(InputError, match=r"finite: crank\.speed is 1e\+"):
         simulate(TABLE_3_1, Inputs(speed=speed), stop_time=1.0, method=method)
+    with pytest.raises(InputError, match="not finite"):
+        simulate(TABLE_3_1, Inputs(torque=1e308), stop_time=1.0, method=method)
 
 
 @pytest.mark.parametrize(("mass", "warned"), [(0.59, False), (1e9, True)])

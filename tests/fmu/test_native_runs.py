@@ -467,6 +467,14 @@ def test_tunable_parameters_change_between_steps(library: Library, name: str) ->
     assert c.step(0.1, 5e-3) == OK
 
 
+def test_tunable_parameters_too_large_together(five_bar: Library) -> None:
+    c = five_bar.instance().start()
+    arrays = c.arrays(["pin.A_friction_radius", "pin.B_friction_radius"], (c_double * 2)(1.7e308, 1.7e308))
+    assert c(c.real("Set"), *arrays) == ERROR
+    assert "parameter pin.A_friction_radius is 1.7e+308: it must be small enough" in c.log[-1][1]
+    assert c.step(0.0, 1e-3) == OK
+
+
 # Inputs that move over a step, outputs that do
 
 
@@ -920,6 +928,18 @@ def test_a_speed_that_contradicts_its_acceleration_is_named(five_bar: Library, m
     c.set(drive__speed=40.0 + moved)
     assert c("Terminate") == (WARNING if said else OK)
     assert [said in text for _, text in c.log] == [True] * bool(said)
+
+
+def test_model_exchange_without_a_command_in_force(five_bar: Library) -> None:
+    c = five_bar.instance("me").start(drive__mode=0, drive__acceleration=50.0, initial__crank_speed=40.0)
+    assert c("EnterContinuousTimeMode") == OK
+    assert c("SetTime", 0.1) == OK
+    assert c.text() == ""
+    rates = c.states("Derivatives" if five_bar.fmi == 2 else "ContinuousStateDerivatives")
+    assert rates[2:4] == c.get("crank.acceleration", "slider.acceleration")
+    assert c.set(slider__stiffness=1.0) == ERROR
+    assert "slider.stiffness is a tunable parameter, it cannot be set in continuous-time mode" in c.log[-1][1]
+    assert c("Terminate") == OK
 
 
 def test_model_exchange_beyond_the_limit(five_bar: Library) -> None:
