@@ -12,7 +12,8 @@ WRITERS = {
     "cli": "what a command makes",
     "export": "FMUs and the sources that they are compiled from",
     "probe": "a working folder for an FMU under test",
-    "numerics/codegen.py": "machine code in the cache",
+    "linkages/package.py": "the package of a described linkage in the cache",
+    "numerics/cache.py": "machine code in the cache, with its hash",
     "numerics/workers.py": "results of workers in a temporary folder",
     "display.py": "a picture in memory",
 }

@@ -138,6 +138,16 @@ def linkage(name: str, ground: Mapping[str, Any], **entries: Any) -> Builder:
         Points of the ground: numbers in metres, texts with a unit, or 0 for what is always zero.
     **entries
         Further entries of `Description`, such as ``gravity``, ``loads`` and ``assembly``.
+
+    Examples
+    --------
+    >>> from analysis import linkage, simulate
+    >>> bar = linkage("example-swing", ground={"A": (0, 0)}, gravity=9.81)
+    >>> bar = bar.body("rod", bar=("A", "B"), length="0.5 m", mass="1 kg", inertia="0.02 kg*m^2")
+    >>> made = bar.freedom("swing", "A", driven=False).mechanism()
+    >>> run = simulate("example-swing", stop_time=1.0)
+    >>> bool(abs(run["energy.residual"]).max() < 1e-6)
+    True
     """
     return Builder(name, ground, **entries)
 

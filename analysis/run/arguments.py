@@ -48,6 +48,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
     def decorate(function: _Function) -> _Function:
         its = signature(function)
         place = list(its.parameters).index("parameters")
+        further = next((p.name for p in its.parameters.values() if p.kind is p.VAR_KEYWORD), "")
 
         @wraps(function)
         def resolved(*arguments: Any, **options: Any) -> Any:
@@ -66,8 +67,8 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
                 values = value if own_each else [value] * len(sets)
                 filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
                 bound[name] = filled if several else filled[0]
-            # `its` has no arguments that are positional only: all can go by their names, but for those of **options
-            others = bound.pop("options", {})
+            # `its` has no arguments that are positional only: all can go by their names, but for further keywords
+            others = bound.pop(further, {})
             return function(**bound, **others)
 
         return cast(_Function, resolved)

@@ -16,6 +16,7 @@ from ..files import Kinds, Quantity, unknown_name
 from ..linkages import SECTIONS, Made, millimetres
 from ..mechanisms import Parameters, mechanism_of
 from ..sections import Section
+from .arguments import takes_published
 
 
 class Mass(NamedTuple):
@@ -58,6 +59,7 @@ def _values(link: Link, units: Mapping[str, str], made: Made, length: float, mas
     return {link.mass: own, link.inertia: inertia, **dict(zip(link.centre, centre))}
 
 
+@takes_published()
 def with_sections(parameters: Parameters, **sections: Section) -> Parameters:
     """Return parameters with the masses, centres of mass and moments of inertia of links of these sections.
 

@@ -314,8 +314,8 @@ def test_examples_are_copied_once(linkwork, tmp_path):
     assert "run-up.toml" in result.stderr
     assert (tmp_path / "mine" / "run-up.toml").read_text() == "changed"
     assert linkwork("examples", "--dest", "mine", "--force").exit_code == 0
-    for path in (ROOT / "examples").iterdir():
-        assert (tmp_path / "mine" / path.name).read_bytes() == path.read_bytes()
+    for path in (path for path in (ROOT / "examples").rglob("*") if path.is_file()):
+        assert (tmp_path / "mine" / path.relative_to(ROOT / "examples")).read_bytes() == path.read_bytes()
 
 
 def test_without_zig_what_can_be_built_is_and_a_note_says_what_is_missing(linkwork, monkeypatch):

@@ -118,7 +118,7 @@ def test_a_case_is_a_state_of_the_page(linkwork: Callable[..., Result], tmp_path
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["nothing.toml"], "no file, and no published set"),
+        (["nothing.toml"], "nothing.toml"),
         (["--set", "drive.speed=3"], "name one"),
         ([ROOT / "examples" / "torsion-bar.toml"], "inputs that are constant"),
         ([ROOT / "examples" / "ellipse.toml"], "linkwork synthesize"),
