@@ -202,7 +202,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("workers.md", 1, 1, ()),
         (
             "linkage-library.md",
-            3,
+            2,
             0,
             ("examples/linkages/jansen.toml", "out/jansen-linkage.png", "out/toggle-press.csv"),
         ),

@@ -311,7 +311,7 @@ def test_examples_are_copied_once(linkwork, tmp_path):
     (tmp_path / "mine" / "run-up.toml").write_text("changed")
     result = linkwork("examples", "--dest", "mine")
     assert result.exit_code == 2
-    assert "run-up.toml" in result.stderr
+    assert "calm-pins.toml" in result.stderr
     assert (tmp_path / "mine" / "run-up.toml").read_text() == "changed"
     assert linkwork("examples", "--dest", "mine", "--force").exit_code == 0
     for path in (path for path in (ROOT / "examples").rglob("*") if path.is_file()):
