@@ -124,7 +124,7 @@ def right_hand_sides(folder: Path) -> tuple[float, float]:
     driver = Path(__file__).with_name("right_hand_sides.c")
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    sources = [name for name in files if name.endswith(".c") and name != "equations.c"]
+    sources = [name for name in files if name.endswith(".c") and name not in ("all.c", "equations.c")]
     options = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-sanitize=undefined", "-D_GNU_SOURCE", "-I.")
     target = PLATFORMS[this_platform()].target
     compile_library(folder, [str(driver), *sources], "right_hand_sides", target, options)
