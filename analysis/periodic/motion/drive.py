@@ -192,9 +192,9 @@ class Drive:
             if number in ratios and number not in (*made.free, *made.commanded):
                 raise InputError(f"{name} has a ratio, but is neither commanded nor free")
         if made.size == 0:
+            other = f", or another freedom by a force, such as {_forces(mechanism)} = 0" if made.others else ""
             raise InputError(
-                f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque, or another freedom by "
-                f"a force, such as {_forces(mechanism)} = 0"
+                f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque{other}"
             )
         return made
 
