@@ -231,14 +231,14 @@ class TestPage:
         assert (tmp_path / "out" / "figures" / "rig-2-forces.png").exists()
 
     def test_the_numbers_of_its_table(self) -> None:
-        rows = re.findall(r"^\| (maximum|minimum) \| ([\d.]+) \| ([\d.]+) cm \|", PAGE.read_text(), flags=re.MULTILINE)
+        rows = re.findall(r"^\| (maximum|minimum) \| ([\d.]+) \| ([\d.]+) mm \|", PAGE.read_text(), flags=re.MULTILINE)
         response = rigs.motions("C")
         found = [(e, "maximum") for e in response.maxima()] + [(e, "minimum") for e in response.minima()]
         for kind, speed, amplitude in rows:
             assert any(
                 kind == other
                 and abs(e.parameter / published.RPM - float(speed)) < 0.02
-                and abs(100.0 * e.amplitude - float(amplitude)) < 1e-4
+                and abs(1e3 * e.amplitude - float(amplitude)) < 1e-3
                 for e, other in found
             )
         assert len(rows) == 3
