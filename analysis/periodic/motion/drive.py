@@ -192,7 +192,8 @@ class Drive:
             if number in ratios and number not in (*made.free, *made.commanded):
                 raise InputError(f"{name} has a ratio, but is neither commanded nor free")
         if made.size == 0:
-            other = f", or another freedom by a force, such as {_forces(mechanism)} = 0" if made.others else ""
+            other = next((c.name for c in forces_of(mechanism).values() if c.freedom >= 0), "")
+            other = other and f", or another freedom by a force, such as {other} = 0"
             raise InputError(
                 f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque{other}"
             )
@@ -304,10 +305,6 @@ def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
     """Return the inputs of a mechanism that are forces, but for the torque on its crank if it has one, by FMI name."""
     crank = mechanism.cyclic[0] if len(mechanism.cyclic) == 1 else -1
     return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
-
-
-def _forces(mechanism: Mechanism) -> str:
-    return next((c.name for c in forces_of(mechanism).values() if c.freedom >= 0), "none")
 
 
 def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
