@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import GROUND, Description, given
+from .description import GROUND, given
 from .parameters import Interface, size
-from .structure import Freed, Pin, Structure, sliders
-from .variables import quoted
+from .structure import Freed, Pin, sliders
+from .writing import function, quoted
 
 
 class Marked(NamedTuple):
@@ -22,8 +21,8 @@ class Marked(NamedTuple):
 class Picture:
     """The picture of one linkage: its joints and parts."""
 
-    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
-        self.description, self.structure, self.interface = description, structure, interface
+    def __init__(self, interface: Interface) -> None:
+        self.description, self.structure, self.interface = interface.description, interface.structure, interface
 
     def drawn(self) -> tuple[list[Marked], list[str]]:
         """Return the joints of the picture, and its parts from the back to the front."""
@@ -55,12 +54,11 @@ class Picture:
                 parts.append(f'Part("link", {through!r}, "{name}")')
         return joints, parts
 
-    def positions(self) -> Iterator[str]:
+    def positions(self) -> str:
         """Write the function of the places of the picture's joints."""
-        joints, _ = self.drawn()
-        yield "def positions(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:"
-        yield '    """Compute the places of the points of the picture."""'
-        yield from ("    b = places(x, p)", "    return (", *(f"        {joint.place}," for joint in joints), "    )")
+        rows = ("b = places(x, p)", "return (", *(f"    {joint.place}," for joint in self.drawn()[0]), ")")
+        signature = "positions(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]"
+        return function(signature, "Compute the places of the points of the picture.", rows)
 
     def moves(self, own: str) -> str:
         """Return the parameters that change where a point of the picture is dragged."""

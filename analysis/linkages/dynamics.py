@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from .description import GROUND, Description, Spring, given
-from .equations import indented
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Joint, Pin, Side, Structure
+from .structure import Dyad, Freed, Geared, Joint, Pin, Side
+from .writing import function, record, tupled
 
 
 class Reaction(NamedTuple):
@@ -29,21 +29,17 @@ def springs_at(description: Description, interface: Interface) -> dict[str, int]
 class Motion:
     """The dynamics of one linkage, function by function."""
 
-    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
-        self.description, self.structure, self.interface = description, structure, interface
+    def __init__(self, interface: Interface) -> None:
+        self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
-        self.along = springs_at(description, interface)
-        self.bodies = tuple(description.bodies)
+        self.along = springs_at(self.description, interface)
+        self.bodies = tuple(self.description.bodies)
         self.reactions: list[Reaction] = []
 
     def owner(self, own: str) -> str:
         """Return a body that has a point, one that moves if there is one."""
         having = [body for body in self.bodies if own in self.interface.points[body]]
         return having[0] if having else GROUND
-
-    def turn(self, body: str) -> str:
-        """Return the expression of the direction of a body."""
-        return f"b.{body}_frame.turn" if body != GROUND else f"held(1.0, 0.0, {self.n})"
 
     # What acts
 
@@ -66,25 +62,19 @@ class Motion:
                 first, second = joint.bodies
                 if isinstance(joint, Pin):
                     angle = f"p.{name}_c, p.{name}_s" if free else "1.0, 0.0"
-                    one, other = self.turn(first), self.turn(second)
+                    one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
                     rows.append(f"{stretch} = angle_between({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")
                 else:
-                    x, y = self.interface.points[first].get(joint.through, ("0.0", "0.0"))
-                    frame = f"b.{first}_frame" if first != GROUND else f"ground({self.n})"
-                    call = f"position_along({frame}, {x}, {y}, b.{joint.name}_line, b.{second}_frame)"
-                    rows.append(f"{name}_position, {rate} = {call}")
+                    rows.append(f"{name}_position, {rate} = {self.interface.travel(joint)}")
                     rows.append(f"{stretch} = {name}_position{f'{free}_position' if free else ''}")
             fields += [stretch, rate]
-        yield from (
-            "class Springs(NamedTuple):",
-            '    """Stretches of the springs, their rates, and the directions of those between points."""',
-            "",
+        doc = "Stretches of the springs, their rates, and the directions of those between points."
+        yield record("Springs", doc, dict.fromkeys(fields, "float"))
+        signature = "springs(b: Places, x: tuple[float, ...], p: Constants) -> Springs"
+        yield function(
+            signature, "Compute the stretches of all springs.", [*rows, f"return Springs({', '.join(fields)})"]
         )
-        yield from (f"    {field}: float" for field in fields)
-        yield from ("", "", "def springs(b: Places, x: tuple[float, ...], p: Constants) -> Springs:")
-        yield '    """Compute the stretches of all springs."""'
-        yield from indented([*rows, f"return Springs({', '.join(fields)})"])
 
     def _kind(self, spring: Spring) -> str:
         return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
@@ -105,9 +95,8 @@ class Motion:
         """Write the functions of the springs' own laws."""
         for name, spring in self.description.springs.items():
             if spring.law:
-                yield f"def {name}_law(x: float, v: float) -> float:"
-                yield f'    """Return the force of {name} at a stretch and its rate (N, N.m)."""'
-                yield from (f"    return {spring.law}", "", "")
+                doc = f"Return the force of {name} at a stretch and its rate (N, N.m)."
+                yield function(f"{name}_law(x: float, v: float) -> float", doc, [f"return {spring.law}"])
 
     def acting(self) -> Iterator[str]:
         """Write the function of the forces on all bodies and along all freedoms."""
@@ -167,40 +156,28 @@ class Motion:
         rows.append(f"along = ({', '.join(freedoms)},)")
         rows.append(f"return Acting(wrenches, along, {' + '.join(lost) or '0.0'}, {' + '.join(gained) or '0.0'})")
         yield from self.laws()
-        yield from (
-            "class Acting(NamedTuple):",
-            '    """Forces on the bodies and along the freedoms, power lost in dampers and friction, and of the loads (W)."""',
-            "",
-        )
-        yield from (
-            "    wrenches: tuple[Wrench, ...]",
-            "    along: tuple[float, ...]",
-            "    lost: float",
-            "    gained: float",
-            "",
-            "",
-        )
+        doc = "Forces on the bodies and along the freedoms, power lost in dampers and friction, and of the loads (W)."
+        fields = {"wrenches": "tuple[Wrench, ...]", "along": "tuple[float, ...]", "lost": "float", "gained": "float"}
+        yield record("Acting", doc, fields)
         s = "s: Springs, " if self.description.springs else ""
-        yield f"def acting(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> Acting:"
-        yield '    """Compute what acts on the bodies and along the freedoms, but for the drives."""'
-        yield from indented(rows)
+        signature = f"acting(b: Places, m: tuple[Mass, ...], {s}i: Applied, p: Constants) -> Acting"
+        yield function(signature, "Compute what acts on the bodies and along the freedoms, but for the drives.", rows)
 
-    def masses(self) -> Iterator[str]:
+    def masses(self) -> str:
         """Write the function of the bodies' masses."""
         names = {parameter.name for parameter in self.interface.parameters}
-        yield "def masses(b: Places, p: Constants) -> tuple[Mass, ...]:"
-        yield '    """Compute the masses of the bodies at their places."""'
-        yield "    return ("
+        rows = ["return ("]
         for body in self.bodies:
             frame = f"b.{body}_frame"
             if body not in self.interface.centres:
-                yield f"        Mass(0.0, 0.0, {frame}.origin, {frame}),"
+                rows.append(f"    Mass(0.0, 0.0, {frame}.origin, {frame}),")
                 continue
             x, y = self.interface.centres[body]
             centre = f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
             inertia = f"p.{body}_inertia" if f"{body}.inertia" in names else "0.0"
-            yield f"        Mass(p.{body}_mass, {inertia}, {centre}, {frame}),"
-        yield "    )"
+            rows.append(f"    Mass(p.{body}_mass, {inertia}, {centre}, {frame}),")
+        signature = "masses(b: Places, p: Constants) -> tuple[Mass, ...]"
+        return function(signature, "Compute the masses of the bodies at their places.", [*rows, ")"])
 
     # Forces in the joints
 
@@ -244,15 +221,10 @@ class Motion:
                         supported(inside.joint, inside.parent, inside.body)
                     supported(side.joint, side.parent, side.body)
         names = [f"in_{r.name}" for r in self.reactions]
-        yield from (
-            "class Forces(NamedTuple):",
-            '    """Forces in the joints, each of one body on another, and their moments about the ground\'s origin."""',
-            "",
-        )
-        yield from (f"    {name}: Wrench" for name in names)
-        yield from ("", "", "def forces(m: Motion, p: Constants) -> Forces:")
-        yield '    """Compute the forces in all joints, from the last dyad back to the ground."""'
-        yield from indented([*rows, f"return Forces({', '.join(names)})"])
+        doc = "Forces in the joints, each of one body on another, and their moments about the ground's origin."
+        yield record("Forces", doc, dict.fromkeys(names, "Wrench"))
+        doc = "Compute the forces in all joints, from the last dyad back to the ground."
+        yield function("forces(m: Motion, p: Constants) -> Forces", doc, [*rows, f"return Forces({', '.join(names)})"])
 
     def _mesh(self, step: Geared) -> str:
         pins = [
@@ -297,18 +269,12 @@ class Motion:
             else:
                 values.append(f"{drive.name}_load")
         loads = [load.field for load in self.interface.loads]
-        yield from (
-            "class Applied(NamedTuple):",
-            '    """Loads along the freedoms, whether their rates are commanded, their accelerations then; other loads."""',
-            "",
-        )
-        yield from (f"    {field}: float" for field in (*fields, *loads))
-        yield from ("", "", "def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied:")
-        yield '    """Return what acts on the linkage from the values of the modes and the inputs."""'
-        rows = [f"({', '.join(modes)},) = modes"] if modes else []
-        rows.append(f"({', '.join((*names, *loads))},) = u")
-        rows.append(f"return Applied({', '.join((*values, *loads))})")
-        yield from indented(rows)
+        doc = "Loads along the freedoms, whether their rates are commanded, their accelerations then; other loads."
+        yield record("Applied", doc, dict.fromkeys((*fields, *loads), "float"))
+        rows = [f"{tupled(modes)} = modes"] if modes else []
+        rows += [f"{tupled((*names, *loads))} = u", f"return Applied({', '.join((*values, *loads))})"]
+        signature = "applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Applied"
+        yield function(signature, "Return what acts on the linkage from the values of the modes and the inputs.", rows)
 
     def _held(self) -> tuple[str, str]:
         """Return the tuples of which rates are commanded and of their accelerations."""
@@ -339,37 +305,24 @@ class Motion:
         rows.append(f"loads = ({', '.join(loads)},)")
         power = " + ".join(f"loads[{k}] * x[{self.n + k}]" for k in n)
         rows.append(f"return Motion(b, m, a.wrenches, e, loads, a.lost, {power} + a.gained)")
-        yield from (
-            "class Motion(NamedTuple):",
-            '    """The bodies, forces on them, accelerations of the freedoms and loads on them, power lost and supplied."""',
-            "",
-        )
-        yield from ("    places: Places", "    masses: tuple[Mass, ...]", "    wrenches: tuple[Wrench, ...]")
-        yield from (
-            "    accelerations: tuple[float, ...]",
-            "    loads: tuple[float, ...]",
-            "    lost: float",
-            "    supplied: float",
-            "",
-            "",
-        )
-        yield from (
-            "def motion(x: tuple[float, ...], i: Applied, p: Constants) -> Motion:",
-            '    """Compute the accelerations, and the loads that hold the commanded rates."""',
-        )
-        yield from indented(rows)
-        yield from ("", "", "def derivative(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:")
-        yield '    """Compute the time derivative of the state."""'
+        numbers = "tuple[float, ...]"
+        fields = {"places": "Places", "masses": "tuple[Mass, ...]", "wrenches": "tuple[Wrench, ...]"}
+        fields |= {"accelerations": numbers, "loads": numbers, "lost": "float", "supplied": "float"}
+        doc = "The bodies, forces on them, accelerations of the freedoms and loads on them, power lost and supplied."
+        yield record("Motion", doc, fields)
+        doc = "Compute the accelerations, and the loads that hold the commanded rates."
+        yield function(f"motion(x: {numbers}, i: Applied, p: Constants) -> Motion", doc, rows)
         rates = ", ".join(f"x[{self.n + k}]" for k in n)
-        yield from indented(["m = motion(x, i, p)", f"return ({rates}, *m.accelerations, m.lost, m.supplied)"])
+        rows = ["m = motion(x, i, p)", f"return ({rates}, *m.accelerations, m.lost, m.supplied)"]
+        signature = f"derivative(x: {numbers}, i: Applied, p: Constants) -> {numbers}"
+        yield function(signature, "Compute the time derivative of the state.", rows)
         yield from self._energies()
-        yield from self._jump(held)
-        yield from ("", "", "def start(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]:")
-        yield from ('    """Return the state at the start as it is."""', "    return x")
-        yield from ("", "", "def clearance(x: tuple[float, ...], i: Applied, p: Constants) -> float:")
-        yield from (
-            '    """Compute the least sine of all dyads, negative in the wrong assembly."""',
-            "    return places(x, p).clearance",
+        yield self._jump(held)
+        signature = f"start(x: {numbers}, i: Applied, p: Constants) -> {numbers}"
+        yield function(signature, "Return the state at the start as it is.", ["return x"])
+        doc = "Compute the least sine of all dyads, negative in the wrong assembly."
+        yield function(
+            f"clearance(x: {numbers}, i: Applied, p: Constants) -> float", doc, ["return places(x, p).clearance"]
         )
 
     def _energies(self) -> Iterator[str]:
@@ -382,24 +335,17 @@ class Motion:
             if given(spring.stiffness):
                 terms.append(f"+ 0.5 * p.{name}_stiffness * s.{name}_stretch * s.{name}_stretch")
         s = "s: Springs, " if self.description.springs else ""
-        yield from ("", "", f"def potential_energy(m: tuple[Mass, ...], {s}p: Constants) -> float:")
-        yield '    """Compute the energy of the springs, and of gravity with zero at the ground\'s origin (J)."""'
-        yield f"    return {' '.join(terms).removeprefix('+ ') or '0.0'}"
-        yield from ("", "", "def energy(x: tuple[float, ...], p: Constants) -> float:")
-        yield '    """Compute the mechanical energy (J)."""'
+        doc = "Compute the energy of the springs, and of gravity with zero at the ground's origin (J)."
+        signature = f"potential_energy(m: tuple[Mass, ...], {s}p: Constants) -> float"
+        yield function(signature, doc, [f"return {' '.join(terms).removeprefix('+ ') or '0.0'}"])
         s = "springs(b, x, p), " if self.description.springs else ""
-        yield from indented(
-            ["b = places(x, p)", "m = masses(b, p)", f"return kinetic_energy(m) + potential_energy(m, {s}p)"]
+        rows = ["b = places(x, p)", "m = masses(b, p)", f"return kinetic_energy(m) + potential_energy(m, {s}p)"]
+        yield function(
+            "energy(x: tuple[float, ...], p: Constants) -> float", "Compute the mechanical energy (J).", rows
         )
 
-    def _jump(self, held: str) -> Iterator[str]:
+    def _jump(self, held: str) -> str:
         n = range(self.n)
-        yield from (
-            "",
-            "",
-            "def jump(x: tuple[float, ...], i: Applied, u: tuple[float, ...], p: Constants) -> tuple[float, ...]:",
-        )
-        yield '    """Return the state after a jump of the commanded rates: the momenta of the other freedoms are conserved."""'
         place, changes = 0, []
         for k, drive in enumerate(self.interface.drives):
             changes.append(f"u[{place + 1}] - x[{self.n + k}]" if drive.table else "0.0")
@@ -413,4 +359,6 @@ class Motion:
             "work = 0.5 * sum(a * b - c * d for a, b, c, d in gained)",
             f"return ({', '.join(f'x[{k}]' for k in n)}, *after, x[{2 * self.n}], x[{2 * self.n + 1}] + work)",
         ]
-        yield from indented(rows)
+        signature = "jump(x: tuple[float, ...], i: Applied, u: tuple[float, ...], p: Constants) -> tuple[float, ...]"
+        doc = "Return the state after a jump of the commanded rates: the momenta of the other freedoms are conserved."
+        return function(signature, doc, rows)

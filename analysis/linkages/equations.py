@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from .description import GROUND, Description
+from .description import GROUND
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Pin, Side, Slider, Structure
+from .structure import Dyad, Freed, Geared, Pin, Side, Slider, sliders
+from .writing import function, record
 
 
 class Places:
     """The function of the places of all bodies of one linkage, line by line."""
 
-    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
-        self.description, self.structure, self.interface = description, structure, interface
+    def __init__(self, interface: Interface) -> None:
+        self.structure, self.interface = interface.structure, interface
         self.n = len(interface.drives)
         self.lines: list[str] = []
         #: variables of points of the ground or of known bodies
@@ -26,7 +27,7 @@ class Places:
 
     def point(self, body: str, own: str, frame: str = "") -> str:
         """Return the expression of a point of a body; ``frame`` is the body's place where it is not that in the ground."""
-        x, y = self.interface.points[body].get(own, ("0.0", "0.0"))
+        x, y = self.interface.own(body, own)
         if body == GROUND or frame == "own":
             return f"fixed({x}, {y}, {self.n})"
         frame = frame or f"{body}_frame"
@@ -41,7 +42,7 @@ class Places:
 
     def hung(self, pin: str, turn: str, body: str, own: str) -> str:
         """Return the expression of the place of a body whose point ``own`` is at a place."""
-        x, y = self.interface.points[body].get(own, ("0.0", "0.0"))
+        x, y = self.interface.own(body, own)
         if (x, y) == ("0.0", "0.0"):
             return f"Frame({pin}, {turn})"
         return f"Frame(minus({pin}, arm({turn}, {x}, {y})), {turn})"
@@ -131,9 +132,9 @@ class Places:
 
     def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
         """Return an arm in a side's body from its point ``start`` to the point ``to`` of one of the side's bodies."""
-        sx, sy = self.interface.points[side.body].get(start, ("0.0", "0.0"))
+        sx, sy = self.interface.own(side.body, start)
         if body == side.body:
-            x, y = self.interface.points[body].get(to, ("0.0", "0.0"))
+            x, y = self.interface.own(body, to)
             result = f"fixed({_difference(x, sx)}, {_difference(y, sy)}, {self.n})"
         else:
             result = self.point(body, to, f"{body}_in_{side.body}")
@@ -145,7 +146,7 @@ class Places:
         """Write the line along which a side slides: variables of its origin and direction."""
         joint = side.joint
         assert isinstance(joint, Slider)
-        parent = f"{side.parent}_frame.turn" if side.parent != GROUND else f"held(1.0, 0.0, {self.n})"
+        parent = self.interface.turn(side.parent)
         name = f"{joint.name}_line"
         if joint.bodies[1] == side.body:
             self.lines.append(f"{name} = {self.inclined(parent, joint)}")
@@ -241,8 +242,8 @@ class Places:
 
     # Functions of the module
 
-    def function(self) -> list[str]:
-        """Return the function of the places of all bodies, and the record that it returns."""
+    def blocks(self) -> Iterator[str]:
+        """Write the record of the places of all bodies and the function that computes it."""
         for n, drive in enumerate(self.interface.drives):
             self.lines.append(f"{drive.variable} = x[{n}]")
         self.lines.append(f"v = ({', '.join(f'x[{self.n + n}]' for n in range(self.n))},)")
@@ -264,27 +265,18 @@ class Places:
             for own in self.interface.points[body]:
                 self.at(body, own)
         fields = [f"{body}_frame" for body in self.structure.bodies] + list(self.places.values())
-        fields += [f"{name}_line" for name, joint in self.structure.joints.items() if isinstance(joint, Slider)]
-        for name, joint in self.structure.joints.items():
-            if isinstance(joint, Slider) and not any(line.startswith(f"{name}_line") for line in self.lines):
-                holder = joint.bodies[0]
-                turn = f"{holder}_frame.turn" if holder != GROUND else f"held(1.0, 0.0, {self.n})"
-                self.lines.append(f"{name}_line = {self.inclined(turn, joint)}")
+        fields += [f"{name}_line" for name in sliders(self.structure)]
+        for name, joint in sliders(self.structure).items():
+            if not any(line.startswith(f"{name}_line") for line in self.lines):
+                self.lines.append(f"{name}_line = {self.inclined(self.interface.turn(joint.bodies[0]), joint)}")
         self.lines += [f"clearance = {margin}", f"return Places({', '.join(fields)}, clearance)"]
-        record = [
-            "class Places(NamedTuple):",
-            '    """The bodies, the points, the lines of slides, and the clearance to the limit of assembly."""',
-            "",
-        ]
         kinds = {"frame": "Frame", "line": "Turn"}
-        record += [f"    {name}: {kinds.get(name.rpartition('_')[2], 'Vector')}" for name in fields] + [
-            "    clearance: float"
-        ]
-        head = [
-            "def places(x: tuple[float, ...], p: Constants) -> Places:",
-            '    """Compute the places of all bodies, freedom after freedom and dyad after dyad."""',
-        ]
-        return [*record, "", "", *head, *indented(self.lines)]
+        types = {name: kinds.get(name.rpartition("_")[2], "Vector") for name in fields} | {"clearance": "float"}
+        yield record(
+            "Places", "The bodies, the points, the lines of slides, and the clearance to the limit of assembly.", types
+        )
+        doc = "Compute the places of all bodies, freedom after freedom and dyad after dyad."
+        yield function("places(x: tuple[float, ...], p: Constants) -> Places", doc, self.lines)
 
 
 def _difference(a: str, b: str) -> str:
@@ -292,7 +284,3 @@ def _difference(a: str, b: str) -> str:
     if b == "0.0":
         return a
     return f"-{b}" if a == "0.0" else f"{a} - {b}"
-
-
-def indented(lines: Iterable[str]) -> Iterator[str]:
-    return (f"    {line}" for line in lines)

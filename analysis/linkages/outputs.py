@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import GROUND, given
+from .description import given
 from .dynamics import Motion
 from .structure import Pin, sliders
-from .variables import quoted
+from .writing import function, quoted
 
 
 class Output(NamedTuple):
@@ -66,10 +66,7 @@ class Outputs:
         freed = {drive.joint for drive in self.interface.drives}
         for name, joint in sliders(self.structure).items():
             if name not in freed:
-                holder, block = joint.bodies
-                x, y = self.interface.points[holder].get(joint.through, ("0.0", "0.0"))
-                frame = f"b.{holder}_frame" if holder != GROUND else f"ground({n})"
-                call = f"position_along({frame}, {x}, {y}, b.{name}_line, b.{block}_frame)"
+                block, call = joint.bodies[1], self.interface.travel(joint)
                 yield Output(
                     f'output("{name}.position", "m", "Position of the {block} on the line of {name}", "", *POSITION)',
                     f"{call}[0]",
@@ -127,17 +124,11 @@ class Outputs:
         yield from (Output("", value) for value in ("potential", f"x[{2 * n}]", f"x[{2 * n + 1}]"))
         yield Output("", f"kinetic + potential - start_energy + x[{2 * n}] - x[{2 * n + 1}]")
 
-    def function(self) -> Iterator[str]:
+    def function(self) -> str:
+        """Write the function of all outputs."""
         s = "s, " if self.description.springs else ""
-        yield from (
-            "def outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]:",
-        )
-        yield '    """Compute all real outputs, in the order of the interface."""'
-        yield from ("    m = motion(x, i, p)", "    f = forces(m, p)", "    b = m.places")
-        if s:
-            yield "    s = springs(b, x, p)"
-        yield "    kinetic = kinetic_energy(m.masses)"
-        yield f"    potential = potential_energy(m.masses, {s}p)"
-        yield "    return ("
-        yield from (f"        {output.value}," for output in self.all())
-        yield "    )"
+        rows = ["m = motion(x, i, p)", "f = forces(m, p)", "b = m.places", *(["s = springs(b, x, p)"] if s else [])]
+        rows += ["kinetic = kinetic_energy(m.masses)", f"potential = potential_energy(m.masses, {s}p)"]
+        rows += ["return (", *(f"    {output.value}," for output in self.all()), ")"]
+        signature = "outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]"
+        return function(signature, "Compute all real outputs, in the order of the interface.", rows)

@@ -6,7 +6,6 @@ import hashlib
 import importlib
 import re
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
 from linkwork import planar
@@ -23,7 +22,8 @@ from .laws import FUNCTIONS
 from .outputs import Outputs
 from .parameters import Drive, interface, size
 from .structure import Structure, analyse
-from .variables import Variables, quoted
+from .variables import Variables
+from .writing import function, listed, quoted
 
 _FRICTION = ("FRICTION_RATE", "FRICTION_SPEED", "lesser")
 
@@ -143,10 +143,6 @@ MECHANISM = Mechanism(
 '''
 
 
-def _lines(texts: Iterable[str], indent: int = 4, end: str = ",") -> str:
-    return "\n".join(f"{' ' * indent}{text}{end}" for text in texts)
-
-
 class Package:
     """The texts of the package of one linkage.
 
@@ -170,9 +166,9 @@ class Package:
         self.description = description
         self.structure: Structure = analyse(description)
         self.interface = interface(description, self.structure)
-        self.motion = Motion(description, self.structure, self.interface)
-        self.picture = Picture(description, self.structure, self.interface)
-        self.variables = Variables(description, self.structure, self.interface)
+        self.motion = Motion(self.interface)
+        self.picture = Picture(self.interface)
+        self.variables = Variables(self.interface)
         equations = self._equations()
         self.files = {"equations.py": equations, "__init__.py": self._mechanism()}
         digest = hashlib.sha256("\0".join(self.files.values()).encode()).hexdigest()
@@ -224,26 +220,18 @@ class Package:
 
     def _equations(self) -> str:
         motion = self.motion
-        sections = [
-            motion.applied(),
-            Places(self.description, self.structure, self.interface).function(),
-            motion.masses(),
-        ]
-        sections += [motion.springs()] if self.description.springs else []
-        sections += [motion.acting(), motion.motion(), motion.forces()]
+        blocks = [*motion.applied(), *Places(self.interface).blocks(), motion.masses()]
+        blocks += motion.springs() if self.description.springs else ()
+        blocks += [*motion.acting(), *motion.motion(), *motion.forces()]
         # of the forces it is only known now which joints have one
         self.outputs = Outputs(motion)
-        sections += [
-            self.outputs.function(),
-            _error_scale(self.interface.drives, *size(self.interface)),
-            self.picture.positions(),
-        ]
-        body = "\n\n\n".join("\n".join(section) for section in sections)
+        scale = _error_scale(self.interface.drives, *size(self.interface))
+        body = "\n\n\n".join([*blocks, self.outputs.function(), scale, self.picture.positions()])
         return _EQUATIONS.format(
             name=self.description.name,
             state=", ".join((*(d.coordinate for d in self.interface.drives), *(d.rate for d in self.interface.drives))),
             imports=_imports(body),
-            constants=_lines((f"{name}: float" for name in self.variables.constants()), end=""),
+            constants=listed((f"{name}: float" for name in self.variables.constants()), end=""),
             body=body,
         )
 
@@ -255,10 +243,10 @@ class Package:
             name=d.name,
             title=title.replace('"', "'").replace("\\", "/"),
             rules=v.rules(),
-            fields=_lines(v.fields(), end=""),
-            values=_lines(v.constants().values(), 12),
-            initial=_lines((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
-            variables=_lines([*v.parameters(), *v.inputs(), *(o.variable for o in self.outputs.all() if o.variable)]),
+            fields=listed(v.fields(), end=""),
+            values=listed(v.constants().values(), 12),
+            initial=listed((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
+            variables=listed([*v.parameters(), *v.inputs(), *(o.variable for o in self.outputs.all() if o.variable)]),
             quoted_name=quoted(d.name),
             quoted_title=quoted(title),
             fmu=quoted("".join(part[:1].upper() + part[1:] for part in re.split(r"[^A-Za-z0-9]+", d.name))),
@@ -266,15 +254,15 @@ class Package:
             started=", ".join(f"{start.name}={start.value!r}" for start in v.starts),
             driven=v.driven(),
             source=quoted(d.source),
-            freedoms=_lines(v.freedoms(), 8),
-            channels=_lines(v.channels(), 8),
-            positions=_lines(map(quoted, v.placing()), 8),
-            joints=_lines(
+            freedoms=listed(v.freedoms(), 8),
+            channels=listed(v.channels(), 8),
+            positions=listed(map(quoted, v.placing()), 8),
+            joints=listed(
                 (f"Joint({quoted(j.name)}, {quoted(j.text)}{self.picture.moves(j.name)})" for j in joints), 12
             ),
-            parts=_lines(parts, 12),
+            parts=listed(parts, 12),
             paths="".join(f"{quoted(name)}, " for name in self.picture.paths()),
-            links=_lines(v.links(), 8),
+            links=listed(v.links(), 8),
         )
 
 
@@ -287,20 +275,22 @@ def _imports(body: str) -> str:
         used = [name for name in names if re.search(rf"\b{name}\b", body)]
         if used:
             found.append(
-                f"from {module} import (\n{_lines(used)}\n)"
+                f"from {module} import (\n{listed(used)}\n)"
                 if len(used) > 4
                 else f"from {module} import {', '.join(used)}"
             )
     return "\n".join(found)
 
 
-def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> Iterable[str]:
+def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> str:
     """Write the function of the magnitudes below which errors are absolute, of a linkage of that size and mass."""
-    yield "def error_scale(parameters: object, x: tuple[float, ...]) -> tuple[float, ...]:"
-    yield '    """Return magnitudes below which errors are absolute, from the size, the mass and the speed at the start."""'
     squares = " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns)
-    yield f"    speed = sqrt(1.0 + {squares or '0.0'})"
-    yield f"    energy = {0.5 * mass * length * length!r} * speed * speed"
     coordinates = ", ".join("1.0" if d.turns else repr(length) for d in drives)
     rates = ", ".join("speed" if d.turns else f"{length!r} * speed" for d in drives)
-    yield f"    return ({coordinates}, {rates}, energy, energy)"
+    rows = (
+        f"speed = sqrt(1.0 + {squares or '0.0'})",
+        f"energy = {0.5 * mass * length * length!r} * speed * speed",
+        f"return ({coordinates}, {rates}, energy, energy)",
+    )
+    doc = "Return magnitudes below which errors are absolute, from the size, the mass and the speed at the start."
+    return function("error_scale(parameters: object, x: tuple[float, ...]) -> tuple[float, ...]", doc, rows)

@@ -84,6 +84,8 @@ class Interface:
 
     Attributes
     ----------
+    description : Description
+    structure : Structure
     parameters : tuple of Parameter
     drives : tuple of Drive
         The freedoms in their order.
@@ -94,11 +96,30 @@ class Interface:
         The same of the centres of mass; bodies without a mass are left out.
     """
 
+    description: Description
+    structure: Structure
     parameters: tuple[Parameter, ...]
     drives: tuple[Drive, ...]
     loads: tuple[Load, ...]
     points: Mapping[str, Mapping[str, tuple[str, str]]]
     centres: Mapping[str, tuple[str, str]]
+
+    def own(self, body: str, point: str) -> tuple[str, str]:
+        """Return the own coordinates of a point of a body; those of its origin where it has no such point."""
+        return self.points[body].get(point, ("0.0", "0.0"))
+
+    def frame(self, body: str, of: str = "") -> str:
+        """Return the expression of the place of a body, a field of the record ``of``."""
+        return f"{of}{body}_frame" if body != GROUND else f"ground({len(self.drives)})"
+
+    def turn(self, body: str, of: str = "") -> str:
+        """Return the expression of the direction of a body, a field of the record ``of``."""
+        return f"{of}{body}_frame.turn" if body != GROUND else f"held(1.0, 0.0, {len(self.drives)})"
+
+    def travel(self, slide: Slider) -> str:
+        """Return the expression of position and velocity of a block on its line, from the places b."""
+        (holder, block), (x, y) = slide.bodies, self.own(slide.bodies[0], slide.through)
+        return f"position_along({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
 
 
 def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...]:
@@ -192,7 +213,8 @@ def interface(description: Description, structure: Structure) -> Interface:
         found.append(Parameter("ground.gravity_direction", "rad", "Direction of gravity", direction, "free"))
     found += _assemblies(description, structure)
     _check_names(found)
-    return Interface(tuple(found), drives, tuple(_loads(description, structure, points)), points, centres)
+    loads = tuple(_loads(description, structure, points))
+    return Interface(description, structure, tuple(found), drives, loads, points, centres)
 
 
 def _joined(description: Description, structure: Structure) -> Iterator[Parameter]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import Description, given
+from .description import given
 from .parameters import Drive, Interface
-from .structure import Pin, Structure, sliders
+from .structure import Pin, sliders
+from .writing import quoted
 
 
 class Start(NamedTuple):
@@ -19,11 +20,6 @@ class Start(NamedTuple):
     rest: float
 
 
-def quoted(text: str) -> str:
-    """Return a text as a literal of Python."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'
-
-
 def display(unit: str) -> str:
     """Return the argument of a variable that names the unit people think in; empty for the unit itself."""
     shown = {"rad": "deg", "rad/s": "rpm"}.get(unit)
@@ -33,8 +29,8 @@ def display(unit: str) -> str:
 class Variables:
     """The variables of one linkage, but for its outputs."""
 
-    def __init__(self, description: Description, structure: Structure, interface: Interface) -> None:
-        self.description, self.structure, self.interface = description, structure, interface
+    def __init__(self, interface: Interface) -> None:
+        self.description, self.structure, self.interface = interface.description, interface.structure, interface
         drives = interface.drives
         self.starts = [Start(_last(d, d.coordinate), d.unit, d.start, d.start) for d in drives]
         self.starts += [Start(_last(d, d.rate), f"{d.unit}/s", d.speed, 0.0) for d in drives]
