@@ -304,9 +304,10 @@ class Motion:
         ]
         rows.append(f"loads = ({', '.join(loads)},)")
         power = " + ".join(f"loads[{k}] * x[{self.n + k}]" for k in n)
-        rows.append(f"return Motion(b, m, a.wrenches, e, loads, a.lost, {power} + a.gained)")
+        rows.append(f"return Motion(b, m, {s}a.wrenches, e, loads, a.lost, {power} + a.gained)")
         numbers = "tuple[float, ...]"
-        fields = {"places": "Places", "masses": "tuple[Mass, ...]", "wrenches": "tuple[Wrench, ...]"}
+        fields = {"places": "Places", "masses": "tuple[Mass, ...]"} | ({"springs": "Springs"} if s else {})
+        fields |= {"wrenches": "tuple[Wrench, ...]"}
         fields |= {"accelerations": numbers, "loads": numbers, "lost": "float", "supplied": "float"}
         doc = "The bodies, forces on them, accelerations of the freedoms and loads on them, power lost and supplied."
         yield record("Motion", doc, fields)

@@ -66,13 +66,14 @@ class Outputs:
         freed = {drive.joint for drive in self.interface.drives}
         for name, joint in sliders(self.structure).items():
             if name not in freed:
-                block, call = joint.bodies[1], self.interface.travel(joint)
+                block = joint.bodies[1]
                 yield Output(
                     f'output("{name}.position", "m", "Position of the {block} on the line of {name}", "", *POSITION)',
-                    f"{call}[0]",
+                    f"{name}_position",
                 )
                 yield Output(
-                    f'output("{name}.velocity", "m/s", "Its rate", "", *RATE, rate_of="{name}.position")', f"{call}[1]"
+                    f'output("{name}.velocity", "m/s", "Its rate", "", *RATE, rate_of="{name}.position")',
+                    f"{name}_velocity",
                 )
         for name, spring in self.description.springs.items():
             if spring.between:
@@ -127,7 +128,10 @@ class Outputs:
     def function(self) -> str:
         """Write the function of all outputs."""
         s = "s, " if self.description.springs else ""
-        rows = ["m = motion(x, i, p)", "f = forces(m, p)", "b = m.places", *(["s = springs(b, x, p)"] if s else [])]
+        rows = ["m = motion(x, i, p)", "f = forces(m, p)", "b = m.places", *(["s = m.springs"] if s else [])]
+        freed = {drive.joint for drive in self.interface.drives}
+        slides = {name: joint for name, joint in sliders(self.structure).items() if name not in freed}
+        rows += [f"{name}_position, {name}_velocity = {self.interface.travel(slides[name])}" for name in slides]
         rows += ["kinetic = kinetic_energy(m.masses)", f"potential = potential_energy(m.masses, {s}p)"]
         rows += ["return (", *(f"    {output.value}," for output in self.all()), ")"]
         signature = "outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]"
