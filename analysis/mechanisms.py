@@ -143,7 +143,7 @@ def _faults_of_equations(m: Mechanism) -> Iterator[str]:
             yield f"the constants are a {type(p).__name__}: they must be a NamedTuple"
             return
         u = (0.0,) * len(m.channels)
-        acting = e.applied(tuple(float(mode.default) for mode in m.modes), u, p)
+        acting = m.idle(p)
         for what, size, found in (
             ("outputs", len(m.output_names), e.outputs(x, acting, 0.0, p)),
             ("derivative", m.size, e.derivative(x, acting, p)),
@@ -160,9 +160,8 @@ def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
         return
     known = next(iter(m.published.values()))
     p, x = known.parameters.constants(), m.state(known.initial)
-    acting = m.equations.applied(tuple(float(mode.default) for mode in m.modes), (0.0,) * len(m.channels), p)
     names = [joint.name for joint in m.drawing.joints]
-    found = m.drawing.positions(x, acting, p)
+    found = m.drawing.positions(x, m.idle(p), p)
     if len(found) != 3 * len(names):
         yield f"its picture has {len(found)} coordinates of {len(names)} joints: it must have three of each"
     parameters = {v.name for v in m.variables if v.causality == "parameter" and v.kind == "Real"}

@@ -12,8 +12,7 @@ WRITERS = {
     "cli": "what a command makes",
     "export": "FMUs and the sources that they are compiled from",
     "probe": "a working folder for an FMU under test",
-    "linkages/package.py": "the package of a described linkage in the cache",
-    "numerics/cache.py": "machine code in the cache, with its hash",
+    "numerics/cache.py": "machine code and packages in the cache",
     "numerics/workers.py": "results of workers in a temporary folder",
     "display.py": "a picture in memory",
 }

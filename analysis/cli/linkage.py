@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from math import asin, degrees
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from .common import handled, say, show_table
+from .common import handled, out_option, say, show_table
+
+if TYPE_CHECKING:
+    from linkwork.mechanism import Mechanism
+
+    from ..linkages import Package
 
 
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False))
 @click.option("--equations", is_flag=True, help="Print the equations, as the FMU carries them, and nothing else.")
-@click.option(
-    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the picture."
-)
+@out_option(help="Folder for the picture.")
 @click.option("--animation", is_flag=True, help="Write an animation too.")
 @handled
 def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
@@ -28,13 +31,14 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
       linkwork linkage linkage.toml
       linkwork linkage linkage.toml --equations > equations.py
     """
-    from ..linkages import load_linkage
+    from ..linkages import load_package
 
-    made = load_linkage(file)
+    package = load_package(file)
+    made = package.mechanism()
     if equations:
-        click.echo(Path(str(made.modules[-1].__file__)).read_text(encoding="utf-8"), nl=False)
+        click.echo(package.files["equations.py"], nl=False)
         return
-    _print_structure(file, made)
+    _print_structure(package)
     _print_reach(made)
     from ..figures import animate, plot
     from ..files import save_figure
@@ -45,16 +49,14 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
         say(f"wrote {animate(made, folder / f'{Path(file).stem}-linkage.gif')}")
 
 
-def _print_structure(file: str, made: Any) -> None:
+def _print_structure(package: Package) -> None:
     """Print the joints, the freedoms and the steps by which the bodies follow."""
-    from ..files import read_tables
-    from ..linkages import Dyad, Geared, Package, described
+    from ..linkages import Dyad, Geared
 
-    package = Package(described(read_tables(file)["linkage"]))
     d, structure = package.description, package.structure
     lost = 3 * len(structure.bodies) - len(structure.freedoms)
     say(
-        f"{made.title}: {len(d.bodies)} moving bodies, {len(structure.joints)} joints; "
+        f"{d.title or d.name}: {len(d.bodies)} moving bodies, {len(structure.joints)} joints; "
         f"3 x {len(structure.bodies)} - {lost} = {len(structure.freedoms)} freedoms by Gruebler's count"
     )
     rows = []
@@ -72,7 +74,7 @@ def _print_structure(file: str, made: Any) -> None:
     show_table("how the bodies follow", ("body", "by", "joints"), rows, words=("body", "by", "joints"))
 
 
-def _print_reach(made: Any) -> None:
+def _print_reach(made: Mechanism) -> None:
     """Print the range of each freedom."""
     from ..linkages import reach
 

@@ -266,7 +266,7 @@ def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
 def _check_start(mechanism: Mechanism, begin: Any) -> None:
     """Make sure that the trace of the start is the start: what NumPy or `float` had to do with it would be lost."""
     for name, known in mechanism.published.items():
-        modes = [float(mode.default) for mode in mechanism.modes]
+        modes = [mode.default for mode in mechanism.modes]
         state = mechanism.state(known.initial)[: 2 * len(mechanism.freedoms)]
         own = [float(getattr(known.parameters, field.name)) for field in fields(known.parameters)]
         constants, _, scale = begin(modes, own, state, [0.0] * len(mechanism.channels))

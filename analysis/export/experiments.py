@@ -10,7 +10,7 @@ from dataclasses import asdict
 from functools import cache
 from math import floor, log10
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
@@ -20,6 +20,7 @@ from ..mechanisms import MECHANISMS
 from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, held_inputs, standard_cases
 from .bill import BILL, TYPE
 from .compatibility import table
+from .description import written
 
 #: Communication steps of an experiment, rows of its reference, and digits of its numbers.
 STEPS, ROWS, DIGITS = 100, 10, 12
@@ -69,7 +70,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
         starts = {v.name: v.start for v in mechanism.variables}
         constant = {name: float(starts[name]) for name in mechanism.input_names}
         add("default", "default experiment", starts, mechanism.experiment[1], lambda number, outputs: constant)
-    files[_EXPERIMENTS[0]] = _xml(root)
+    files[_EXPERIMENTS[0]] = written(root)
     return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()} | {MANIFEST: _manifest()}
 
 
@@ -88,7 +89,7 @@ def _manifest() -> bytes:
     bill = (f"../{BILL.partition('/')[2]}", TYPE, "meta-data", "Bill of materials")
     for source, kind, role, text in (own, bill):
         SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": text})
-    return _xml(root)
+    return written(root)
 
 
 #: The inputs of a step by name, from its number and the outputs at its start.
@@ -153,9 +154,4 @@ def _parameter_set(name: str, values: Mapping[str, Any]) -> bytes:
     for key, value in values.items():
         tag = "ssv:Integer" if isinstance(value, int) else "ssv:Real"
         SubElement(SubElement(listed, "ssv:Parameter", {"name": key}), tag, {"value": repr(value)})
-    return _xml(root)
-
-
-def _xml(root: Element) -> bytes:
-    indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'.encode()
+    return written(root)

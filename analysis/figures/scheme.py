@@ -13,9 +13,9 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from linkwork.mechanism import Mechanism, Part
+from linkwork.parameters import field_name
 
-from ..linkages import reach
-from ..linkages.reach import start
+from ..linkages import Reach, reach
 from ..mechanisms import mechanism_of
 from ..run import Trajectory
 from .animation import check_frames, gif
@@ -51,7 +51,7 @@ def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[st
     drawing = mechanism.drawing
     assert drawing is not None
     p = parameters.constants()
-    acting = mechanism.equations.applied((0.0,) * len(mechanism.modes), (0.0,) * len(mechanism.channels), p)
+    acting = mechanism.idle(p)
     found = np.full((len(coordinates), len(drawing.joints), 3), np.nan)
     rest = (0.0,) * (mechanism.size - len(mechanism.freedoms))
     for row, q in zip(found, coordinates):
@@ -73,7 +73,7 @@ def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array]
         axis.plot(*at[name][1:].T, color=TRACE, linewidth=THIN, zorder=2)
     colours = cycle(COLOURS)
     for part in drawing.parts:
-        if not part.where or _value(mechanism, parameters, part.where) != 0.0:
+        if not part.where or getattr(parameters, field_name(part.where), 0.0) != 0.0:
             _draw_part(axis, part, [now[name] for name in part.joints], unit, colours)
     shown = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")} | set(
         drawing.paths
@@ -87,10 +87,6 @@ def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array]
     axis.margins(0.08)
     axis.set_xlabel("x [mm]")
     axis.set_ylabel("y [mm]")
-
-
-def _value(mechanism: Mechanism, parameters: Any, name: str) -> float:
-    return float(getattr(parameters, name.replace(".", "_", 1), 0.0))
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:
@@ -143,13 +139,11 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
     return f"{mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
 
 
-def _swept(mechanism: Mechanism) -> Array:
+def _swept(mechanism: Mechanism, found: Reach) -> Array:
     """Return coordinates from the start on through the range of the first freedom, the others at their start."""
-    found = reach(mechanism)
-    q = np.linspace(found.low, found.high, _TRACED)
-    middle = start(mechanism)
-    rows = np.tile(middle, (_TRACED + 1, 1))
-    rows[1:, 0] = q
+    known = next(iter(mechanism.published.values()))
+    rows = np.tile(mechanism.state(known.initial)[: len(mechanism.freedoms)], (_TRACED + 1, 1))
+    rows[1:, 0] = np.linspace(found.low, found.high, _TRACED)
     return rows
 
 
@@ -160,7 +154,9 @@ def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
     with styled():
         figure = Figure(figsize=(1.3 * _SIDE, _SIDE))
         axis = figure.add_subplot()
-        draw(axis, mechanism, known.parameters, places(mechanism, known.parameters, _swept(mechanism)))
+        draw(
+            axis, mechanism, known.parameters, places(mechanism, known.parameters, _swept(mechanism, reach(mechanism)))
+        )
         write_title(figure, title or mechanism.title)
         return finish(figure)
 
@@ -173,7 +169,7 @@ def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: st
         for number, mechanism in enumerate(mechanisms):
             axis = figure.add_subplot(rows, columns, number + 1)
             known = next(iter(mechanism.published.values()))
-            at = places(mechanism, known.parameters, _swept(mechanism))
+            at = places(mechanism, known.parameters, _swept(mechanism, reach(mechanism)))
             draw(axis, mechanism, known.parameters, at, letters=False)
             axis.set_axis_off()
             axis.set_title(mechanism.name, fontsize=SMALL)
@@ -192,10 +188,11 @@ def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, 
     """
     check_frames(frames)
     known = next(iter(mechanism.published.values()))
-    swept = _swept(mechanism)[1:]
+    found = reach(mechanism)
+    swept = _swept(mechanism, found)[1:]
     at = places(mechanism, known.parameters, swept)
     order = np.linspace(0, len(swept) - 1, frames).astype(int)
-    if not reach(mechanism).turns:
+    if not found.turns:
         order = np.concatenate([order, order[::-1]])
     points = np.concatenate(list(at.values()))
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)

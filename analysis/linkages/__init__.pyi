@@ -3,11 +3,11 @@ from .builder import described as described
 from .builder import described_in as described_in
 from .builder import linkage as linkage
 from .builder import load_linkage as load_linkage
+from .builder import load_package as load_package
 from .builder import with_linkage as with_linkage
 from .description import Description as Description
 from .description import LinkageError as LinkageError
 from .package import Package as Package
-from .package import mechanism as mechanism
 from .reach import Reach as Reach
 from .reach import reach as reach
 from .sections import SECTIONS as SECTIONS

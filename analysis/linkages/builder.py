@@ -11,7 +11,7 @@ from linkwork.mechanism import Mechanism
 
 from .. import files
 from .description import Description
-from .package import mechanism
+from .package import Package
 
 LINKAGE = "linkage"
 
@@ -46,18 +46,28 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     if not described_in(tables):
         return tables
     own = tables[LINKAGE]
-    made = load_linkage(folder / own) if isinstance(own, str) else _compiled(tables)
+    made = (load_package(folder / own) if isinstance(own, str) else _package(tables)).mechanism()
     return {"published": made.name, **{name: value for name, value in tables.items() if name != LINKAGE}}
 
 
-def _compiled(tables: Mapping[str, Any]) -> Mechanism:
-    """Compile the linkage in the tables of a file, whose title is its own where it has no other."""
+def _package(tables: Mapping[str, Any]) -> Package:
+    """Return the package of the linkage in the tables of a file, whose title is its own where it has no other."""
     title = {"title": tables["title"]} if "title" in tables else {}
-    return mechanism(described({**title, **tables[LINKAGE]}))
+    return Package(described({**title, **tables[LINKAGE]}))
 
 
 def load_linkage(path: str | Path) -> Mechanism:
-    """Compile the linkage that a file describes; see `docs/linkages.md`.
+    """Compile the linkage that a file describes, or names the file of; see `docs/linkages.md`.
+
+    Raises
+    ------
+    InputError, LinkageError, ParameterError
+    """
+    return load_package(path).mechanism()
+
+
+def load_package(path: str | Path) -> Package:
+    """Return the package of the linkage that a file describes, or names the file of.
 
     Raises
     ------
@@ -69,7 +79,7 @@ def load_linkage(path: str | Path) -> Mechanism:
         tables = files.read_tables(path)
     if not isinstance(tables.get(LINKAGE), Mapping) or not described_in(tables):
         raise InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
-    return _compiled(tables)
+    return _package(tables)
 
 
 class Builder:
@@ -125,7 +135,7 @@ class Builder:
         ------
         LinkageError, ParameterError
         """
-        return mechanism(described(self.tables))
+        return Package(described(self.tables)).mechanism()
 
 
 def linkage(name: str, ground: Mapping[str, Any], **entries: Any) -> Builder:

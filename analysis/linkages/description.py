@@ -94,47 +94,49 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slide:
-    """A body that slides along a straight line of another without turning against it.
+class Line:
+    """A straight line of a body.
 
     Attributes
     ----------
-    body : str
-        The block: its origin is on the line, and its x axis along it.
     on : str
-        The body that holds the line.
+        The body.
     through : str
-        A point of that body on the line, the zero of the position.
+        A point of the body on the line, the zero of positions along it.
     direction : float
-        Of the line in that body (rad).
+        Of the line in the body (rad).
     """
 
-    body: str = entry(_name)
-    on: str = entry(_name, GROUND)
+    on: str = entry(_name)
     through: str = entry(_name)
     direction: float = entry(Quantity("rad"), 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slot:
-    """A pin of one body in a straight slot of another.
+class Slide(Line):
+    """A body that slides along a line of another, by default of the ground, without turning against it.
+
+    Attributes
+    ----------
+    body : str
+        The block: its origin is on the line, and its x axis along it.
+    """
+
+    on: str = entry(_name, GROUND)
+    body: str = entry(_name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slot(Line):
+    """A straight slot of a body, and a pin of another in it.
 
     Attributes
     ----------
     pin : str
         The point in the slot.
-    on : str
-        The body that has the slot.
-    through : str
-        A point of that body on the line of the slot.
-    direction : float
-        Of the slot in that body (rad).
     """
 
     pin: str = entry(_name)
-    on: str = entry(_name)
-    through: str = entry(_name)
-    direction: float = entry(Quantity("rad"), 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

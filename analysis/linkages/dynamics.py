@@ -258,7 +258,7 @@ class Motion:
         pins = [
             j
             for j in self.structure.joints.values()
-            if isinstance(j, Pin) and {step.mate, step.carrier} <= set(j.bodies)
+            if isinstance(j, Pin) and {step.mate, step.parent} <= set(j.bodies)
         ]
         ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
         return f"mesh(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"

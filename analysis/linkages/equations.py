@@ -100,7 +100,7 @@ class Places:
     def geared(self, step: Geared) -> None:
         """Write the place of a gear from the angle of its mate."""
         ratio, phase = f"p.{step.gear}_ratio", f"p.{step.gear}_phase"
-        (mate, mate_constants), (carrier, carrier_constants) = self.angles[step.mate], self.angles[step.carrier]
+        (mate, mate_constants), (carrier, carrier_constants) = self.angles[step.mate], self.angles[step.parent]
         terms: dict[int, str] = {}
         factor = f"1.0 / {ratio}" if step.inverse else ratio
         for number in mate.keys() | carrier.keys():

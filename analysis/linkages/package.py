@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from linkwork import planar
-from linkwork.errors import AssemblyError
+from linkwork.errors import AssemblyError, LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import MECHANISMS, register
-from ..numerics.cache import code_folder
+from ..numerics.cache import code_folder, put
 from .description import Description, LinkageError
 from .drawing import Picture
 from .dynamics import Motion
@@ -175,9 +175,52 @@ class Package:
         self.variables = Variables(description, self.structure, self.interface)
         equations = self._equations()
         self.files = {"equations.py": equations, "__init__.py": self._mechanism()}
-        library = Path(str(planar.__file__)).read_text(encoding="utf-8")
-        digest = hashlib.sha256("\0".join((*self.files.values(), library)).encode()).hexdigest()
+        digest = hashlib.sha256("\0".join(self.files.values()).encode()).hexdigest()
         self.name = f"{re.sub(r'[^a-z0-9]', '_', description.name.lower())}_{digest[:12]}"
+
+    def mechanism(self, folder: Path | None = None) -> Mechanism:
+        """Return the mechanism, registered.
+
+        Parameters
+        ----------
+        folder : path, optional
+            Where the package is kept; by default below the user's cache.
+
+        Raises
+        ------
+        LinkageError
+            If the bodies cannot be joined at the start, or a mechanism of Linkwork has the name.
+        """
+        name = self.description.name
+        known = MECHANISMS.get(name)
+        if known is not None and known.modules[-1].__package__ == self.name:
+            return known
+        if known is not None and not hasattr(sys.modules[str(known.modules[-1].__package__)], "equations"):
+            raise LinkageError(f"linkage.name is {name}: it must not be that of a mechanism of Linkwork")
+        place = code_folder("linkages") if folder is None else Path(folder)
+        own = place / self.name
+        own.mkdir(parents=True, exist_ok=True)
+        for file, text in self.files.items():
+            if not (own / file).is_file() or (own / file).read_text(encoding="utf-8") != text:
+                put(own / file, text.encode())
+        if str(place) not in sys.path:
+            sys.path.append(str(place))
+        importlib.invalidate_caches()
+        made: Mechanism = importlib.import_module(self.name).MECHANISM
+        start = made.published[name]
+        try:
+            made.check_assembly(start.parameters, made.state(start.initial))
+        except AssemblyError as error:
+            signs = ", the assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
+            raise LinkageError(f"{error}: the start{signs} or the lengths must be others") from None
+        MECHANISMS.pop(name, None)
+        try:
+            register(made)
+        except LinkworkError:
+            if known is not None:
+                MECHANISMS[name] = known
+            raise
+        return made
 
     def _equations(self) -> str:
         motion = self.motion
@@ -261,49 +304,3 @@ def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> Itera
     coordinates = ", ".join("1.0" if d.turns else repr(length) for d in drives)
     rates = ", ".join("speed" if d.turns else f"{length!r} * speed" for d in drives)
     yield f"    return ({coordinates}, {rates}, energy, energy)"
-
-
-def mechanism(description: Description, folder: Path | None = None) -> Mechanism:
-    """Return the mechanism of a description, registered.
-
-    Parameters
-    ----------
-    description : Description
-    folder : path, optional
-        Where its package is kept; by default below the user's cache.
-
-    Raises
-    ------
-    LinkageError, ParameterError
-        If the description is wrong, or another mechanism has the name.
-    """
-    package = Package(description)
-    known = MECHANISMS.get(description.name)
-    if known is not None and known.modules[-1].__package__ == package.name:
-        return known
-    if known is not None and not hasattr(sys.modules[str(known.modules[-1].__package__)], "equations"):
-        raise LinkageError(f"linkage.name is {description.name}: it must not be that of a mechanism of Linkwork")
-    place = code_folder("linkages") if folder is None else Path(folder)
-    own = place / package.name
-    own.mkdir(parents=True, exist_ok=True)
-    for name, text in package.files.items():
-        if not (own / name).is_file() or (own / name).read_text(encoding="utf-8") != text:
-            (own / name).write_text(text, encoding="utf-8")
-    if str(place) not in sys.path:
-        sys.path.append(str(place))
-    importlib.invalidate_caches()
-    made: Mechanism = importlib.import_module(package.name).MECHANISM
-    start = made.published[description.name]
-    try:
-        made.check_assembly(start.parameters, made.state(start.initial))
-    except AssemblyError as error:
-        signs = "" if package.structure.dyads else ", another assembly"
-        raise LinkageError(f"{error}: the start must be another{signs}, or the lengths") from None
-    MECHANISMS.pop(description.name, None)
-    try:
-        register(made)
-    except LinkageError:
-        if known is not None:
-            MECHANISMS[known.name] = known
-        raise
-    return made

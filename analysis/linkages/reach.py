@@ -6,7 +6,6 @@ from math import pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from linkwork.limits import LIMIT_SINE
@@ -34,25 +33,6 @@ class Reach(NamedTuple):
     least: float
 
 
-def clearance(mechanism: Mechanism, x: NDArray[np.float64]) -> float:
-    """Return the clearance of the start at other coordinates; -1 where the bodies do not reach each other."""
-    known = next(iter(mechanism.published.values()))
-    p = known.parameters.constants()
-    acting = mechanism.equations.applied(
-        tuple(float(mode.default) for mode in mechanism.modes), (0.0,) * len(mechanism.channels), p
-    )
-    try:
-        return float(mechanism.equations.clearance((*x, *(0.0,) * (mechanism.size - len(x))), acting, p))
-    except (ArithmeticError, ValueError):
-        return -1.0
-
-
-def start(mechanism: Mechanism) -> NDArray[np.float64]:
-    """Return the coordinates at the start."""
-    known = next(iter(mechanism.published.values()))
-    return np.array(mechanism.state(known.initial)[: len(mechanism.freedoms)])
-
-
 def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, samples: int = 360) -> Reach:
     """Find the range of a freedom.
 
@@ -68,14 +48,20 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     period = mechanism.freedoms[freedom].period
     if most is None:
         most = pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0
-    ends, least = [], clearance(mechanism, start(mechanism))
+    known = next(iter(mechanism.published.values()))
+    p = known.parameters.constants()
+    acting, x = mechanism.idle(p), list(mechanism.state(known.initial))
+    middle = x[freedom]
 
     def margin(q: float) -> float:
-        x = start(mechanism)
+        """Return the clearance to the limit at a coordinate; less than -1 where the bodies do not reach each other."""
         x[freedom] = q
-        return clearance(mechanism, x) - LIMIT_SINE
+        try:
+            return float(mechanism.equations.clearance(x, acting, p)) - LIMIT_SINE
+        except (ArithmeticError, ValueError):
+            return -1.0 - LIMIT_SINE
 
-    middle = float(start(mechanism)[freedom])
+    ends, least = [], margin(middle) + LIMIT_SINE
     for sign in (-1.0, 1.0):
         before = middle
         for q in middle + sign * most * np.arange(1, samples + 1) / samples:

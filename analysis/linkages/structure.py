@@ -43,14 +43,13 @@ class Freed(NamedTuple):
 
 
 class Geared(NamedTuple):
-    """A gear that follows from its mate's angle, pinned to ``parent``; ``inverse`` where the mate is the second of the pair."""
+    """A gear that follows from its mate's angle, both on ``parent``; ``inverse`` where the mate is the second of the pair."""
 
     body: str
     parent: str
     pin: Pin
     gear: str
     mate: str
-    carrier: str
     inverse: bool
 
 
@@ -294,7 +293,7 @@ def _geared(
             for pin in pins:
                 carriers = [c for c in pin.bodies if body in pin.bodies and c in linear and c != mate]
                 if carriers:
-                    yield Geared(body, carriers[0], pin, name, mate, carriers[0], inverse)
+                    yield Geared(body, carriers[0], pin, name, mate, inverse)
 
 
 def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tuple[Joint, str, str]]:

@@ -39,15 +39,20 @@ def code_folder(name: str) -> Path:
     return Path(tempfile.mkdtemp(prefix="linkwork-"))
 
 
-def keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache, complete or not at all; where the disk is full or read-only it is made again the next time."""
+def put(path: Path, content: bytes) -> None:
+    """Write a file, complete or not at all."""
     part = path.with_suffix(f".{os.getpid()}")
+    try:
+        part.write_bytes(content)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def keep(path: Path, content: bytes) -> None:
+    """Write a file of the cache as `put`; where the disk is full or read-only it is made again the next time."""
     with suppress(OSError):
-        try:
-            part.write_bytes(content)
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
+        put(path, content)
 
 
 def hashes_below(folder: Path) -> dict[str, str]:

@@ -65,11 +65,11 @@ def _swept(
         for j in n
     )
     right = tuple((forces[j][0] * smooth[j][0] + forces[j][1] * smooth[j][1] + least) / size[j] for j in n)
-    return _solved(matrix, right)
+    return solved(matrix, right)
 
 
-def _solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
-    """Solve linear equations by elimination without pivoting, for diagonally dominant matrices."""
+def solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
+    """Solve linear equations without pivoting; the matrix is diagonally dominant, or symmetric positive definite."""
     if not right:
         return ()
     first, *rows = matrix
@@ -79,5 +79,5 @@ def _solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> 
         factor = row[0] / first[0]
         reduced.append(tuple(a - factor * b for a, b in zip(row[1:], first[1:])))
         values.append(value - factor * right[0])
-    rest = _solved(tuple(reduced), tuple(values))
+    rest = solved(tuple(reduced), tuple(values))
     return ((right[0] - sum(a * b for a, b in zip(first[1:], rest))) / first[0], *rest)

@@ -341,6 +341,11 @@ class Mechanism:
             return JAMMING
         return ASSEMBLY
 
+    def idle(self, p: Any) -> Any:
+        """What acts on the mechanism with constants p where all inputs are zero and the modes are the default ones."""
+        modes = tuple(float(mode.default) for mode in self.modes)
+        return self.equations.applied(modes, (0.0,) * len(self.channels), p)
+
     def check_state(self, parameters: Any, x: Sequence[float], i: Any, p: Any) -> None:
         """Make sure that the links can be joined and do not jam, clear of the limit of either.
 

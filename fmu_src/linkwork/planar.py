@@ -18,6 +18,7 @@ from math import asin, atan2, cos, degrees, fabs, sin, sqrt
 from typing import Any, NamedTuple
 
 from .errors import AssemblyError
+from .friction import solved
 from .limits import LIMIT_SINE
 
 
@@ -393,17 +394,6 @@ def accelerations(matrix: Matrix, forces: Rates, held: Rates, given: Rates) -> t
         free[i] * (forces[i] - sum(matrix[i][j] * held[j] * given[j] for j in n)) + held[i] * given[i] for i in n
     )
     return solved(rows, right)
-
-
-def solved(matrix: Matrix, right: Rates) -> tuple[float, ...]:
-    """Solve linear equations with a symmetric positive definite matrix, by elimination without pivoting."""
-    if not right:
-        return ()
-    first, *rows = matrix
-    factors = [row[0] / first[0] for row in rows]
-    reduced = tuple(tuple(a - f * b for a, b in zip(row[1:], first[1:])) for f, row in zip(factors, rows))
-    rest = solved(reduced, tuple(value - f * right[0] for f, value in zip(factors, right[1:])))
-    return ((right[0] - sum(a * b for a, b in zip(first[1:], rest))) / first[0], *rest)
 
 
 def multiplied(matrix: Matrix, values: Rates) -> tuple[float, ...]:

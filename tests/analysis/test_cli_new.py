@@ -115,6 +115,8 @@ def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tm
     assert "coupler, rocker" in linkwork("linkage", "linkage.toml").output
     assert (tmp_path / "out" / "linkage-linkage.png").is_file()
     assert "def places(" in linkwork("linkage", "linkage.toml", "--equations").output
+    (tmp_path / "case.toml").write_text('linkage = "linkage.toml"\n')
+    assert "coupler, rocker" in linkwork("linkage", "case.toml").output
     assert linkwork("run", "linkage.toml", "--no-plot").exit_code == 0
     text = (tmp_path / "linkage.toml").read_text()
     for kind in (Body, Slide, Slot, Gear, Spring, Description):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.linkages import Package, described, linkage, load_linkage, mechanism
+from analysis.linkages import Package, described, linkage, load_linkage
 from analysis.mechanisms import FIVE_BAR, check
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import LinkworkError
@@ -120,7 +120,7 @@ def test_many_random_linkages_move_as_with_multipliers(tmp_path, first):
 def test_random_linkages_keep_their_energy(tmp_path, seed):
     """Energy gained and lost is that supplied, over a run of the compiled solver from rest."""
     package, _ = assembled(seed, tmp_path, name=f"random-{seed}")
-    made = mechanism(package.description, tmp_path)
+    made = package.mechanism(tmp_path)
     known = made.published[made.name]
     modes = dict.fromkeys((freedom.mode.arguments[0] for freedom in made.freedoms if freedom.mode), 0.0)
     run = simulate(known.parameters, Inputs(**modes), initial=known.initial, stop_time=0.05, step=1e-3, tolerance=1e-11)
@@ -163,7 +163,7 @@ def five_bar(p: Any) -> dict[str, Any]:
 
 def test_described_five_bar_is_the_hand_written_one(tmp_path):
     base = FIVE_BAR.published["table-3.1"].parameters
-    made = mechanism(described(five_bar(base)), tmp_path)
+    made = Package(described(five_bar(base))).mechanism(tmp_path)
     by_hand = replace(
         base, crank_mass=0.3, crank_cog_distance=0.02, slider_guide_angle=0.3, slider_spring_free_position=0.002,
         coupler_cog_distance=math.hypot(base.coupler_cog_distance, 0.001), slider_coulomb_friction=0.7,
@@ -211,7 +211,7 @@ def test_described_five_bar_costs_little_more():
         ids = [f.instruction_id(n) for n in range(f.n_instructions())]
         return sum(code not in (casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST) for code in ids)
 
-    made = mechanism(described(five_bar(FIVE_BAR.published["table-3.1"].parameters)))
+    made = Package(described(five_bar(FIVE_BAR.published["table-3.1"].parameters))).mechanism()
     assert operations(made) <= 1.3 * operations(FIVE_BAR)
 
 
@@ -324,7 +324,7 @@ MISTAKES = [
 @pytest.mark.parametrize(("path", "value", "named"), MISTAKES, ids=[f"{n}-{m[0]}" for n, m in enumerate(MISTAKES)])
 def test_mistakes_are_named(tmp_path, path, value, named):
     with pytest.raises(LinkworkError) as error:
-        mechanism(described(changed(path, value)), tmp_path)
+        Package(described(changed(path, value))).mechanism(tmp_path)
     assert named in str(error.value)
 
 
@@ -343,10 +343,10 @@ def test_other_freedoms_are_proposed(tmp_path):
         "freedoms": {"lever": "F"},
     }
     with pytest.raises(LinkworkError, match="A or D") as error:
-        mechanism(described(data), tmp_path)
+        Package(described(data)).mechanism(tmp_path)
     assert all(body in str(error.value) for body in ("crank", "coupler", "rocker", "link"))
     # left to itself the linkage takes one that does
-    made = mechanism(described({k: v for k, v in data.items() if k != "freedoms"}), tmp_path)
+    made = Package(described({k: v for k, v in data.items() if k != "freedoms"})).mechanism(tmp_path)
     assert made.freedoms[0].coordinate == "crank.angle"
 
 
