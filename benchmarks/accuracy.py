@@ -62,7 +62,7 @@ def _in_turn(equation, modes, constants, states, forces):
     for i in range(states.shape[0]):
         for j in range(x.shape[0]):
             x[j] = states[i, j] + 0.0 * out[j]
-        evaluate(equation, 0.0, x, modes, forces, constants, out)
+        evaluate(equation, 0.0, x, modes, forces, constants, out)  # type: ignore[call-arg]  # Numba adds the first
     return out
 
 
