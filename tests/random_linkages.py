@@ -15,11 +15,13 @@ class Maker:
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
         self.data: dict[str, Any] = {"name": "random-linkage", "ground": {}, "bodies": {}, "freedoms": {}}
-        self.data |= {"slides": {}, "slots": {}, "gears": {}, "springs": {}, "assembly": {}, "loads": []}
+        self.data |= {"slides": {}, "slots": {}, "gears": {}, "racks": {}, "springs": {}, "assembly": {}, "loads": []}
         self.places: dict[str, tuple[float, float, float]] = {"ground": (0.0, 0.0, 0.0)}
         self.count = 0
         #: bodies with angles that are linear in the freedoms, pinned to the ground: mates of gears
         self.mates: list[tuple[str, np.ndarray]] = []
+        #: bodies that freedoms pin to others: gears of racks
+        self.pinned: list[tuple[str, str]] = []
 
     def name(self, prefix: str) -> str:
         self.count += 1
@@ -82,17 +84,10 @@ class Maker:
         joint = self.joined(kind, base, body)
         start = self.places[body][2] - self.places[base][2]
         if kind == "P":
-            s = self.data["slides"][joint]
-            block, points = (
-                s["body"],
-                self.data["ground"] if s["on"] == "ground" else self.data["bodies"][s["on"]]["points"],
-            )
-            x, y, angle = self.places[s["on"]]
-            ox, oy = points[s["through"]]
-            ox, oy = x + np.cos(angle) * ox - np.sin(angle) * oy, y + np.sin(angle) * ox + np.cos(angle) * oy
-            bx, by, turn = self.places[block]
-            start = (bx - ox) * np.cos(turn) + (by - oy) * np.sin(turn)
-        elif base == "ground":
+            start = self.position(joint)
+        else:
+            self.pinned.append((body, base))
+        if kind == "R" and base == "ground":
             self.mates.append((body, self.place_of("ground", joint)))
         self.data["freedoms"][self.name("f")] = {
             "joint": joint,
@@ -100,13 +95,22 @@ class Maker:
             "driven": bool(self.rng.uniform() < 0.6),
         }
 
+    def position(self, slide: str) -> float:
+        """Position of a slide at the places of its bodies."""
+        s = self.data["slides"][slide]
+        x, y, angle = self.places[s["on"]]
+        ox, oy = self.place_of(s["on"], s["through"])
+        ox, oy = x + np.cos(angle) * ox - np.sin(angle) * oy, y + np.sin(angle) * ox + np.cos(angle) * oy
+        bx, by, turn = self.places[s["body"]]
+        return float((bx - ox) * np.cos(turn) + (by - oy) * np.sin(turn))
+
     def place_of(self, body: str, own: str) -> np.ndarray:
         points = self.data["ground"] if body == "ground" else self.data["bodies"][body]["points"]
         return np.array(points[own])
 
     def dyad(self, kind: str) -> None:
-        if kind == "gear":
-            return self.gear()
+        if kind in ("gear", "rack"):
+            return self.gear() if kind == "gear" else self.rack()
         if kind == "slot":
             base, other, body = self.known(), self.known(), self.new()
             self.pin(base, body)
@@ -147,6 +151,25 @@ class Maker:
         ratio = float(self.rng.choice([-1.0, -0.5, 1.5, 2.0]))
         phase = self.places[body][2] - ratio * self.places[mate][2]
         self.data["gears"][self.name("g")] = {"bodies": [mate, body], "ratio": ratio, "phase": float(phase)}
+
+    def rack(self) -> None:
+        """A rack on the carrier of a pinned freedom, or a gear on either body of a slide."""
+        slides = list(self.data["slides"])
+        if self.pinned and (not slides or self.rng.uniform() < 0.5):
+            gear, carrier = self.pinned[int(self.rng.integers(len(self.pinned)))]
+            rack = self.new()
+            slide = self.joined("P", carrier, rack)
+        elif slides:
+            slide = str(self.rng.choice(slides))
+            ends = [self.data["slides"][slide][part] for part in ("on", "body")]
+            gear = self.new()
+            carrier, rack = ends if ends[1] == "ground" or self.rng.uniform() < 0.5 else ends[::-1]
+            self.pin(carrier, gear)
+        else:
+            return
+        radius = float(self.rng.uniform(0.05, 0.2) * self.rng.choice([-1.0, 1.0]))
+        offset = self.position(slide) - radius * (self.places[gear][2] - self.places[carrier][2])
+        self.data["racks"][self.name("r")] = {"gear": gear, "rack": rack, "radius": radius, "offset": offset}
 
     def actions(self) -> None:
         """Springs, dampers, a load and gravity."""

@@ -51,7 +51,7 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
 
 def _print_structure(package: Package) -> None:
     """Print the joints, the freedoms and the steps by which the bodies follow."""
-    from ..linkages import Dyad, Geared
+    from ..linkages import Dyad, Geared, Racked
 
     d, structure = package.description, package.structure
     lost = 3 * len(structure.bodies) - len(structure.freedoms)
@@ -67,6 +67,9 @@ def _print_structure(package: Package) -> None:
             rows.append((bodies, f"dyad {step.kind}", f"held at {outer}, joined at {step.inner.name}"))
         elif isinstance(step, Geared):
             rows.append((step.body, "gear", f"pinned at {step.pin.name}, geared to {step.mate}"))
+        elif isinstance(step, Racked):
+            by = "rack" if step.turns else "gear"
+            rows.append((step.body, step.rack, f"held at {step.joint.name}, moved by the {by} {step.mate}"))
         else:
             freedom = package.interface.drives[step.freedom]
             driven = f", driven as {freedom.table}" if freedom.table else ""

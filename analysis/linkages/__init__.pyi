@@ -15,4 +15,5 @@ from .sections import Made as Made
 from .sections import millimetres as millimetres
 from .structure import Dyad as Dyad
 from .structure import Geared as Geared
+from .structure import Racked as Racked
 from .template import TEXT as TEXT

@@ -120,6 +120,10 @@ class Builder:
         """Add a pair of gears: ``bodies``, ``ratio``, ``phase``."""
         return self._add("gears", name, entries)
 
+    def rack(self, name: str, **entries: Any) -> Builder:
+        """Add a toothed rack: ``gear``, ``rack``, ``radius``, ``offset``."""
+        return self._add("racks", name, entries)
+
     def spring(self, name: str, **entries: Any) -> Builder:
         """Add a spring with damper and friction: ``at`` or ``between``, ``stiffness``, ``free``, ``damping``, ``friction``."""
         return self._add("springs", name, entries)

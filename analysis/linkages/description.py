@@ -159,6 +159,26 @@ class Gear:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rack:
+    """A toothed rack and its gear, on one body: the rack slides on it, or it on the rack, and the gear is pinned to it.
+
+    Attributes
+    ----------
+    gear, rack : str
+        The bodies.
+    radius : float
+        Pitch radius of the gear (m): travel of the slide by the angle of the gear, seen from the third body; of either sign.
+    offset : float
+        Position of the slide at which that angle is zero (m).
+    """
+
+    gear: str = entry(_name)
+    rack: str = entry(_name)
+    radius: float = entry(Quantity("m"))
+    offset: float = entry(Quantity("m"), 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Spring:
     """A spring with a damper and dry friction: between two points, about a pin or along a slide.
 
@@ -230,7 +250,7 @@ class Description:
         What it is, and where it is from.
     ground : mapping of str to (x, y)
         Points of the ground (m).
-    bodies, slides, slots, gears, springs : mapping
+    bodies, slides, slots, gears, racks, springs : mapping
         By name.
     freedoms : mapping of str to FreedomTable
         By name, one to four; where none are given they are proposed.
@@ -252,6 +272,7 @@ class Description:
     slides: Mapping[str, Slide] = entry(_named(Table(Slide)), factory=dict)
     slots: Mapping[str, Slot] = entry(_named(Table(Slot)), factory=dict)
     gears: Mapping[str, Gear] = entry(_named(Table(Gear)), factory=dict)
+    racks: Mapping[str, Rack] = entry(_named(Table(Rack)), factory=dict)
     springs: Mapping[str, Spring] = entry(_named(Table(Spring)), factory=dict)
     freedoms: Mapping[str, FreedomTable] = entry(_named(_freedom), factory=dict)
     assembly: Mapping[str, int] = entry(_named(files.Whole()), factory=dict)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .description import GROUND, given
 from .parameters import Interface, size
-from .structure import Freed, Pin, sliders
+from .structure import Freed, Pin, on_one_body, sliders
 from .writing import function, quoted
 
 
@@ -45,6 +45,12 @@ class Picture:
             parts.append(f'Part("guide", ("{joint.through}", "{name}End"), "line of {name}")')
             parts += [f'Part("spring", {along}, "{own}", "{own}.stiffness")' for own in springs]
             parts.append(f'Part("slider", {along}, "{block}")')
+        for name, rack in d.racks.items():
+            pin, slide, _ = on_one_body(name, rack, self.structure.joints)
+            side, line = "" if slide.bodies[1] == rack.rack else "-", f"b.{slide.name}_line"
+            x, y = (f"b.at_{pin.name}.{c} {s} {side}p.{name}_radius * {line}.{t}" for c, s, t in ("x+s", "y-c"))
+            joints.append(Marked(f"{name}Pitch", f"pitch point of {name}", f"*({x}, {y}, 0.0)"))
+            parts.append(f'Part("axis", ("{pin.name}", "{name}Pitch"), "radius of {rack.gear}")')
         parts += [f'Part("pivot", ("{own}",), "bearing {own}")' for own in d.ground if own in self.structure.joints]
         parts += [f'Part("axis", {s.between!r}, "{name}")' for name, s in d.springs.items() if s.between]
         for name, body in d.bodies.items():

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from .description import GROUND, Description, Spring, given
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Joint, Pin, Side
+from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side
 from .writing import function, record, tupled
 
 
@@ -35,6 +35,7 @@ class Motion:
         self.along = springs_at(self.description, interface)
         self.bodies = tuple(self.description.bodies)
         self.reactions: list[Reaction] = []
+        self.racked: list[Racked] = []
 
     def owner(self, own: str) -> str:
         """Return a body that has a point, one that moves if there is one."""
@@ -210,6 +211,13 @@ class Motion:
                 if step.mate != GROUND:
                     rows.append(f"on_{step.mate} = added(on_{step.mate}, on_teeth)")
                 supported(step.pin, step.parent, step.body)
+            elif isinstance(step, Racked):
+                rows.append(f"in_{step.rack} = {self._teeth(step)}")
+                self.racked.append(step)
+                rows.append(f"on_{step.body} = less(on_{step.body}, in_{step.rack})")
+                if step.mate != GROUND:
+                    rows.append(f"on_{step.mate} = added(on_{step.mate}, in_{step.rack})")
+                supported(step.joint, step.parent, step.body)
             else:
                 first, second = step.ends
                 reaction(step.inner, second, first, self._inner(step))
@@ -220,7 +228,7 @@ class Motion:
                     for inside in reversed(side.inside):
                         supported(inside.joint, inside.parent, inside.body)
                     supported(side.joint, side.parent, side.body)
-        names = [f"in_{r.name}" for r in self.reactions]
+        names = [f"in_{r.name}" for r in self.reactions] + [f"in_{r.rack}" for r in self.racked]
         doc = "Forces in the joints, each of one body on another, and their moments about the ground's origin."
         yield record("Forces", doc, dict.fromkeys(names, "Wrench"))
         doc = "Compute the forces in all joints, from the last dyad back to the ground."
@@ -234,6 +242,13 @@ class Motion:
         ]
         ratio = f"1.0 / p.{step.gear}_ratio" if step.inverse else f"p.{step.gear}_ratio"
         return f"mesh(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
+
+    def _teeth(self, step: Racked) -> str:
+        """Return the force of its mate on a rack or a gear."""
+        side = "" if step.slide.bodies[0] == step.parent else "-"
+        call = "rack_on_gear" if step.turns else "gear_on_rack"
+        line = f"b.{step.slide.name}_line"
+        return f"{call}(b.at_{step.pin.name}, {line}, {side}p.{step.rack}_radius, on_{step.body})"
 
     def _inner(self, step: Dyad) -> str:
         def total(side: Side) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from .description import GROUND
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Pin, Side, Slider, sliders
+from .structure import Dyad, Freed, Geared, Pin, Racked, Side, Slider, sliders
 from .writing import function, record
 
 
@@ -21,6 +21,8 @@ class Places:
         self.places: dict[str, str] = {}
         #: of bodies whose angles are linear: coefficients of the coordinates, and the constant terms
         self.angles: dict[str, tuple[dict[int, str], list[str]]] = {GROUND: ({}, [])}
+        #: of slides whose positions are linear
+        self.travels: dict[str, tuple[dict[int, str], list[str]]] = {}
         self.margins: list[str] = []
 
     # Places
@@ -74,16 +76,58 @@ class Places:
             travel = f"travelled({drive.variable}, {self.share({step.freedom: '1.0'})}, v)"
             if joint.inclined:
                 constants.append(f"{sign}p.{joint.name}_direction")
-            if step.sign > 0:
-                self.lines.append(f"{turn} = {self.inclined(parent_turn, joint)}")
-                frame = f"Frame(plus({self.point(step.parent, joint.through, own)}, turned({turn}, {travel})), {turn})"
-            else:
-                self.lines.append(f"{turn} = {self.inclined(parent_turn, joint, -1)}")
-                origin = self.point(step.parent, "", own)
-                through = f"minus({origin}, turned({parent_turn}, {travel}))"
-                frame = self.hung(through, turn, step.body, joint.through)
+            if not lead:
+                self.travels[joint.name] = {step.freedom: "1.0"}, []
+            frame = self.slid(step, joint, parent_turn, travel, own)
         self.angles[step.body] = terms, constants
         self.lines.append(f"{step.body}_{suffix} = {frame}")
+
+    def slid(self, step: Freed | Racked, joint: Slider, parent_turn: str, travel: str, own: str = "") -> str:
+        """Write the direction of a body that slides on its parent or the parent on it, and return its place."""
+        turn = f"{step.body}_turn"
+        if joint.bodies[1] == step.body:
+            self.lines.append(f"{turn} = {self.inclined(parent_turn, joint)}")
+            return f"Frame(plus({self.point(step.parent, joint.through, own)}, turned({turn}, {travel})), {turn})"
+        self.lines.append(f"{turn} = {self.inclined(parent_turn, joint, -1)}")
+        through = f"minus({self.point(step.parent, '', own)}, turned({parent_turn}, {travel}))"
+        return self.hung(through, turn, step.body, joint.through)
+
+    def racked(self, step: Racked) -> None:
+        """Write the place of a rack from the angle of its gear, or of a gear from the position of its rack."""
+        radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
+        turn, carrier = f"{step.body}_turn", self.interface.turn(step.parent)
+        own_terms, own_constants = self.angles.get(step.parent, ({}, []))
+        if step.turns and step.linear:
+            travel, start = self.travels[step.slide.name]
+            terms = dict(own_terms)
+            for number, factor in travel.items():
+                terms[number] = f"({terms.get(number, '0.0')} + {factor} / {radius})"
+            constants = [*own_constants, f"({' + '.join((*start, f'-{offset}'))}) / {radius}"]
+            self.angles[step.body] = terms, constants
+            self.lines.append(f"{turn} = {self.angled(terms, constants)}")
+        elif step.turns:
+            holder, block = step.slide.bodies
+            start = self.at(holder, step.slide.through)
+            line = self.inclined(self.interface.turn(holder), step.slide)
+            self.lines.append(f"{turn} = rolled({carrier}, {line}, {start}, {block}_frame.origin, {offset}, {radius})")
+        else:
+            terms, constants = self.angles[step.mate]
+            share = {
+                n: f"{radius} * ({terms.get(n, '0.0')} - {own_terms.get(n, '0.0')})"
+                for n in terms.keys() | own_terms.keys()
+            }
+            angle = " + ".join(constants) or "0.0"
+            start = [f"{radius} * ({angle} - ({' + '.join(own_constants) or '0.0'}))", offset]
+            self.travels[step.slide.name] = share, start
+            way = " + ".join((*(f"{f} * {self.interface.drives[n].variable}" for n, f in share.items()), *start))
+            frame = self.slid(step, step.slide, carrier, f"travelled({way}, {self.share(share)}, v)")
+            sign = "" if step.slide.bodies[1] == step.body else "-"
+            inclined = [f"{sign}p.{step.slide.name}_direction"] if step.slide.inclined else []
+            self.angles[step.body] = own_terms, [*own_constants, *inclined]
+            self.lines.append(f"{step.body}_frame = {frame}")
+            return
+        pin = self.at(step.parent, step.pin.name)
+        self.lines.append(f"{step.body}_frame = {self.hung(pin, turn, step.body, step.pin.name)}")
 
     def share(self, terms: dict[int, str]) -> str:
         """Return the derivatives of an angle by the coordinates, as a tuple."""
@@ -256,6 +300,9 @@ class Places:
             elif isinstance(step, Geared):
                 self.lines.append(f"# {step.body}, geared to {step.mate}")
                 self.geared(step)
+            elif isinstance(step, Racked):
+                self.lines.append(f"# {step.body}, in the teeth of {step.mate}")
+                self.racked(step)
             else:
                 self.dyad(step)
         margin = "1.0"

@@ -119,6 +119,13 @@ class Outputs:
                 f"moment_about(f.in_{r.name}, b.{block}_frame.origin)",
             )
 
+        for rack in self.motion.racked:
+            line = f"b.{rack.slide.name}_line"
+            sign, gear, bar = ("-", rack.body, rack.mate) if rack.turns else ("", rack.mate, rack.body)
+            text = f"Force of the {gear} on the {bar} in the pitch point, along the line of {rack.slide.name}"
+            along = f"{sign}({line}.c * f.in_{rack.rack}.x + {line}.s * f.in_{rack.rack}.y)"
+            yield Output(f'output("{rack.rack}.force", "N", {quoted(text)})', along)
+
     def _energy_outputs(self, n: int) -> Iterator[Output]:
         sources = ("springs and gravity", "dampers and friction", "drives and loads")
         yield Output(f"*energy_outputs({', '.join(map(quoted, sources))})", "kinetic")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
 from typing import NamedTuple
 
 from linkwork.errors import ParameterError
@@ -11,7 +13,7 @@ from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
 from .description import GROUND, Body, Description, LinkageError, Spring, given
-from .structure import Pin, Slider, Structure
+from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
 class Parameter(NamedTuple):
@@ -32,7 +34,10 @@ class Parameter(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """A freedom: its name, unit and place in the interface, its start, and the table of its inputs if it can be driven."""
+    """A freedom: its name, unit and place in the interface, its start, and the table of its inputs if it can be driven.
+
+    ``turns_back`` are the turns after which all bodies are in the same places; 0 where there are none.
+    """
 
     name: str
     joint: str
@@ -42,6 +47,7 @@ class Drive(NamedTuple):
     start: float
     speed: float
     table: str
+    turns_back: int
 
     @property
     def variable(self) -> str:
@@ -144,9 +150,34 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 Quantity(unit)(table.start, f"{where}.start"),
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
+                _turns_back(description, structure, len(found)) if turns else 0,
             )
         )
     return tuple(found)
+
+
+def _turns_back(description: Description, structure: Structure, freedom: int) -> int:
+    """Count the turns of a freedom after which all gears are back; 0 where they never are, or a rack goes on."""
+    angles, turns = {GROUND: 0.0}, 1
+    for step in structure.steps:
+        carrier = angles.get(step.parent, 0.0) if not isinstance(step, Dyad) else 0.0
+        if isinstance(step, Freed):
+            own = step.freedom == freedom and isinstance(step.joint, Pin)
+            angles[step.body] = carrier + (step.sign if own else 0)
+        elif isinstance(step, Geared):
+            ratio = description.gears[step.gear].ratio
+            factor = 1.0 / ratio if step.inverse else ratio
+            angles[step.body] = carrier + factor * (angles[step.mate] - carrier)
+        elif isinstance(step, Racked):
+            if not step.turns and angles[step.mate] != carrier:
+                return 0
+            angles[step.body] = carrier
+    for angle in angles.values():
+        share = Fraction(angle).limit_denominator(100)
+        if abs(angle - share) > 1e-9:
+            return 0
+        turns = lcm(turns, share.denominator)
+    return turns
 
 
 def interface(description: Description, structure: Structure) -> Interface:
@@ -218,7 +249,7 @@ def interface(description: Description, structure: Structure) -> Interface:
 
 
 def _joined(description: Description, structure: Structure) -> Iterator[Parameter]:
-    """Yield the parameters of slides, slots and gears."""
+    """Yield the parameters of slides, slots, gears and racks."""
     for joint in structure.joints.values():
         if isinstance(joint, Slider) and joint.inclined:
             table = (description.slides | description.slots)[joint.name]  # type: ignore[operator]
@@ -231,6 +262,14 @@ def _joined(description: Description, structure: Structure) -> Iterator[Paramete
         yield Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
         text = f"Angle of the {second} where that of the {first} is zero"
         yield Parameter(f"{name}.phase", "rad", text, gear.phase, "free")
+    for name, rack in description.racks.items():
+        if rack.radius == 0.0:
+            raise ParameterError(f"linkage.racks.{name}.radius", 0.0, "not be zero")
+        yield Parameter(
+            f"{name}.radius", "m", f"Travel of the {rack.rack} by the angle of the {rack.gear}", rack.radius, "free"
+        )
+        text = f"Position of the {rack.rack} where the angle of the {rack.gear} is zero"
+        yield Parameter(f"{name}.offset", "m", text, rack.offset, "free")
 
 
 def _assemblies(description: Description, structure: Structure) -> Iterator[Parameter]:

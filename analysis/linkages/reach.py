@@ -41,13 +41,13 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     mechanism : Mechanism
     freedom : int
     most : float, optional
-        The distance from the start that is looked at: by default half a turn, of a slide 1 m.
+        The distance from the start that is looked at: by default half its period, or half a turn; of a slide 1 m.
     samples : int
         Places looked at to either side.
     """
     period = mechanism.freedoms[freedom].period
     if most is None:
-        most = pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0
+        most = 0.5 * period or (pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0)
     known = next(iter(mechanism.published.values()))
     p = known.parameters.constants()
     acting, x = mechanism.idle(p), list(mechanism.state(known.initial))

@@ -8,7 +8,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 from ..files import unknown_name
-from .description import GROUND, Description, FreedomTable, LinkageError
+from .description import GROUND, Description, FreedomTable, LinkageError, Rack
 
 MOST_FREEDOMS = 4
 
@@ -53,6 +53,28 @@ class Geared(NamedTuple):
     inverse: bool
 
 
+class Racked(NamedTuple):
+    """A rack or its gear that follows from the other, ``mate``; both are on ``parent``, which ``joint`` joins to ``body``.
+
+    ``rack`` is its name in the description, ``pin`` and ``slide`` are the joints of the two with ``parent``; ``linear`` says
+    whether the travel is linear in the coordinates.
+    """
+
+    body: str
+    parent: str
+    joint: Joint
+    rack: str
+    mate: str
+    pin: Pin
+    slide: Slider
+    linear: bool
+
+    @property
+    def turns(self) -> bool:
+        """Whether the gear follows from the rack."""
+        return self.joint is self.pin
+
+
 class Side(NamedTuple):
     """A body of a dyad with those that freedoms join to it: its joint with ``parent``, whose place is known."""
 
@@ -84,7 +106,7 @@ class Dyad(NamedTuple):
         return self.kind in ("RRR", "RRP", "RPR")
 
 
-Step = Freed | Geared | Dyad
+Step = Freed | Geared | Racked | Dyad
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,12 +169,37 @@ def joints(description: Description) -> dict[str, Joint]:
         for part in gear.bodies:
             if part not in known:
                 raise unknown_name(part, known, f"body {part}, of linkage.gears.{name}")
+    for name, rack in description.racks.items():
+        for part in (rack.gear, rack.rack):
+            if part not in known:
+                raise unknown_name(part, known, f"body {part}, of linkage.racks.{name}")
+        on_one_body(name, rack, found)
     for own in description.bodies:
         if not any(own in joint.bodies for joint in found.values()):
             raise LinkageError(
                 f"the body {own} is joined to nothing: it must share a point with another, or slide on one"
             )
     return found
+
+
+def on_one_body(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[Pin, Slider, str]:
+    """Return the pin of a gear, the slide of its rack, and the body that both are on.
+
+    Raises
+    ------
+    LinkageError
+        If there is no such body.
+    """
+    for slide in found.values():
+        if isinstance(slide, Slider) and rack.rack in slide.bodies:
+            carrier = slide.bodies[slide.bodies[0] == rack.rack]
+            for pin in found.values():
+                if isinstance(pin, Pin) and {rack.gear, carrier} <= set(pin.bodies) and rack.gear != carrier:
+                    return pin, slide, carrier
+    raise LinkageError(
+        f"linkage.racks.{name} has the gear {rack.gear} and the rack {rack.rack}: there must be a body to which the gear is "
+        "pinned, and on which the rack slides"
+    )
 
 
 def _check_line(
@@ -174,7 +221,8 @@ def sliders(structure: Structure) -> dict[str, Slider]:
 def mobility(description: Description, found: Mapping[str, Joint]) -> int:
     """Count the freedoms by Gruebler's formula."""
     moving = len(description.bodies) + len(description.slots)
-    lost = sum(2 * (len(joint.bodies) - 1) for joint in found.values()) + len(description.gears)
+    lost = sum(2 * (len(joint.bodies) - 1) for joint in found.values())
+    lost += len(description.gears) + len(description.racks)
     return 3 * moving - lost
 
 
@@ -260,7 +308,7 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
     steps: list[Step] = list(_tree(GROUND, found, freed))
     #: bodies whose places are known, in order, and those whose angles are linear in the coordinates
     known = dict.fromkeys((GROUND, *(step.body for step in _freed(steps))))
-    linear = set(known)
+    linear, travels = set(known), set(freed)
     moving = [*description.bodies, *description.slots]
     fixed = [joint for name, joint in found.items() if name not in freed]
     step: Step | None
@@ -268,6 +316,11 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
         if step := next(_geared(description, fixed, known, linear, unknown), None):
             new = [step.body]
             linear.add(step.body)
+        elif racked := next(_racked(description, found, fixed, known, linear, travels), None):
+            step, new = racked, [racked.body]
+            if racked.linear:
+                linear.add(racked.body)
+                travels.add(racked.slide.name)
         elif step := next(_dyads(fixed, {body: _tree(body, found, freed) for body in unknown}, known), None):
             new = [body for side in step.sides for body in side.bodies]
         else:
@@ -294,6 +347,24 @@ def _geared(
                 carriers = [c for c in pin.bodies if body in pin.bodies and c in linear and c != mate]
                 if carriers:
                     yield Geared(body, carriers[0], pin, name, mate, inverse)
+
+
+def _racked(
+    description: Description,
+    found: Mapping[str, Joint],
+    fixed: list[Joint],
+    known: Mapping[str, None],
+    linear: set[str],
+    travels: set[str],
+) -> Iterator[Racked]:
+    """Yield the racks whose gears' angles are known, and the gears whose racks are; ``travels`` are the linear slides."""
+    for name, rack in description.racks.items():
+        pin, slide, carrier = on_one_body(name, rack, found)
+        if rack.rack not in known and slide in fixed and {rack.gear, carrier} <= linear:
+            yield Racked(rack.rack, carrier, slide, name, rack.gear, pin, slide, True)
+        if rack.gear not in known and pin in fixed and {rack.rack, carrier} <= known.keys():
+            all_linear = slide.name in travels and carrier in linear
+            yield Racked(rack.gear, carrier, pin, name, rack.rack, pin, slide, all_linear)
 
 
 def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tuple[Joint, str, str]]:

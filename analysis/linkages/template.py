@@ -64,6 +64,12 @@ section = {{ kind = "rod", diameter = "12 mm", material = "aluminium" }}
 # ratio = -0.5                            # speed of the second by that of the first; negative for external gears
 # phase = "0 deg"                         # angle of the second at which that of the first is zero
 
+# [linkage.racks.R]                       # a toothed rack that slides on a body to which its gear is pinned
+# gear = "crank"
+# rack = "block"
+# radius = "20 mm"                        # travel by the angle of the gear: positive where the rack is on the right of it
+# offset = "0 mm"                         # position of the slide at which the angle of the gear is zero
+
 [linkage.springs.return]                  # about a pin, along a slide, or between = ["P", "D"]
 at = "D"
 stiffness = "0.5 N*m/rad"

@@ -121,7 +121,7 @@ class Variables:
             if d.table:
                 arguments = f'("{self._argument(d, d.load)}", "{self._argument(d, "speed")}")'
                 mode = f'Mode("{d.table}.mode", ("{d.load}", "speed"), {arguments}, {int(d.speed != 0.0)})'
-                period = "2.0 * pi" if d.turns else "0.0"
+                period = f"{2.0 * d.turns_back} * pi" if d.turns_back else "0.0"
             start = f'("{_last(d, d.coordinate)}", "{_last(d, d.rate)}")'
             yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period})'
 

@@ -154,6 +154,20 @@ def within(f: Frame, inner: Frame) -> Frame:
     return Frame(plus(f.origin, turned(f.turn, inner.origin)), both(f.turn, inner.turn))
 
 
+def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
+    """Return the direction of a gear on ``carrier`` whose rack moves a block along a line from ``start``.
+
+    The angle from the carrier is the distance of the block from ``start``, less ``offset``, by ``radius``.
+    """
+    arm = minus(block, start)
+    way = line.c * arm.x + line.s * arm.y
+    angle = (way - offset) / radius
+    *share, bias = ((line.c * g[0] + line.s * g[1]) / radius for g in arm.columns)
+    rate = (line.c * arm.vx + line.s * arm.vy) / radius
+    turn = Turn(cos(angle), sin(angle), rate, (*share, bias + way * line.w * line.w / radius))
+    return both(carrier, turn)
+
+
 def hung(pin: Vector, t: Turn, own: Vector) -> Frame:
     """Return the place of a body of direction ``t`` whose point ``own`` is at ``pin``."""
     return Frame(minus(pin, turned(t, own)), t)
@@ -497,6 +511,23 @@ def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
     share = (ratio - 1.0) * moment / (dx * dx + dy * dy)
     x, y = -share * dy, share * dx
     return Wrench(x, y, moment + pin.x * y - pin.y * x)
+
+
+def gear_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
+    """Return the force of a gear pinned at ``pin`` on its rack, which slides along t, at their pitch point.
+
+    The pitch point is at ``radius`` to the right of t from the pin, to the left where it is negative.
+    """
+    pull = on.x * t.c + on.y * t.s
+    x, y = pull * t.c, pull * t.s
+    return Wrench(x, y, (pin.x + radius * t.s) * y - (pin.y - radius * t.c) * x)
+
+
+def rack_on_gear(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
+    """Return the force of its rack on a gear, as in `gear_on_rack`."""
+    pull = moment_about(on, pin) / radius
+    x, y = pull * t.c, pull * t.s
+    return Wrench(x, y, (pin.x + radius * t.s) * y - (pin.y - radius * t.c) * x)
 
 
 # Measures

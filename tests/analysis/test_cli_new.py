@@ -11,7 +11,7 @@ import pytest
 from analysis.cli.new import LINKAGE, case_text, kinds
 from analysis.files import Many, Quantity, Whole, entry_names
 from analysis.files.template import example, meanings
-from analysis.linkages.description import Body, Description, Gear, Slide, Slot, Spring
+from analysis.linkages.description import Body, Description, Gear, Rack, Slide, Slot, Spring
 from analysis.mechanisms import MECHANISMS
 from analysis.run import RunTable, acting_on, load_case, load_parameters
 from analysis.slider import TABLES as MOTION
@@ -119,7 +119,7 @@ def test_a_new_linkage_is_drawn_runs_and_holds_every_entry_there_is(linkwork, tm
     assert "coupler, rocker" in linkwork("linkage", "case.toml").output
     assert linkwork("run", "linkage.toml", "--no-plot").exit_code == 0
     text = (tmp_path / "linkage.toml").read_text()
-    for kind in (Body, Slide, Slot, Gear, Spring, Description):
+    for kind in (Body, Slide, Slot, Gear, Rack, Spring, Description):
         for name in entry_names(kind):
             assert re.search(rf"\b{name}\b", text), (kind, name)
 

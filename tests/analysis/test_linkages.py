@@ -13,15 +13,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.linkages import Package, described, linkage, load_linkage
+from analysis.linkages import Package, Racked, described, linkage, load_linkage
 from analysis.mechanisms import FIVE_BAR, check
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from tests.oracles.planar import Multipliers
-from tests.random_linkages import random_linkage
+from tests.random_linkages import KINDS, random_linkage
 
 pytestmark = pytest.mark.usefixtures("own_linkages")
+
+
+RACKS = ("rack", "RRP", "RPR", "PRP")
+#: Whether the gear follows from the rack, and the travel is linear.
+CASES = ((False, True), (True, True), (True, False))
 
 
 def imported(package: Package, folder: Path) -> Any:
@@ -36,9 +41,11 @@ def imported(package: Package, folder: Path) -> Any:
     return importlib.import_module(package.name)
 
 
-def assembled(seed: int, folder: Path, **changes: Any) -> tuple[Package, dict[str, tuple[float, float, float]]]:
+def assembled(
+    seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes: Any
+) -> tuple[Package, dict[str, tuple[float, float, float]]]:
     """A random linkage with the signs of assembly that give the places from which it was made; and these."""
-    data, places = random_linkage(seed)
+    data, places = random_linkage(seed, kinds)
     package = Package(described(data))
     module = imported(package, folder)
     names = [dyad.inner.name for dyad in package.structure.dyads if dyad.assembled]
@@ -60,9 +67,9 @@ def assembled(seed: int, folder: Path, **changes: Any) -> tuple[Package, dict[st
     raise AssertionError("no assembly gives the places")
 
 
-def compared(seed: int, folder: Path) -> list[str]:
+def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS) -> list[str]:
     """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return its kinds of dyads."""
-    package, places = assembled(seed, folder)
+    package, places = assembled(seed, folder, kinds)
     d, made = package.description, imported(package, folder).MECHANISM
     check(made)
     oracle, rng = Multipliers(d), np.random.default_rng(seed)
@@ -107,6 +114,38 @@ def compared(seed: int, folder: Path) -> list[str]:
 def test_random_linkages_move_as_with_multipliers(tmp_path):
     kinds = [kind for seed in range(16) for kind in compared(seed, tmp_path)]
     assert set(kinds) == {"RRR", "RRP", "PRP", "RPR", "RPP"}
+
+
+def test_random_racks_move_as_with_multipliers(tmp_path):
+    """Racks from gears and gears from racks, the rack as block and as holder of the line, linear and not."""
+    found = set()
+    for seed in (4, 9, 10, 25, 30, 42, 57, 66, 69, 70, 71, 84, 91, 102, 121):
+        package, _ = assembled(seed, tmp_path, RACKS)
+        steps = [step for step in package.structure.steps if isinstance(step, Racked)]
+        found |= {(step.turns, step.linear, step.slide.bodies[0] == step.parent) for step in steps}
+        compared(seed, tmp_path, RACKS)
+    assert found >= {(turns, linear, block) for turns, linear in CASES for block in (True, False)}
+
+
+@pytest.mark.parametrize(
+    ("change", "turns"),
+    [
+        ({"gears": {"Z": {"bodies": ["crank", "wheel"], "ratio": -1.5}}}, 2),
+        ({"gears": {"Z": {"bodies": ["crank", "wheel"], "ratio": math.sqrt(2.0)}}}, 0),
+        ({"slides": {"S": {"body": "wheel", "through": "O"}},
+          "racks": {"R": {"gear": "crank", "rack": "wheel", "radius": 0.1}}}, 0),
+    ],
+)  # fmt: skip
+def test_period_of_a_crank_brings_gears_and_racks_back(tmp_path, change, turns):
+    """A wheel at -1.5 times the crank's speed is back after two turns, one at an irrational ratio and a rack never are."""
+    bodies = {
+        name: {"points": {own: [0, 0]}, "mass": 1.0, "inertia": 1.0} for name, own in (("crank", "A"), ("wheel", "B"))
+    }
+    if "slides" in change:
+        bodies["wheel"]["points"] = {"Q": [0, 0]}
+    data = {"name": "period-test", "ground": {"A": [0, 0], "B": [0.5, 0], "O": [0, -0.1]}, "bodies": bodies}
+    made = Package(described(data | {"freedoms": {"crank": "A"}} | change)).mechanism(tmp_path)
+    assert made.freedoms[0].period == pytest.approx(2.0 * math.pi * turns)
 
 
 @pytest.mark.slow
@@ -302,6 +341,9 @@ MISTAKES = [
     ("gears/X", {"bodies": ["crank", "wheel"], "ratio": -1}, "linkage.gears.X"),
     ("gears/X", {"bodies": ["crank", "rocker"]}, "linkage.gears.X.ratio"),
     ("gears/X", {"bodies": ["crank", "rocker"], "ratio": -1}, "0 freedoms"),
+    ("racks/R", {"gear": "crank", "rack": "rocker"}, "linkage.racks.R.radius"),
+    ("racks/R", {"gear": "crank", "rack": "bar", "radius": 0.1}, "linkage.racks.R"),
+    ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0.1}, "linkage.racks.R"),
     ("springs/k", {"stiffness": "1 N/mm"}, "linkage.springs.k"),
     ("springs/k", {"at": "C", "between": ["A", "C"], "stiffness": 1.0}, "linkage.springs.k"),
     ("springs/k", {"at": "Z", "stiffness": 1.0}, "linkage.springs.k"),

@@ -70,6 +70,10 @@ class Multipliers:
             carrier = self.pose(self.carrier(*g.bodies))[2]
             a, b = (self.pose(body)[2] - carrier for body in g.bodies)
             closed(name, b - g.ratio * a - g.phase)
+        for name, r in description.racks.items():
+            _, slide, carrier = self.meshed(r)
+            turn = self.pose(r.gear)[2] - self.pose(carrier)[2]
+            closed(name, self.coordinate(slide) - r.radius * turn - r.offset)
         self.closure = casadi.vertcat(*rows)
         self.freedoms = casadi.vertcat(*(self.coordinate(f.joint) for f in description.freedoms.values()))
         both = casadi.vertcat(self.closure, self.freedoms)
@@ -97,6 +101,15 @@ class Multipliers:
         """The body to which both gears are pinned."""
         pinned = [{b for of in self.owners.values() if gear in of for b in of} for gear in (one, other)]
         return next(iter((pinned[0] & pinned[1]) - {one, other}))
+
+    def meshed(self, r: Any) -> tuple[str, str, str]:
+        """The pin of a gear, the slide of its rack, and the body that both are on."""
+        for slide, s in self.d.slides.items():
+            for carrier in {s.on, s.body} - {r.rack} if r.rack in (s.on, s.body) else ():
+                for pin, of in self.owners.items():
+                    if {carrier, r.gear} <= set(of):
+                        return pin, slide, carrier
+        raise AssertionError(r)
 
     def coordinate(self, joint: str) -> Any:
         """Coordinate of a joint."""
@@ -151,6 +164,24 @@ class Multipliers:
         for own, body, sign in ((pins[1], gear.bodies[1], -1.0), (pins[0], gear.bodies[0], 1.0)):
             if own in forces:
                 forces[own] = forces[own] + sign * force * (1.0 if self.owners[own][0] == body else -1.0)
+
+    def pull(self, forces: dict[str, np.ndarray], q: np.ndarray, rack: Any, pull: float) -> None:
+        """Replace the force on the block and the couple on the gear, that closure knows, by a force at the pitch point."""
+        pin, name, carrier = self.meshed(rack)
+        s = self.d.slides[name]
+        angle = casadi.Function("a", [self.q], [self.pose(s.on)[2] + s.direction])
+        along = np.array([np.cos(float(angle(q))), np.sin(float(angle(q)))])
+        centre, block = (
+            np.asarray(casadi.Function("p", [self.q], [casadi.vertcat(*place)])(q)).ravel()
+            for place in (self.at(carrier, pin), casadi.vertsplit(self.pose(s.body))[:2])
+        )
+        side = 1.0 if s.body == rack.rack else -1.0
+        pitch = centre + side * rack.radius * np.array([along[1], -along[0]])
+        arm = pitch - block
+        forces[name] = forces[name] - np.array([0.0, pull * (arm[0] * along[1] - arm[1] * along[0])])
+        if pin in forces:
+            first = 1.0 if self.owners[pin][0] == rack.gear else -1.0
+            forces[pin] = forces[pin] + first * side * pull * along
 
     def placed(self, coordinates: np.ndarray, guess: np.ndarray) -> np.ndarray:
         """Places of the bodies at coordinates of the freedoms, by Newton's method."""
@@ -238,4 +269,6 @@ class Multipliers:
         joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
         for name, gear in self.d.gears.items():
             self.share(joints, q, gear, float(joints[name][0]))
+        for name, rack in self.d.racks.items():
+            self.pull(joints, q, rack, float(joints[name][0]))
         return Solution(accelerations, all_loads, joints, float(energy[0, 0]))
