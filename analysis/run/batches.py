@@ -225,8 +225,8 @@ def _integrate(
     counts = carries["sample"]
     if task.outputs is not None:
         for i, count in enumerate(counts.tolist()):
-            values = outputs_of(mechanism, problem.modes, batch.p[i], states[i, :count], forces[i, :count])
-            samples[0][i, :count] = values[:, task.outputs]
+            rows = (states[i, :count], forces[i, :count])
+            samples[0][i, :count] = outputs_of(mechanism, problem.modes, batch.p[i], *rows, task.outputs)
     for i in np.flatnonzero(counts < n).tolist():
         for part in samples:
             part[i, counts[i] :] = np.nan

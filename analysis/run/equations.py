@@ -203,3 +203,15 @@ def machine(mechanism: Mechanism, switched: bool = False) -> Machine:
             if key not in _MACHINES:
                 _MACHINES[key] = Machine(mechanism, switched)
     return _MACHINES[key]
+
+
+@cache
+def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...]) -> Any:
+    """Return machine code of the equation ``chosen``: some of the outputs, which costs what these need."""
+    from ..numerics.codegen import MAKING, MachineCode
+
+    casadi = symbolic.library()
+    traces = expressions(mechanism, switched)
+    arguments = [casadi.SX.sym("t"), *traces.symbols]
+    with MAKING:
+        return MachineCode([casadi.Function("chosen", arguments, [traces.outputs[list(columns)]], {"cse": True})])

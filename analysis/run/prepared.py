@@ -18,7 +18,7 @@ from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.workers import interruptible
 from .angles import WholeTurns
 from .cautions import PATIENCE, SHARE, energy_balance, fastest_decay, stiffness
-from .equations import OUTPUTS, machine
+from .equations import OUTPUTS, chosen_outputs, machine
 from .events import Event, RunInterrupted, shown
 from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
 from .sampling import NotFiniteError, sample
@@ -298,8 +298,9 @@ def outputs_of(
     p: NDArray[np.float64],
     states: NDArray[np.float64],
     inputs: NDArray[np.float64],
+    columns: tuple[int, ...] | None = None,
 ) -> NDArray[np.float64]:
-    """Compute all real outputs of a mechanism, shape (n, outputs), from rows of states and inputs.
+    """Compute the real outputs of a mechanism, shape (n, outputs), from rows of states and inputs.
 
     Parameters
     ----------
@@ -308,10 +309,16 @@ def outputs_of(
     p : ndarray
         Constants, and after them the mechanical energy at the start (J).
     states, inputs : ndarray, shapes (n, states) and (n, channels)
+    columns : tuple of int, optional
+        Numbers of the outputs to compute, in the order of the columns; by default all.
     """
     from .compiled import rows
 
-    values = np.empty((len(states), len(mechanism.output_names)))
-    outputs = machine(mechanism, mechanism.switched(p.tolist())).addresses[OUTPUTS]
+    switched = mechanism.switched(p.tolist())
+    if columns is None:
+        outputs, count = machine(mechanism, switched).addresses[OUTPUTS], len(mechanism.output_names)
+    else:
+        outputs, count = chosen_outputs(mechanism, switched, columns).addresses["chosen"], len(columns)
+    values = np.empty((len(states), count))
     rows(outputs, modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return values

@@ -184,17 +184,17 @@ def test_runs_that_cannot_start_leave_the_others_as_they_are(n_jobs: int | None)
 
 def test_chosen_outputs_are_those_of_all() -> None:
     every = simulate_many(slipping(), Inputs(speed=SPEED), stop_time=1.0, step=0.01)
-    names = ("slider.position", "crank.angle")
+    names = ("slider.position", "pin.C.fx", "energy.residual", "crank.angle")
     some = simulate_many(slipping(), Inputs(speed=SPEED), outputs=names, stop_time=1.0, step=0.01)
     assert some.names == names
     assert some.states.size == some.forces.size == 0
     assert some.values is not None
-    assert some.values.shape == (3, 101, 2)
+    assert some.values.shape == (3, 101, 4)
     for name in names:
         assert np.ma.allequal(some.output(name), every.output(name))
         assert np.array_equal(some.output(name).mask, every.output(name).mask)
         assert np.array_equal(some[1][name], every[1][name])
-    with pytest.raises(InputError, match=r"no output 'crank.speed'.* \(the names are slider.position, crank.angle\)"):
+    with pytest.raises(InputError, match=r"no output 'crank.speed'.* \(the names are slider.position, .*crank.angle\)"):
         some.output("crank.speed")
 
 
