@@ -107,9 +107,9 @@ class Places:
             self.lines.append(f"{turn} = {self.angled(terms, constants)}")
         elif step.turns:
             holder, block = step.slide.bodies
-            start = self.at(holder, step.slide.through)
+            origin = self.at(holder, step.slide.through)
             line = self.inclined(self.interface.turn(holder), step.slide)
-            self.lines.append(f"{turn} = rolled({carrier}, {line}, {start}, {block}_frame.origin, {offset}, {radius})")
+            self.lines.append(f"{turn} = rolled({carrier}, {line}, {origin}, {block}_frame.origin, {offset}, {radius})")
         else:
             terms, constants = self.angles[step.mate]
             share = {

@@ -134,7 +134,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
     driven = [
         name for n, (name, table) in enumerate(tables.items()) if (n == 0 if table.driven is None else table.driven)
     ]
-    found = []
+    found: list[Drive] = []
     for name, table in tables.items():
         turns = isinstance(structure.joints[table.joint], Pin)
         unit, rate_unit = ("rad", "rad/s") if turns else ("m", "m/s")
