@@ -256,6 +256,9 @@ class Description:
         By name, one to four; where none are given they are proposed.
     assembly : mapping of str to int
         +1 or -1 by the joint between the two bodies of a dyad, +1 by default.
+    friction : mapping
+        Friction that grows with the force in a joint, by its name: of a pin the friction radius (m), coefficient times its
+        radius; of a slide or a slot the coefficient.
     loads, torques : tuple of str
         Points on which forces, and bodies on which torques can act.
     gravity : float
@@ -276,6 +279,7 @@ class Description:
     springs: Mapping[str, Spring] = entry(_named(Table(Spring)), factory=dict)
     freedoms: Mapping[str, FreedomTable] = entry(_named(_freedom), factory=dict)
     assembly: Mapping[str, int] = entry(_named(files.Whole()), factory=dict)
+    friction: Mapping[str, Any] = entry(_named(files.unchanged), factory=dict)
     loads: tuple[str, ...] = entry(Many(_name), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)

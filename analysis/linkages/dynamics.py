@@ -184,11 +184,8 @@ class Motion:
 
     def forces(self) -> Iterator[str]:
         """Write the function of the forces in all joints, from the last dyad back to the ground."""
-        rows = [
-            f"on_{body} = needed(m.masses[{n}], m.accelerations, m.wrenches[{n}])" for n, body in enumerate(self.bodies)
-        ]
+        rows = [f"on_{body} = needed(m[{n}], e, wrenches[{n}])" for n, body in enumerate(self.bodies)]
         rows += [f"on_{body} = Wrench(0.0, 0.0, 0.0)" for body in self.structure.bodies if body not in self.bodies]
-        rows.insert(0, "b = m.places")
         taken: dict[str, int] = {}
 
         def reaction(joint: Joint, by: str, on: str, force: str) -> None:
@@ -232,7 +229,8 @@ class Motion:
         doc = "Forces in the joints, each of one body on another, and their moments about the ground's origin."
         yield record("Forces", doc, dict.fromkeys(names, "Wrench"))
         doc = "Compute the forces in all joints, from the last dyad back to the ground."
-        yield function("forces(m: Motion, p: Constants) -> Forces", doc, [*rows, f"return Forces({', '.join(names)})"])
+        arguments = "b: Places, m: tuple[Mass, ...], wrenches: tuple[Wrench, ...], e: tuple[float, ...], p: Constants"
+        yield function(f"forces({arguments}) -> Forces", doc, [*rows, f"return Forces({', '.join(names)})"])
 
     def _mesh(self, step: Geared) -> str:
         pins = [
@@ -311,15 +309,30 @@ class Motion:
         rows += [
             f"held_ones = {held}",
             f"e = accelerations(matrix, right, held_ones, {known})",
-            "inertial = multiplied(matrix, e)",
         ]
+        wrenches, lost = "a.wrenches", "a.lost"
+        if self.description.friction:
+            wrenches, lost = "wrenches", "lost"
+            rows += [
+                "wrenches, lost = a.wrenches, a.lost",
+                "if p.rough:",
+                "    units = rubbing(b, p)",
+                "    without = contacts(forces(b, m, wrenches, e, p), b)",
+                "    sizes = contact_forces(without, responses(b, m, units, matrix, held_ones, p))",
+                "    wrenches = rubbed(wrenches, units, sizes)",
+                "    lost = lost + sum(size * unit.lost for size, unit in zip(sizes, units))",
+                f"    f = generalised_forces(m, wrenches, {self.n})",
+                f"    right = {tupled(right)}",
+                f"    e = accelerations(matrix, right, held_ones, {known})",
+            ]
+        rows.append("inertial = multiplied(matrix, e)")
         loads = [
             f"i.{d.name}_load{f' + held_ones[{k}] * (inertial[{k}] - right[{k}])' if d.table else ''}"
             for k, d in enumerate(drives)
         ]
         rows.append(f"loads = ({', '.join(loads)},)")
         power = " + ".join(f"loads[{k}] * x[{self.n + k}]" for k in n)
-        rows.append(f"return Motion(b, m, {s}a.wrenches, e, loads, a.lost, {power} + a.gained)")
+        rows.append(f"return Motion(b, m, {s}{wrenches}, e, loads, {lost}, {power} + a.gained)")
         numbers = "tuple[float, ...]"
         fields = {"places": "Places", "masses": "tuple[Mass, ...]"} | ({"springs": "Springs"} if s else {})
         fields |= {"wrenches": "tuple[Wrench, ...]"}
@@ -336,10 +349,13 @@ class Motion:
         yield self._jump(held)
         signature = f"start(x: {numbers}, i: Applied, p: Constants) -> {numbers}"
         yield function(signature, "Return the state at the start as it is.", ["return x"])
-        doc = "Compute the least sine of all dyads, negative in the wrong assembly."
-        yield function(
-            f"clearance(x: {numbers}, i: Applied, p: Constants) -> float", doc, ["return places(x, p).clearance"]
-        )
+        rows, margin = ["b = places(x, p)"], "b.clearance"
+        if self.description.friction:
+            rows += ["if not p.rough:", "    return b.clearance", f"m, held_ones = masses(b, p), {held}"]
+            rows.append(f"response = responses(b, m, rubbing(b, p), mass_matrix(m, {self.n}), held_ones, p)")
+            margin = "lesser(b.clearance, jamming_margin(response))"
+        doc = "Compute the least sine of all dyads, negative in the wrong assembly, or the smaller margin to jamming."
+        yield function(f"clearance(x: {numbers}, i: Applied, p: Constants) -> float", doc, [*rows, f"return {margin}"])
 
     def _energies(self) -> Iterator[str]:
         terms = []

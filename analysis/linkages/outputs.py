@@ -135,7 +135,12 @@ class Outputs:
     def function(self) -> str:
         """Write the function of all outputs."""
         s = "s, " if self.description.springs else ""
-        rows = ["m = motion(x, i, p)", "f = forces(m, p)", "b = m.places", *(["s = m.springs"] if s else [])]
+        rows = [
+            "m = motion(x, i, p)",
+            "f = forces(m.places, m.masses, m.wrenches, m.accelerations, p)",
+            "b = m.places",
+            *(["s = m.springs"] if s else []),
+        ]
         freed = {drive.joint for drive in self.interface.drives}
         slides = {name: joint for name, joint in sliders(self.structure).items() if name not in freed}
         rows += [f"{name}_position, {name}_velocity = {self.interface.travel(slides[name])}" for name in slides]

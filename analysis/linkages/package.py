@@ -14,6 +14,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import MECHANISMS, register
 from ..numerics.cache import code_folder, put
+from .contacts import Contacts
 from .description import Description, LinkageError
 from .drawing import Picture
 from .dynamics import Motion
@@ -25,7 +26,7 @@ from .structure import Structure, analyse
 from .variables import Variables
 from .writing import function, listed, quoted
 
-_FRICTION = ("FRICTION_RATE", "FRICTION_SPEED", "lesser")
+_FRICTION = ("FRICTION_RATE", "FRICTION_SPEED", "contact_forces", "jamming_margin", "lesser")
 
 _EQUATIONS = '''"""Equations of the {name}, written from its description: one freedom, one dyad after the other.
 
@@ -139,6 +140,7 @@ MECHANISM = Mechanism(
     links=(
 {links}
     ),
+    switch="{switch}",
 )
 '''
 
@@ -223,6 +225,7 @@ class Package:
         blocks = [*motion.applied(), *Places(self.interface).blocks(), motion.masses()]
         blocks += motion.springs() if self.description.springs else ()
         blocks += [*motion.acting(), *motion.motion(), *motion.forces()]
+        blocks += Contacts(motion).blocks() if self.description.friction else ()
         # of the forces it is only known now which joints have one
         self.outputs = Outputs(motion)
         scale = _error_scale(self.interface.drives, *size(self.interface))
@@ -263,6 +266,7 @@ class Package:
             parts=listed(parts, 12),
             paths="".join(f"{quoted(name)}, " for name in self.picture.paths()),
             links=listed(v.links(), 8),
+            switch="rough" if d.friction else "",
         )
 
 

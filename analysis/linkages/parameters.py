@@ -235,6 +235,7 @@ def interface(description: Description, structure: Structure) -> Interface:
     for name in description.slots:
         points[name] = {description.slots[name].pin: ("0.0", "0.0")}
     found += _joined(description, structure)
+    found += _friction(description, structure)
     by_joint = {drive.joint: drive for drive in drives}
     for name, spring in description.springs.items():
         found += _spring(name, spring, structure, by_joint.get(spring.at))
@@ -270,6 +271,21 @@ def _joined(description: Description, structure: Structure) -> Iterator[Paramete
         )
         text = f"Position of the {rack.rack} where the angle of the {rack.gear} is zero"
         yield Parameter(f"{name}.offset", "m", text, rack.offset, "free")
+
+
+def _friction(description: Description, structure: Structure) -> Iterator[Parameter]:
+    """Yield the parameters of friction that grows with the forces in joints."""
+    slots = description.slots
+    for name, value in description.friction.items():
+        joint = structure.joints.get(name)
+        if joint is None or len(joint.bodies) != 2 or (isinstance(joint, Pin) and slots.keys() & set(joint.bodies)):
+            names = ", ".join(n for n, j in structure.joints.items() if len(j.bodies) == 2 and n not in slots)
+            raise LinkageError(f"linkage.friction has {name}: it must be a slot, or a joint of two bodies: {names}")
+        if isinstance(joint, Pin):
+            own, unit, text = "friction_radius", "m", f"Friction radius of the pin {name}: coefficient times its radius"
+        else:
+            own, unit, text = "friction_coefficient", "1", f"Coefficient of friction of {name}"
+        yield Parameter(f"{name}.{own}", unit, text, Quantity(unit, least=0.0)(value, f"linkage.friction.{name}"))
 
 
 def _assemblies(description: Description, structure: Structure) -> Iterator[Parameter]:
@@ -389,6 +405,8 @@ def _check_names(found: list[Parameter]) -> None:
 
 def size(found: Interface) -> tuple[float, float]:
     """Return a length (m), the greatest coordinate of a point, and the mass of all bodies (kg); 1 where there is none."""
-    lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and "free" not in p.name]
+    lengths = [
+        abs(p.value) for p in found.parameters if p.unit == "m" and "free" not in p.name and "friction" not in p.name
+    ]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

@@ -79,6 +79,10 @@ damping = "0.01 N*m*s/rad"
 # law = "3*x**3"                          # a further force against the stretch x and its rate v, or a table [[x, force], ...]
 # driven = true                           # an input drives it: a cylinder, a linear motor
 
+# [linkage.friction]                      # that grows with the force in a joint
+# B = "0.2 mm"                            # of a pin: the friction radius, coefficient times radius of the pin
+# G = 0.1                                 # of a slide or a slot: the coefficient
+
 [linkage.freedoms]                        # as many as the linkage has; left out: they are proposed
 crank = {{ joint = "A", speed = "300 rpm" }} # start = "0 deg"; driven = true: its rate can be commanded
 

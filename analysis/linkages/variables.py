@@ -52,6 +52,8 @@ class Variables:
         if self.description.gravity:
             direction = "self.ground_gravity_direction"
             found |= {"gx": f"self.gravity * cos({direction})", "gy": f"self.gravity * sin({direction})"}
+        if self.description.friction:
+            found["rough"] = " + ".join(f"self.{p.field}" for p in self.interface.parameters if ".friction_" in p.name)
         return found or {"nothing": "0.0"}
 
     def rules(self) -> str:
@@ -93,7 +95,7 @@ class Variables:
         """Return the parameters that set the places of the bodies at the start."""
         placing = (".direction", ".ratio", ".phase", ".radius", ".offset")
         names = [p.name for p in self.interface.parameters if p.unit in ("m", "") or p.name.endswith(placing)]
-        names = [name for name in names if not any(part in name for part in (".cog_", ".free_"))]
+        names = [name for name in names if not any(part in name for part in (".cog_", ".free_", ".friction_"))]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:

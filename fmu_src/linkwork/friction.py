@@ -10,6 +10,8 @@ FRICTION_SPEED = 1e-3
 FRICTION_RATE = 0.1
 #: What rounds off the magnitude of a force F where it passes zero (N): it is taken as sqrt(F^2 + F0^2).
 FRICTION_FORCE = 1e-2
+#: Norm of the response of the contacts' forces to friction up to which they are solved for: at 1 friction may jam the links.
+MOST_RESPONSE = 0.8
 #: Sweeps of Newton's method for the forces of contacts with friction, before the last.
 SWEEPS = 4
 
@@ -37,6 +39,15 @@ def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...
     for _ in range(SWEEPS):
         s = _swept(smooth, response, s)
     return _swept(smooth, response, settled(s))
+
+
+def jamming_margin(response: tuple[tuple[Vector, ...], ...]) -> float:
+    """Return how far friction is from where it may jam the links, negative beyond; ``response`` is that of `contact_forces`.
+
+    It is taken from the norm of the response: below 1 the solution for the contact forces is unique.
+    """
+    # what is added, lost in any other sum, gives the root a derivative at rest
+    return 1.0 - sqrt(1e-24 + sum(x * x + y * y for forces in response for x, y in forces)) / MOST_RESPONSE
 
 
 def settled(s: tuple[float, ...]) -> tuple[float, ...]:

@@ -415,6 +415,28 @@ def multiplied(matrix: Matrix, values: Rates) -> tuple[float, ...]:
     return tuple(sum(a * b for a, b in zip(row, values)) for row in matrix)
 
 
+class Rubbing(NamedTuple):
+    """Friction of one joint for a force of 1 N in it: forces on the bodies, and power lost (W)."""
+
+    wrenches: tuple[Wrench, ...]
+    lost: float
+
+
+def still(m: Mass) -> Mass:
+    """Return a body without its bias acceleration: what changes its motion and the forces on it changes them alike."""
+    centre = m.centre._replace(columns=(*m.centre.columns[:-1], (0.0, 0.0)))
+    turn = m.frame.turn._replace(columns=(*m.frame.turn.columns[:-1], 0.0))
+    return m._replace(centre=centre, frame=m.frame._replace(turn=turn))
+
+
+def rubbed(wrenches: tuple[Wrench, ...], units: tuple[Rubbing, ...], sizes: Rates) -> tuple[Wrench, ...]:
+    """Add the friction in joints with forces of these sizes to what acts on the bodies."""
+    return tuple(
+        added(f, *(Wrench(size * g.x, size * g.y, size * g.moment) for size, g in zip(sizes, on)))
+        for f, *on in zip(wrenches, *(unit.wrenches for unit in units))
+    )
+
+
 def kinetic_energy(masses: tuple[Mass, ...]) -> float:
     """Compute the kinetic energy (J)."""
     return 0.5 * sum(

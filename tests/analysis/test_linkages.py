@@ -67,9 +67,9 @@ def assembled(
     raise AssertionError("no assembly gives the places")
 
 
-def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS) -> list[str]:
+def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes: Any) -> list[str]:
     """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return its kinds of dyads."""
-    package, places = assembled(seed, folder, kinds)
+    package, places = assembled(seed, folder, kinds, **changes)
     d, made = package.description, imported(package, folder).MECHANISM
     check(made)
     oracle, rng = Multipliers(d), np.random.default_rng(seed)
@@ -92,6 +92,8 @@ def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS) -> list[st
         forces = {name: values[f"{name}.torque"] for name in d.torques}
         forces |= {name: values[f"{name}.force"] for name, s in d.springs.items() if s.driven}
         points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in d.loads}
+        if made.equations.clearance(x, i, p) < 0.0:  # friction may jam the linkage
+            continue
         wanted = oracle.solve(q, rates, loads, commanded, points, forces)
         m = equations.motion(x, i, p)
         # near the limit of assembly both lose digits alike
@@ -125,6 +127,22 @@ def test_random_racks_move_as_with_multipliers(tmp_path):
         found |= {(step.turns, step.linear, step.slide.bodies[0] == step.parent) for step in steps}
         compared(seed, tmp_path, RACKS)
     assert found >= {(turns, linear, block) for turns, linear in CASES for block in (True, False)}
+
+
+def test_random_friction_is_that_of_multipliers(tmp_path):
+    """Friction by the forces in pins, slides and slots, solved together with the accelerations, is that of a fixed point."""
+    joints = set()
+    for seed in range(12):
+        package, _ = assembled(seed, tmp_path)
+        frictions = {}
+        for name, joint in package.structure.joints.items():
+            pin = name in package.interface.points["ground"] or not hasattr(joint, "through")
+            if len(joint.bodies) == 2 and (not pin or not set(joint.bodies) & set(package.description.slots)):
+                frictions[name] = 5e-4 if pin else 0.02
+        compared(seed, tmp_path, friction=frictions)
+        joints |= {type(package.structure.joints[name]).__name__ for name in frictions}
+        joints |= {"slot" for name in frictions if name in package.description.slots}
+    assert joints == {"Pin", "Slider", "slot"}
 
 
 @pytest.mark.parametrize(
@@ -200,9 +218,16 @@ def five_bar(p: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_described_five_bar_is_the_hand_written_one(tmp_path):
+#: Friction of the five-bar by the forces in its joints: coefficient of the guide, radii of the pins (m).
+ROUGH = {"G": 0.15, "A": 6e-4, "B": 5e-4, "C": 4e-4, "D": 3e-4}
+
+
+@pytest.mark.parametrize("rough", [{}, ROUGH], ids=["smooth", "rough"])
+def test_described_five_bar_is_the_hand_written_one(tmp_path, rough):
     base = FIVE_BAR.published["table-3.1"].parameters
-    made = Package(described(five_bar(base))).mechanism(tmp_path)
+    made = Package(described(five_bar(base) | {"friction": rough})).mechanism(tmp_path)
+    base = replace(base, slider_friction_coefficient=rough.get("G", 0.0))
+    base = replace(base, **{f"pin_{name}_friction_radius": rough[name] for name in rough if name != "G"})
     by_hand = replace(
         base, crank_mass=0.3, crank_cog_distance=0.02, slider_guide_angle=0.3, slider_spring_free_position=0.002,
         coupler_cog_distance=math.hypot(base.coupler_cog_distance, 0.001), slider_coulomb_friction=0.7,
@@ -219,12 +244,17 @@ def test_described_five_bar_is_the_hand_written_one(tmp_path):
     }
     names |= {"transmission.angle": "C.transmission_angle", "coupler.angle": "coupler.angle", "coupler.point.y": "P.y"}
     names |= {name: name for name in ("drive.applied_torque", "energy.kinetic", "rocker.angle", "slider.acceleration")}
-    rng = np.random.default_rng(1)
+    rng, compared = np.random.default_rng(1), 0
     for _ in range(100):
         x = (rng.uniform(0, 6.28), rng.uniform(-0.01, 0.01), rng.uniform(-50, 50), rng.uniform(-1, 1), 0.0, 0.0)
         u = tuple(rng.uniform(-9, 9, 6))
         for mode in (0.0, 1.0):
             acting = [m.equations.applied((mode,), u, c) for m, c in ((FIVE_BAR, k), (made, p))]
+            margins = [m.equations.clearance(x, i, c) for m, i, c in ((FIVE_BAR, acting[0], k), (made, acting[1], p))]
+            assert margins[1] == pytest.approx(margins[0], rel=1e-10, abs=1e-10)
+            if margins[0] < 0.1:  # friction may jam the links
+                continue
+            compared += 1
             one, other = (
                 (
                     m.equations.derivative(x, i, c),
@@ -237,6 +267,7 @@ def test_described_five_bar_is_the_hand_written_one(tmp_path):
             np.testing.assert_allclose(other[1], one[1], rtol=1e-11, atol=1e-11)
             for own, name in names.items():
                 assert other[2][name] == pytest.approx(one[2][own], rel=1e-10, abs=1e-10), own
+    assert compared > 100
 
 
 def test_described_five_bar_costs_little_more():
@@ -344,6 +375,9 @@ MISTAKES = [
     ("racks/R", {"gear": "crank", "rack": "rocker"}, "linkage.racks.R.radius"),
     ("racks/R", {"gear": "crank", "rack": "bar", "radius": 0.1}, "linkage.racks.R"),
     ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0.1}, "linkage.racks.R"),
+    ("friction", {"Z": 0.1}, "linkage.friction has Z"),
+    ("friction", {"C": "0.1 kg"}, "linkage.friction.C"),
+    ("friction", {"C": -0.1}, "linkage.friction.C"),
     ("springs/k", {"stiffness": "1 N/mm"}, "linkage.springs.k"),
     ("springs/k", {"at": "C", "between": ["A", "C"], "stiffness": 1.0}, "linkage.springs.k"),
     ("springs/k", {"at": "Z", "stiffness": 1.0}, "linkage.springs.k"),

@@ -14,7 +14,7 @@ import numpy as np
 import pint
 
 from analysis.linkages.description import GROUND, Description
-from linkwork.friction import FRICTION_RATE, FRICTION_SPEED
+from linkwork.friction import FRICTION_FORCE, FRICTION_RATE, FRICTION_SPEED
 
 _UNITS = pint.UnitRegistry()
 
@@ -233,6 +233,21 @@ class Multipliers:
         inertia_of = casadi.jacobian(momentum, self.v)
         return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
 
+    def rubbing(self, q: np.ndarray, v: np.ndarray) -> dict[str, np.ndarray]:
+        """Friction of each joint in all coordinates for a force of 1 N in it."""
+        found = {}
+        for name, value in self.d.friction.items():
+            if name in self.d.slots:
+                (normal, start), slot = self.line(self.d.slots[name]), self.d.slots[name]
+                x, y = self.at(self.moving(slot.pin), slot.pin)
+                measure = normal[1] * (x - start[0]) - normal[0] * (y - start[1])
+            else:
+                measure = self.coordinate(name)
+            slow = FRICTION_RATE if name in self.owners else FRICTION_SPEED
+            along = np.asarray(casadi.Function("g", [self.q], [casadi.jacobian(measure, self.q)])(q)).ravel()
+            found[name] = -number(value) * np.tanh(along @ v / slow) * along
+        return found
+
     def solve(
         self,
         q: np.ndarray,
@@ -261,14 +276,25 @@ class Multipliers:
         matrix[: len(q), len(q) :] = -constraints.T
         matrix[len(q) :, : len(q)] = constraints
         wanted = np.concatenate([-d[:size, 0], [commanded[n] - d[size + n, 0] for n in held]])
-        solution = np.linalg.solve(matrix, np.concatenate([right[:, 0] + along[free].T @ loads[free], wanted]))
+        rubbing = self.rubbing(q, v)
+        rubbed, before = np.zeros(len(q)), np.full(len(q), np.inf)
+        # friction and the forces by which it grows, in turns
+        for _ in range(200):
+            solution = np.linalg.solve(
+                matrix, np.concatenate([right[:, 0] + along[free].T @ loads[free] + rubbed, wanted])
+            )
+            multipliers = solution[len(q) :]
+            joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
+            for name, gear in self.d.gears.items():
+                self.share(joints, q, gear, float(joints[name][0]))
+            for name, rack in self.d.racks.items():
+                self.pull(joints, q, rack, float(joints[name][0]))
+            sizes = {name: np.hypot(FRICTION_FORCE, joints[name][0]) for name in rubbing}
+            sizes |= {name: np.hypot(sizes[name], joints[name][1]) for name in rubbing.keys() & self.owners.keys()}
+            before, rubbed = rubbed, sum((sizes[name] * rub for name, rub in rubbing.items()), np.zeros(len(q)))
+            if np.abs(rubbed - before).max() <= 1e-14 * np.abs(rubbed).max(initial=0.0):
+                break
         accelerations = along @ solution[: len(q)] + d[size:, 0]
-        multipliers = solution[len(q) :]
         all_loads = loads.copy()
         all_loads[held] = multipliers[size:]
-        joints = {name: multipliers[a:b] for name, (a, b) in self.rows.items()}
-        for name, gear in self.d.gears.items():
-            self.share(joints, q, gear, float(joints[name][0]))
-        for name, rack in self.d.racks.items():
-            self.pull(joints, q, rack, float(joints[name][0]))
         return Solution(accelerations, all_loads, joints, float(energy[0, 0]))

@@ -14,10 +14,10 @@ The functions are straight lines of arithmetic on floats, like those of `kinemat
 
 from __future__ import annotations
 
-from math import sqrt, tanh
+from math import tanh
 from typing import NamedTuple
 
-from ..friction import FRICTION_RATE, FRICTION_SPEED, contact_forces, lesser, resistance
+from ..friction import FRICTION_RATE, FRICTION_SPEED, contact_forces, jamming_margin, lesser, resistance
 from .kinematics import (
     Coefficients,
     Position,
@@ -32,9 +32,6 @@ from .kinematics import (
     transmission_angle,
 )
 from .parameters import Constants
-
-#: Norm of the response of the contacts' forces to friction up to which they are solved for: at 1 friction may jam the guide.
-MOST_RESPONSE = 0.8
 
 State = tuple[float, float, float, float, float, float]
 
@@ -282,12 +279,6 @@ def contact_friction(g: Position, k: Coefficients, m: Inertia, x: State, i: Inpu
     return Friction(*(sum(size * unit.friction[n] for size, unit in zip(sizes, units)) for n in range(5)))
 
 
-def response_norm(units: tuple[Rubbing, ...]) -> float:
-    """Compute the norm of the change of the contact forces with their magnitudes; below 1 the solution is unique."""
-    # what is added, lost in any other sum, gives the root a derivative at rest
-    return sqrt(1e-24 + sum(x * x + y * y for unit in units for x, y in contacts(unit.response)))
-
-
 def derivative(x: State, i: Inputs, p: Constants) -> State:
     """Compute the time derivative of the state under constant inputs."""
     g = position(x[0], x[1], p)
@@ -423,7 +414,7 @@ def clearance(x: State, i: Inputs, p: Constants) -> float:
         return sine
     k = coefficients(g, p)
     units = unit_friction(g, k, inertia(g, k, p), x[2], x[3], i.speed_drive, p)
-    return lesser(sine, 1.0 - response_norm(units) / MOST_RESPONSE)
+    return lesser(sine, jamming_margin(tuple(contacts(unit.response) for unit in units)))
 
 
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:

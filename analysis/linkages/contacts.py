@@ -1,0 +1,71 @@
+"""Write the friction in the joints of a described linkage that grows with the forces in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .description import GROUND
+from .dynamics import Motion
+from .structure import Pin
+from .writing import function
+
+
+class Contacts:
+    """Functions of the friction of one linkage: for forces of 1 N, the forces in the joints, and how they change with it."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion, self.interface = motion, motion.interface
+        self.joints = [motion.structure.joints[name] for name in motion.description.friction]
+
+    def blocks(self) -> Iterator[str]:
+        """Write all functions."""
+        yield self._rubbing()
+        rows = ["return ("]
+        for joint in self.joints:
+            f, line = f"f.in_{joint.name}", f"b.{joint.name}_line"
+            if isinstance(joint, Pin):
+                rows.append(f"    ({f}.x, {f}.y),")
+            else:
+                rows.append(f"    ({line}.c * {f}.y - {line}.s * {f}.x, 0.0),")
+        signature = "contacts(f: Forces, b: Places) -> tuple[tuple[float, float], ...]"
+        yield function(signature, "Return the forces in the joints with friction (N).", [*rows, ")"])
+        n = self.motion.n
+        rows = [
+            "bodies = tuple(still(body) for body in m)",
+            "found = []",
+            "for unit in units:",
+            f"    along = generalised_forces(bodies, unit.wrenches, {n})",
+            f"    change = accelerations(matrix, along, held_ones, ({'0.0, ' * n}))",
+            "    found.append(contacts(forces(b, bodies, unit.wrenches, change, p), b))",
+            "return tuple(found)",
+        ]
+        arguments = "b: Places, m: tuple[Mass, ...], units: tuple[Rubbing, ...], matrix: tuple[tuple[float, ...], ...]"
+        signature = f"responses({arguments}, held_ones: tuple[float, ...], p: Constants)"
+        doc = "Return the changes of these forces with friction by a force of 1 N in each of the joints."
+        yield function(f"{signature} -> tuple[tuple[tuple[float, float], ...], ...]", doc, rows)
+
+    def _rubbing(self) -> str:
+        rows, units = ["none = Wrench(0.0, 0.0, 0.0)"], []
+        for joint in self.joints:
+            name = joint.name
+            first, second = joint.bodies
+            slip, rub = f"{name}_slip", f"{name}_rub"
+            if isinstance(joint, Pin):
+                one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
+                rows.append(f"{slip} = {other}.w - {one}.w")
+                rows.append(f"{rub} = p.{name}_friction_radius * tanh({slip} / FRICTION_RATE)")
+                on = {first: f"torque({rub})", second: f"torque(-{rub})"}
+            else:
+                rows.append(f"{slip} = {self.interface.travel(joint)}[1]")
+                rows.append(f"{rub} = p.{name}_friction_coefficient * tanh({slip} / FRICTION_SPEED)")
+                slot = self.motion.description.slots.get(name)
+                # the block of a slot has no mass: its friction acts on the body that has the pin
+                at = f"b.at_{slot.pin}" if slot else f"b.{second}_frame.origin"
+                second = self.motion.owner(slot.pin) if slot else second
+                along = f"{rub} * b.{name}_line.c, {rub} * b.{name}_line.s, {at}"
+                on = {first: f"force({along})", second: f"force({along.replace(rub, '-' + rub)})"}
+            wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies if body != GROUND)
+            units.append(f"    Rubbing(({wrenches}), {rub} * {slip}),")
+        doc = "Compute the friction in the joints for forces of 1 N in them."
+        signature = "rubbing(b: Places, p: Constants) -> tuple[Rubbing, ...]"
+        return function(signature, doc, [*rows, "return (", *units, ")"])
