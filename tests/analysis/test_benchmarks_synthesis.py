@@ -120,6 +120,7 @@ def test_a_linkage_is_measured_by_the_task(name: str) -> None:
     assert error == pytest.approx(problem.convert(evaluate(problem.task, linkage).error), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_printed_packaging_machine_is_not_flat_enough() -> None:
     # flatness 6.99 cm at a travel of 175.8 cm (notes on chapter VI); asked are 2.5 cm at 144 cm
     printed = PROBLEMS["packaging"].linkage

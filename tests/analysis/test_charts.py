@@ -139,6 +139,7 @@ def test_crossings_of_other_motions_are_traced_under_their_own_name() -> None:
         assert orbit.amplitude > 3.0 * find_orbit(there, speed=speed).amplitude
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     # on the branch of one damper: torus at 0.1055 and 0.2644 N.m, period doubling at 0.3395 N.m
@@ -169,6 +170,7 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     ].any()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> None:
     chart = stability_chart(

@@ -439,6 +439,7 @@ def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
         assert (tmp_path / "out" / f"rig-2-spring-c-stability{name}").exists()
 
 
+@pytest.mark.slow
 def test_a_chart_with_points_missing_is_written_and_ends_early(linkwork, tmp_path, monkeypatch):
     monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)
     monkeypatch.setattr(charts, "LINES", (2, 2))

@@ -183,6 +183,7 @@ def test_speeds_to_avoid_know_a_motion_that_no_branch_leads_to_or_say_that_none_
     assert "not sought" in plot(response).axes[0].get_legend().get_title().get_text()
 
 
+@pytest.mark.slow
 def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_they_are_stable() -> None:
     """The range is 12 rpm; the branch is begun from an unstable motion some 80 rpm below it."""
     low, high = 1200.0 * RAD_S_PER_RPM, 1400.0 * RAD_S_PER_RPM
@@ -264,6 +265,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(charts, "SAMPLES", 6)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
     chart = stability_chart(
@@ -284,6 +286,7 @@ def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
     assert chart.grid.largest[0, 1] == pytest.approx(orbit.largest, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path) -> None:
     arguments = ["basins", "--published", "rig-1-spring-b", "--speed", "1000 rpm", "--points", "4", "--html"]
     done = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path)])

@@ -53,6 +53,7 @@ def test_the_curve_passes_the_folds_of_single_branches(folds: CrossingCurve) -> 
         assert np.interp(friction, curve[:, 1], curve[:, 0]) == pytest.approx(fold.parameter, rel=2e-5)
 
 
+@pytest.mark.slow
 def test_beyond_the_greatest_friction_of_the_curve_the_branch_from_below_has_no_fold(folds: CrossingCurve) -> None:
     # the curve rises to the friction at which the rising jump is gone, and goes on through a cusp to larger motions
     falling = np.diff(folds.points[:, 1]) < -1e-9

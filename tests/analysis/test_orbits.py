@@ -111,7 +111,10 @@ ORBITS = {
 }
 
 
-@pytest.fixture(params=ORBITS, scope="module")
+@pytest.fixture(
+    params=[pytest.param(name, marks=pytest.mark.slow if name == "rough torque" else ()) for name in ORBITS],
+    scope="module",
+)
 def orbit(request: pytest.FixtureRequest) -> PeriodicOrbit:
     parameters, drive, start = ORBITS[request.param]
     return orbit_of(parameters, drive, start=start)

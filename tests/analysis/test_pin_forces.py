@@ -162,6 +162,7 @@ class TestBound:
         assert "limit of greatest pin force [N]" in traded.columns()
 
 
+@pytest.mark.slow
 def test_the_least_force_within_an_error() -> None:
     """Whoever asks the other way round, for the least error within that force, comes to the same linkage."""
     error = 0.004

@@ -306,6 +306,7 @@ def test_the_greatest_error_of_a_slider_is_that_of_scipys_minimax() -> None:
     assert found.value == pytest.approx(float(errors(result.x).max()), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_hausdorff_distance_of_a_square() -> None:
     path = syn.TargetPath(points=SQUARE, closed=True)
     found = syn.synthesize(

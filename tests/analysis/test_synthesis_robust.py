@@ -188,6 +188,7 @@ class TestBeyondAFourBar:
         solution = best(traced(wave, closed=False, samples=40), candidates=1 << 12, starts=3)
         assert 0.1 < solution.evaluation.worst < 2.0
 
+    @pytest.mark.slow
     def test_a_spiral(self) -> None:
         u = np.linspace(0.0, 6.0 * pi, 90)
         spiral = np.column_stack([u * np.cos(u), u * np.sin(u)])

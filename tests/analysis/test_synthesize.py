@@ -50,6 +50,7 @@ class TestResult:
             assert solution.evaluation.worst == pytest.approx(distance.max())
             assert solution.evaluation.rms == pytest.approx(float(np.sqrt(np.mean(distance**2))))
 
+    @pytest.mark.slow
     def test_the_same_seed_gives_the_same_bits_on_any_number_of_cores(self) -> None:
         tasks = (TASK, syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True), samples=24))
         for task in tasks:

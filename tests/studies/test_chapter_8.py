@@ -109,6 +109,7 @@ class TestRig1:
         assert (falling[both] > 2.0 * rising[both]).all()
         np.testing.assert_allclose(falling[speeds > fold], rising[speeds > fold], rtol=1e-9)
 
+    @pytest.mark.slow
     def test_four_peaks_become_two(self) -> None:
         assert rigs.speed_of_fewer_peaks("A", 400.0, 500.0) == pytest.approx(451.0, abs=1.0)
         assert steady_turn(rigs.rig("A"), 440.0).peaks == 4
