@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from linkwork.errors import InputError, Interrupted
+from linkwork.errors import Interrupted
 
 from .common import (
     INTERRUPTED,
@@ -135,9 +134,8 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
         written.append(write_tables(case, solution.run_case(make, title), head=make.masses_in_words()))
-    with suppress(InputError):  # of a pivot that is driven
-        tables = solution.described_case(make, title)
-        written.append(write_tables(folder / "linkage.toml", tables, head=make.masses_in_words()))
+    tables = solution.described_case(make, title)
+    written.append(write_tables(folder / "linkage.toml", tables, head=make.masses_in_words()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     written += plotted(plots, solution, folder / "best-linkage.png", title=title)

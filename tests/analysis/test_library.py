@@ -13,9 +13,10 @@ from scipy.integrate import solve_ivp
 import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linkages import described, load_linkage, reach
+from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, orbit_of
 from analysis.run import Trajectory, case_from, compare, cosimulate, load_case, simulate
-from analysis.synthesis.result.described import description
+from analysis.synthesis.result.described import description, drives
 from tests.oracles.planar import Multipliers
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
@@ -210,17 +211,29 @@ FOUR_BAR = {
             **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15, branch=-1,
             pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2),
         ),
+        syn.FiveBar(
+            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
+            pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2, series=FourierSeries([0.0, 0.1, 0.05], [0.0, 0.2, -0.1])),
+        ),
+        syn.Linkage(
+            **FOUR_BAR, ground_length=0.2, crank_length=0.06, coupler_length=0.18, rocker_length=0.15,
+            pivot=syn.SliderMotion(FourierSeries([2e-3, 4e-3, -1e-3], [0.0, 6e-3, 2e-3]), guide_angle=0.3),
+        ),
     ],
-    ids=["four-bar", "slider-crank", "slider-crank-other-side", "five-bar", "five-bar-half-speed"],
+    ids=["four-bar", "slider-crank", "slider-crank-other-side", "five-bar", "five-bar-half-speed", "two-drives", "moved-pivot"],
 )  # fmt: skip
-def test_a_linkage_that_was_found_is_described_and_runs(found):
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
     """Its coupler point goes where the synthesis says, over two turns."""
-    make = syn.Make(speed=20.0)
-    case = case_from({"linkage": description(found, make, rotation=0.2), "run": {"revolutions": 2.0}}, folder=FOLDER)
+    make, way = syn.Make(speed=20.0), {"rotation": 0.2, "direction": direction}
+    run = {"stop_time": 0.2 * np.pi, "step": 1e-3}
+    case = case_from(
+        {"linkage": description(found, make, **way), **drives(found, make, **way), "run": run}, folder=FOLDER
+    )
     done = simulate(
         case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step, tolerance=1e-12
     )
     assert done.status == 0
-    wanted = found.path(0.2 + 20.0 * done.time / found.turns)
+    wanted = found.path(0.2 + direction * 20.0 * done.time / found.turns)
     np.testing.assert_allclose(np.column_stack([done["P.x"], done["P.y"]]), wanted, atol=1e-9)
     assert done["energy.kinetic"].min() > 0.0
