@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -33,7 +34,7 @@ def run(name: str, **changes: Any) -> Trajectory:
 
 
 def test_the_library_is_there():
-    assert len(FILES) >= 19
+    assert len(FILES) >= 20
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -177,6 +178,32 @@ def test_the_fmus_of_a_linkage_run_as_in_process(name, tmp_path):
     for file in (build(made, tmp_path), *(build_native(made, kind, tmp_path) for kind in (NATIVE, NATIVE_FMI3))):
         other = cosimulate(file, case.parameters, case.inputs, **given)
         assert compare(found, other).worst.relative < 1e-8, file.name
+
+
+def test_newtons_method_from_the_start_misses_places():
+    """Of Stephenson's second inversion from its crank: the shares of docs/linkages.md, which says why this is refused."""
+    made = load_linkage(FOLDER / "stephenson-2.toml")
+    oracle = Multipliers(
+        described(tomllib.loads((FOLDER / "stephenson-2.toml").read_text(encoding="utf-8"))["linkage"])
+    )
+    found, p = reach(made), made.published[made.name].parameters.constants()
+
+    def places(angle: float) -> np.ndarray:
+        b = made.modules[-1].places((angle, 0.0), p)
+        frames = [getattr(b, f"{body}_frame") for body in oracle.bodies]
+        return np.array([c for f in frames for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
+
+    wanted = np.array([places(angle) for angle in np.linspace(found.low + 1e-6, found.high - 1e-6, 400)])
+    crank = wanted[:, 2]
+    assert np.diff(crank).min() < 0.0 < np.diff(crank).max()
+    shares = []
+    oracle.freedoms = oracle.coordinate("A")
+    closed = casadi.vertcat(oracle.closure, oracle.freedoms)
+    oracle.joints = casadi.Function("joints", [oracle.q], [closed, casadi.jacobian(closed, oracle.q)])
+    for sweeps in (8, 50):
+        ends = np.array([oracle.placed(angle, places(np.deg2rad(20.0)), sweeps) for angle in crank[:, None]])
+        shares.append(np.mean(np.abs(ends - wanted)[:, 0::3].max(axis=1) < 1e-9))
+    assert shares == pytest.approx([0.84, 0.84], abs=0.01)
 
 
 def test_ranges_of_motion():

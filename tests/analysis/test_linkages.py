@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.linkages import Package, Racked, described, linkage, load_linkage
+from analysis.linkages import Dyad, Package, Racked, described, linkage, load_linkage
 from analysis.mechanisms import FIVE_BAR, check
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import LinkworkError
@@ -24,6 +24,7 @@ from tests.random_linkages import KINDS, random_linkage
 pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
+GROUPS = ("group", "RRP", "slot", "RPR")
 RACKS = ("rack", "RRP", "RPR", "PRP")
 #: Whether the gear follows from the rack, and the travel is linear.
 CASES = ((False, True), (True, True), (True, False))
@@ -127,6 +128,13 @@ def test_random_racks_move_as_with_multipliers(tmp_path):
         found |= {(step.turns, step.linear, step.slide.bodies[0] == step.parent) for step in steps}
         compared(seed, tmp_path, RACKS)
     assert found >= {(turns, linear, block) for turns, linear in CASES for block in (True, False)}
+
+
+def test_random_dyads_inside_dyads_move_as_with_multipliers(tmp_path):
+    for seed in (2, 7, 15, 22, 28, 43):
+        package, _ = assembled(seed, tmp_path, GROUPS)
+        assert len(package.structure.dyads) > sum(isinstance(step, Dyad) for step in package.structure.steps)
+        compared(seed, tmp_path, GROUPS)
 
 
 def test_random_friction_is_that_of_multipliers(tmp_path):
