@@ -12,6 +12,7 @@ import click
 
 from linkwork.errors import Interrupted
 
+from ..display import format_count
 from .common import (
     INTERRUPTED,
     SYNTHESIS,
@@ -80,7 +81,7 @@ def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
 
 def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[PinForces] | None = None) -> None:
     """Print ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known."""
-    from ..synthesis import format_transmission, quality_cells, quality_headings
+    from ..synthesis import format_transmission, format_variants, quality_cells, quality_headings
 
     headings = ["", *quality_headings(solutions[0].task), "largest link [mm]", "transmission angle [deg]"]
     rows = [
@@ -95,8 +96,12 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
     for row, s in zip(rows, solutions):
         v = s.verdicts
         row.append(", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]))
+    if any(s.variants for s in solutions):
+        headings.append("also found")
+        for row, s in zip(rows, solutions):
+            row.append(format_variants(s))
     styles = [None if s.verdicts.sound else "yellow" for s in solutions]
-    show_table(title, headings, rows, words=("verdict",), styles=styles)
+    show_table(title, headings, rows, words=("verdict", "also found"), styles=styles)
 
 
 def print_best(best: Assessment) -> None:
@@ -208,8 +213,8 @@ def synthesize(
         if error.synthesis is None:
             raise
         result, stopped = error.synthesis, error
-    forces = chosen.forces(result.solutions)
-    title = f"{chosen.title}: {len(result.solutions)} linkages, {result.seconds:.1f} s"
+    forces = chosen.forces(result.every)
+    title = f"{chosen.title}: {format_count(len(result.solutions), 'linkage')}, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
     best = assess(result.best)
     print_best(best)

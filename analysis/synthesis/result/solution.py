@@ -268,12 +268,15 @@ class Solution(Shown):
     linkage : Linkage
     evaluation : Evaluation
     verdicts : Verdicts
+    variants : tuple of Solution
+        Mirror images and near copies that it stands for in a ranking, the best first.
     """
 
     task: Task
     linkage: Linkage
     evaluation: Evaluation
     verdicts: Verdicts
+    variants: tuple[Solution, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
