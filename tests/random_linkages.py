@@ -111,6 +111,8 @@ class Maker:
     def dyad(self, kind: str) -> None:
         if kind in ("gear", "rack"):
             return self.gear() if kind == "gear" else self.rack()
+        if kind == "group":
+            return self.group()
         if kind == "slot":
             base, other, body = self.known(), self.known(), self.new()
             self.pin(base, body)
@@ -141,6 +143,20 @@ class Maker:
             pair = (one, other) if self.rng.uniform() < 0.5 else (other, one)
             self.slide(*pair)
         return None
+
+    def group(self) -> None:
+        """A four-bar in a body that is pinned to a known one, its own coupler to a lever: a dyad with a dyad inside."""
+        base, other = self.known(), self.known()
+        first, upper, lower, coupler, lever = (self.new() for _ in range(5))
+        self.pin(base, first)
+        start = self.places[upper][2] - self.places[first][2]
+        self.data["freedoms"][self.name("f")] = {
+            "joint": self.pin(first, upper),
+            "start": float(start),
+            "driven": False,
+        }
+        for pair in ((first, lower), (lower, coupler), (upper, coupler), (coupler, lever), (other, lever)):
+            self.pin(*pair)
 
     def gear(self) -> None:
         if not self.mates:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from linkwork.errors import InputError, Interrupted
+from linkwork.errors import Interrupted
 
+from ..display import format_count
 from .common import (
     INTERRUPTED,
     SYNTHESIS,
@@ -81,7 +81,7 @@ def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
 
 def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[PinForces] | None = None) -> None:
     """Print ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known."""
-    from ..synthesis import format_transmission, quality_cells, quality_headings
+    from ..synthesis import format_transmission, format_variants, quality_cells, quality_headings
 
     headings = ["", *quality_headings(solutions[0].task), "largest link [mm]", "transmission angle [deg]"]
     rows = [
@@ -96,8 +96,12 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
     for row, s in zip(rows, solutions):
         v = s.verdicts
         row.append(", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]))
+    if any(s.variants for s in solutions):
+        headings.append("also found")
+        for row, s in zip(rows, solutions):
+            row.append(format_variants(s))
     styles = [None if s.verdicts.sound else "yellow" for s in solutions]
-    show_table(title, headings, rows, words=("verdict",), styles=styles)
+    show_table(title, headings, rows, words=("verdict", "also found"), styles=styles)
 
 
 def print_best(best: Assessment) -> None:
@@ -118,6 +122,18 @@ def write_described(best: Assessment, folder: Path, title: str, *, curve: str, t
     return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
 
 
+def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: Make) -> list[Path]:
+    """Write the linkages as descriptions that run: the first, and of the others, with their ranks, the sound ones."""
+    from ..files import write_tables
+
+    names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]
+    return [
+        write_tables(folder / name, s.described_case(make, title), head=make.masses_in_words())
+        for s, name in names
+        if s is solutions[0] or s.verdicts.sound
+    ]
+
+
 def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, plots: bool, animate: bool) -> list[Path]:
     """Write everything about one solution: drawing, curve, report, parameters and a case that runs; return the paths."""
     from .. import figures
@@ -135,9 +151,6 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
         written.append(write_tables(case, solution.run_case(make, title), head=make.masses_in_words()))
-    with suppress(InputError):  # of a pivot that is driven
-        tables = solution.described_case(make, title)
-        written.append(write_tables(folder / "linkage.toml", tables, head=make.masses_in_words()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     written += plotted(plots, solution, folder / "best-linkage.png", title=title)
@@ -210,8 +223,8 @@ def synthesize(
         if error.synthesis is None:
             raise
         result, stopped = error.synthesis, error
-    forces = chosen.forces(result.solutions)
-    title = f"{chosen.title}: {len(result.solutions)} linkages, {result.seconds:.1f} s"
+    forces = chosen.forces(result.every)
+    title = f"{chosen.title}: {format_count(len(result.solutions), 'linkage')}, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
     best = assess(result.best)
     print_best(best)
@@ -223,6 +236,7 @@ def synthesize(
         print_solutions("the same curve from other pivots: the first one's cognates", others)
         written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
     written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
+    written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += plotted(plots, result, folder / "alternatives.png", title=chosen.title)
     print_written(written)
     if not result.best.verdicts.sound:

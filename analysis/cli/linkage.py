@@ -60,10 +60,11 @@ def _print_structure(package: Package) -> None:
         f"3 x {len(structure.bodies)} - {lost} = {len(structure.freedoms)} freedoms by Gruebler's count"
     )
     rows = []
-    for step in structure.steps:
+    steps = [s for step in structure.steps for s in (step.inner_dyads if isinstance(step, Dyad) else (step,))]
+    for step in steps:
         if isinstance(step, Dyad):
             outer = " and ".join(side.joint.name for side in step.sides)
-            bodies = ", ".join(body for side in step.sides for body in side.bodies)
+            bodies = ", ".join(step.bodies)
             rows.append((bodies, f"dyad {step.kind}", f"held at {outer}, joined at {step.inner.name}"))
         elif isinstance(step, Geared):
             rows.append((step.body, "gear", f"pinned at {step.pin.name}, geared to {step.mate}"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from .common import (
     set_option,
     show_table,
 )
-from .design import leave_if_stopped, overrides_of, search_options, write_described
+from .design import leave_if_stopped, overrides_of, search_options, write_described, write_linkages
 
 if TYPE_CHECKING:
     from ..numerics.fourier import FourierSeries
@@ -72,11 +73,11 @@ def slider_motion(
     chosen = load_slider_case(case, overrides)
     solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
     folder = folder_of(out)
-    written = _write_solution(solution, folder, chosen.synthesis.title, plots)
+    written = _write_solution(solution, folder, chosen, plots)
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
-            print_error("note: a five-bar whose second crank is geared cannot be simulated yet: no forces are computed")
+            print_error("note: no forces are computed of a five-bar with a geared second crank: run its linkage.toml")
         else:
             written += _dynamics(chosen, solution, folder, plots)
     elif isinstance(pivot, SliderMotion):
@@ -163,10 +164,14 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
     show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
 
 
-def _write_solution(solution: Solution, folder: Path, title: str, plots: bool) -> list[Path]:
+def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: bool) -> list[Path]:
     from ..synthesis import assess
 
+    title, make = case.synthesis.title, case.synthesis.make
+    if case.drive is not None:
+        make = replace(make, speed=case.drive.speed)
     written = write_described(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
+    written += write_linkages([solution], folder, title, make=make)
     return written + plotted(plots, solution, folder / "linkage.png", title=title)
 
 

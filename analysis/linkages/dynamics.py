@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from .description import GROUND, Description, Spring, given
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side
+from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step
 from .writing import function, record, tupled
 
 
@@ -199,7 +199,7 @@ class Motion:
             if by != GROUND:
                 rows.append(f"on_{by} = added(on_{by}, on_{on})")
 
-        for step in reversed(self.structure.steps):
+        def back(step: Step) -> None:
             if isinstance(step, Freed):
                 supported(step.joint, step.parent, step.body)
             elif isinstance(step, Geared):
@@ -223,8 +223,11 @@ class Motion:
                 rows.append(f"on_{second} = added(on_{second}, {inner})")
                 for side in step.sides:
                     for inside in reversed(side.inside):
-                        supported(inside.joint, inside.parent, inside.body)
+                        back(inside)
                     supported(side.joint, side.parent, side.body)
+
+        for step in reversed(self.structure.steps):
+            back(step)
         names = [f"in_{r.name}" for r in self.reactions] + [f"in_{r.rack}" for r in self.racked]
         doc = "Forces in the joints, each of one body on another, and their moments about the ground's origin."
         yield record("Forces", doc, dict.fromkeys(names, "Wrench"))

@@ -211,19 +211,44 @@ class Places:
                 self.lines.append(f"{body}_turn = {self.inclined(line, joint, -1)}")
                 frame = self.hung(place, f"{body}_turn", body, joint.through)
         self.lines.append(f"{body}_frame = {frame}")
-        for step in side.inside:
-            self.lines.append(f"{step.body}_frame = within({body}_frame, {step.body}_in_{body})")
+        for own in side.bodies[1:]:
+            self.lines.append(f"{own}_frame = within({body}_frame, {own}_in_{body})")
+
+    def insides(self, step: Dyad) -> None:
+        """Write the places of what follows from the bodies of a dyad, in these."""
+        for side in step.sides:
+            kept = dict(self.angles)
+            self.angles[side.body] = {}, []
+            for inside in side.inside:
+                if isinstance(inside, Freed):
+                    self.freed(inside, side.body)
+                else:
+                    self.nested(inside, side.body)
+            self.angles = kept
+
+    def nested(self, step: Dyad, lead: str) -> None:
+        """Write the places of a dyad RRR in the body ``lead``, whose own place is not known yet."""
+        name, (one, other) = step.inner.name, step.sides
+        assert isinstance(step.inner, Pin)
+        self.lines.append(f"# dyad RRR in the {lead}: {one.body} and {other.body}, joined at {name}")
+        self.insides(step)
+        frames = ["own" if side.parent == lead else f"{side.parent}_in_{lead}" for side in step.sides]
+        pins = [self.point(side.parent, side.joint.name, frame) for side, frame in zip(step.sides, frames)]
+        turns = [f"{side.body}_turn_in_{lead}" for side in step.sides]
+        first, second = (self.end(side, end, step.inner) for side, end in zip(step.sides, step.ends))
+        call = f"pin_pin_pin({pins[0]}, {pins[1]}, {first}, {second}, p.{name}_assembly, v)"
+        self.lines.append(f"{turns[0]}, {turns[1]}, margin_{name} = {call}")
+        self.margins.append(f"margin_{name}")
+        for side, pin, turn in zip(step.sides, pins, turns):
+            self.lines.append(f"{side.body}_in_{lead} = {self.hung(pin, turn, side.body, side.joint.name)}")
+            for own in side.bodies[1:]:
+                self.lines.append(f"{own}_in_{lead} = within({side.body}_in_{lead}, {own}_in_{side.body})")
 
     def dyad(self, step: Dyad) -> None:
         """Write the places of the bodies of a dyad."""
         name = step.inner.name
         self.lines.append(f"# dyad {step.kind}: {' and '.join(s.body for s in step.sides)}, joined at {name}")
-        for side in step.sides:
-            kept = dict(self.angles)
-            self.angles[side.body] = {}, []
-            for inside in side.inside:
-                self.freed(inside, side.body)
-            self.angles = kept
+        self.insides(step)
         branch, margin = f"p.{name}_assembly", f"margin_{name}"
         turns = [f"{side.body}_turn" for side in step.sides]
         pins = [self.at(s.parent, s.joint.name) if isinstance(s.joint, Pin) else "" for s in step.sides]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -41,6 +41,11 @@ class Freed(NamedTuple):
     freedom: int
     sign: int
 
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The body alone."""
+        return (self.body,)
+
 
 class Geared(NamedTuple):
     """A gear that follows from its mate's angle, both on ``parent``; ``inverse`` where the mate is the second of the pair."""
@@ -76,17 +81,17 @@ class Racked(NamedTuple):
 
 
 class Side(NamedTuple):
-    """A body of a dyad with those that freedoms join to it: its joint with ``parent``, whose place is known."""
+    """A body of a dyad with what follows from it by freedoms and dyads: its joint with ``parent``, whose place is known."""
 
     body: str
     parent: str
     joint: Joint
-    inside: tuple[Freed, ...]
+    inside: tuple[Freed | Dyad, ...]
 
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of the bodies, the joined one first."""
-        return (self.body, *(step.body for step in self.inside))
+        return (self.body, *(body for step in self.inside for body in step.bodies))
 
 
 class Dyad(NamedTuple):
@@ -99,6 +104,20 @@ class Dyad(NamedTuple):
     sides: tuple[Side, Side]
     inner: Joint
     ends: tuple[str, str]
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The bodies of both sides."""
+        return (*self.sides[0].bodies, *self.sides[1].bodies)
+
+    @property
+    def inner_dyads(self) -> Iterator[Dyad]:
+        """The dyads inside its sides, in their order, and itself as the last."""
+        for side in self.sides:
+            for step in side.inside:
+                if isinstance(step, Dyad):
+                    yield from step.inner_dyads
+        yield self
 
     @property
     def assembled(self) -> bool:
@@ -130,8 +149,8 @@ class Structure:
 
     @property
     def dyads(self) -> tuple[Dyad, ...]:
-        """The dyads in their order."""
-        return tuple(step for step in self.steps if isinstance(step, Dyad))
+        """The dyads in their order, those inside others before these."""
+        return tuple(dyad for step in self.steps if isinstance(step, Dyad) for dyad in step.inner_dyads)
 
 
 def joints(description: Description) -> dict[str, Joint]:
@@ -321,13 +340,35 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
             if racked.linear:
                 linear.add(racked.body)
                 travels.add(racked.slide.name)
-        elif step := next(_dyads(fixed, {body: _tree(body, found, freed) for body in unknown}, known), None):
-            new = [body for side in step.sides for body in side.bodies]
+        elif dyad := _next_dyad(fixed, {body: _tree(body, found, freed) for body in unknown}, known):
+            step, new = dyad, list(dyad.bodies)
         else:
             return steps, unknown
         steps.append(step)
         known |= dict.fromkeys(new)
     return steps, []
+
+
+def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Dyad | None:
+    """Return a dyad of bodies with what freedoms join to them, else with what follows from them by dyads too."""
+    if dyad := next(_dyads(fixed, trees, known), None):
+        return dyad
+    groups: dict[str, list[Freed | Dyad]] = {}
+    for body, tree in trees.items():
+        own: list[Freed | Dyad] = list(tree)
+        there = dict.fromkeys((body, *(step.body for step in tree)))
+        while inner := next(
+            (
+                dyad
+                for dyad in _dyads(fixed, {b: trees[b] for b in trees if b not in there}, there)
+                if dyad.kind == "RRR" and not there.keys() & set(dyad.bodies)
+            ),
+            None,
+        ):
+            own.append(inner)
+            there |= dict.fromkeys(inner.bodies)
+        groups[body] = own
+    return next(_dyads(fixed, groups, known), None)
 
 
 def _freed(steps: list[Step]) -> Iterator[Freed]:
@@ -375,8 +416,10 @@ def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tu
             yield joint, ends[0], ends[1]
 
 
-def _dyads(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Iterator[Dyad]:
-    """Yield the pairs of groups that follow from known bodies; ``trees`` are the freedoms from each body on."""
+def _dyads(
+    fixed: list[Joint], trees: Mapping[str, Sequence[Freed | Dyad]], known: Mapping[str, None]
+) -> Iterator[Dyad]:
+    """Yield the pairs of groups that follow from known bodies; ``trees`` are the steps from each body on."""
     base = set(known)
     sides = [
         Side(body, parent, joint, tuple(inside))

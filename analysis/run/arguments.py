@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import signature
+from math import tau
 from typing import Any, TypeVar, cast
 
 from linkwork.errors import InputError
@@ -122,16 +123,19 @@ def at_its_speed(known: PublishedSet, speed: Any) -> Any:
 
 
 def turn_durations(inputs: Inputs, mechanism: Mechanism) -> tuple[float, float] | None:
-    """Return the durations (s) of one turn of the slowest and the fastest freedom with a constant speed.
+    """Return the durations (s) of one turn of the slowest and the fastest angle with a constant speed.
 
     None where there is no such freedom.
     """
     found = []
-    for number in mechanism.cyclic:
+    angles = {v.name for v in mechanism.variables if v.unit == "rad"}
+    for number, freedom in enumerate(mechanism.freedoms):
+        if freedom.coordinate not in angles:
+            continue
         channel = mechanism.channel(number, "command")
         parts = () if channel is None else inputs.parts(mechanism.channels[channel].argument)
         if len(parts) == 1 and isinstance(parts[0], (int, float)) and parts[0] != 0.0:
-            found.append(mechanism.freedoms[number].period / abs(parts[0]))
+            found.append(tau / abs(parts[0]))
     return (max(found), min(found)) if found else None
 
 

@@ -87,7 +87,8 @@ def test_the_example_does_what_it_says(linkwork, tmp_path) -> None:
     assert float(row.split("│")[2]) < 760.0
     names = {p.name for p in (tmp_path / "out").glob("[!.]*")}
     assert names == {
-        *("curve.csv", "report.txt", "linkage.dxf", "linkage.svg", "linkage.png", "motion.csv", "motion.png"),
+        *("curve.csv", "report.txt", "linkage.dxf", "linkage.svg", "linkage.png", "linkage.toml"),
+        *("motion.csv", "motion.png"),
         *("force.csv", "five-bar-parameters.toml", "five-bar.toml", "tracking.csv", "tracking.png"),
     }
 
@@ -106,6 +107,7 @@ def test_the_motion_that_made_the_path_is_found(linkwork, tmp_path) -> None:
     assert "wrote out/motion.csv" in result.output
 
 
+@pytest.mark.usefixtures("own_linkages")
 def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> None:
     """The control force as a table over time, on the plant in process, through one turn: slider and coupler point."""
     load = {"fx": "2 N", "fy": "-3 N"}
@@ -129,6 +131,12 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     there = (p[0] + 1j * p[1]) * np.exp(1j * BASE.ground_angle) + complex(BASE.pivot_x, BASE.pivot_y)
     wanted = replace(BASE, pivot=MOTION).path(way - BASE.crank_phase) @ [1.0, 1j]
     assert np.abs(there - wanted).max() < 2e-6
+    # the linkage as one of its own, with the motion commanded
+    own = load_case(tmp_path / "moved" / "linkage.toml")
+    run = simulate(own.parameters, own.inputs, initial=own.initial, stop_time=0.5, step=0.5 / 24)
+    reached = np.column_stack([run["P.x"], run["P.y"]]) @ [1.0, 1j]
+    phi = run["crank.angle"] - BASE.ground_angle - BASE.crank_phase
+    assert np.abs(reached - replace(BASE, pivot=MOTION).path(phi) @ [1.0, 1j]).max() < 1e-6
     again = CliRunner().invoke(cli.main, ["run", "moved/five-bar.toml", "--no-plot"], catch_exceptions=False)
     assert again.exit_code == 0, again.output
 

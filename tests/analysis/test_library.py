@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -13,9 +14,10 @@ from scipy.integrate import solve_ivp
 import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linkages import described, load_linkage, reach
+from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, orbit_of
 from analysis.run import Trajectory, case_from, compare, cosimulate, load_case, simulate
-from analysis.synthesis.result.described import description
+from analysis.synthesis.result.described import description, drives
 from tests.oracles.planar import Multipliers
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
@@ -32,7 +34,7 @@ def run(name: str, **changes: Any) -> Trajectory:
 
 
 def test_the_library_is_there():
-    assert len(FILES) >= 19
+    assert len(FILES) >= 21
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -167,7 +169,7 @@ def test_multipliers_are_those_of_the_multipliers_of_lagrange(name, changes):
 
 @pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize("name", ["klann", "elastic-bearing", "shaper"])
+@pytest.mark.parametrize("name", ["elastic-bearing", "shaper", "rack-and-pinion"])
 def test_the_fmus_of_a_linkage_run_as_in_process(name, tmp_path):
     case = load_case(FOLDER / f"{name}.toml")
     made = load_linkage(FOLDER / f"{name}.toml")
@@ -176,6 +178,32 @@ def test_the_fmus_of_a_linkage_run_as_in_process(name, tmp_path):
     for file in (build(made, tmp_path), *(build_native(made, kind, tmp_path) for kind in (NATIVE, NATIVE_FMI3))):
         other = cosimulate(file, case.parameters, case.inputs, **given)
         assert compare(found, other).worst.relative < 1e-8, file.name
+
+
+def test_newtons_method_from_the_start_misses_places():
+    """Of Stephenson's second inversion from its crank: the shares of docs/linkages.md, which says why this is refused."""
+    made = load_linkage(FOLDER / "stephenson-2.toml")
+    oracle = Multipliers(
+        described(tomllib.loads((FOLDER / "stephenson-2.toml").read_text(encoding="utf-8"))["linkage"])
+    )
+    found, p = reach(made), made.published[made.name].parameters.constants()
+
+    def places(angle: float) -> np.ndarray:
+        b = made.modules[-1].places((angle, 0.0), p)
+        frames = [getattr(b, f"{body}_frame") for body in oracle.bodies]
+        return np.array([c for f in frames for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
+
+    wanted = np.array([places(angle) for angle in np.linspace(found.low + 1e-6, found.high - 1e-6, 400)])
+    crank = wanted[:, 2]
+    assert np.diff(crank).min() < 0.0 < np.diff(crank).max()
+    shares = []
+    oracle.freedoms = oracle.coordinate("A")
+    closed = casadi.vertcat(oracle.closure, oracle.freedoms)
+    oracle.joints = casadi.Function("joints", [oracle.q], [closed, casadi.jacobian(closed, oracle.q)])
+    for sweeps in (8, 50):
+        ends = np.array([oracle.placed(angle, places(np.deg2rad(20.0)), sweeps) for angle in crank[:, None]])
+        shares.append(np.mean(np.abs(ends - wanted)[:, 0::3].max(axis=1) < 1e-9))
+    assert shares == pytest.approx([0.84, 0.84], abs=0.01)
 
 
 def test_ranges_of_motion():
@@ -210,17 +238,29 @@ FOUR_BAR = {
             **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15, branch=-1,
             pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2),
         ),
+        syn.FiveBar(
+            **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
+            pivot=syn.SecondCrank(length=0.03, ratio=0.5, phase=-0.2, series=FourierSeries([0.0, 0.1, 0.05], [0.0, 0.2, -0.1])),
+        ),
+        syn.Linkage(
+            **FOUR_BAR, ground_length=0.2, crank_length=0.06, coupler_length=0.18, rocker_length=0.15,
+            pivot=syn.SliderMotion(FourierSeries([2e-3, 4e-3, -1e-3], [0.0, 6e-3, 2e-3]), guide_angle=0.3),
+        ),
     ],
-    ids=["four-bar", "slider-crank", "slider-crank-other-side", "five-bar", "five-bar-half-speed"],
+    ids=["four-bar", "slider-crank", "slider-crank-other-side", "five-bar", "five-bar-half-speed", "two-drives", "moved-pivot"],
 )  # fmt: skip
-def test_a_linkage_that_was_found_is_described_and_runs(found):
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
     """Its coupler point goes where the synthesis says, over two turns."""
-    make = syn.Make(speed=20.0)
-    case = case_from({"linkage": description(found, make, rotation=0.2), "run": {"revolutions": 2.0}}, folder=FOLDER)
+    make, way = syn.Make(speed=20.0), {"rotation": 0.2, "direction": direction}
+    run = {"stop_time": 0.2 * np.pi, "step": 1e-3}
+    case = case_from(
+        {"linkage": description(found, make, **way), **drives(found, make, **way), "run": run}, folder=FOLDER
+    )
     done = simulate(
         case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step, tolerance=1e-12
     )
     assert done.status == 0
-    wanted = found.path(0.2 + 20.0 * done.time / found.turns)
+    wanted = found.path(0.2 + direction * 20.0 * done.time / found.turns)
     np.testing.assert_allclose(np.column_stack([done["P.x"], done["P.y"]]), wanted, atol=1e-9)
     assert done["energy.kinetic"].min() > 0.0

@@ -183,10 +183,10 @@ class Multipliers:
             first = 1.0 if self.owners[pin][0] == rack.gear else -1.0
             forces[pin] = forces[pin] + first * side * pull * along
 
-    def placed(self, coordinates: np.ndarray, guess: np.ndarray) -> np.ndarray:
+    def placed(self, coordinates: np.ndarray, guess: np.ndarray, sweeps: int = 20) -> np.ndarray:
         """Places of the bodies at coordinates of the freedoms, by Newton's method."""
         q = guess
-        for _ in range(20):
+        for _ in range(sweeps):
             residual, jacobian = (np.asarray(a) for a in self.joints(q))
             residual[len(residual) - len(coordinates) :, 0] -= coordinates
             q = q - np.linalg.solve(jacobian, residual[:, 0])

@@ -1,3 +1,4 @@
+from .alike import format_variants as format_variants
 from .described import description as description
 from .drawing import LinkageScene as LinkageScene
 from .drawing import plates as plates

@@ -6,17 +6,20 @@ from cmath import rect
 from math import pi, remainder, tau
 from typing import Any
 
-from linkwork.errors import InputError
+import numpy as np
 
 from ...units import with_unit
-from ..linkage.linkage import FiveBar, Linkage, SliderCrank
+from ..linkage.linkage import Linkage, SliderCrank
 from ..linkage.machine import Make
+from ..linkage.pivot import SecondCrank, SliderMotion
 
 _NAME = "found-linkage"
 
 
 def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
-    """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a geared five-bar.
+    """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
+
+    A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` are the speeds of both.
 
     Parameters
     ----------
@@ -27,17 +30,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         Rotation of the shaft at the start (rad).
     direction : float
         +1 or -1: sense in which the crank turns.
-
-    Raises
-    ------
-    InputError
-        If the rocker pivot moves by another rule than gears: it is the slider of a five-bar, or a crank of its own drive.
     """
-    geared = isinstance(linkage, FiveBar) and not linkage.pivot.series.order
-    if linkage.pivot is not None and not geared:
-        raise InputError(
-            f"the pivot of this {linkage.title} is driven: only linkages with a fixed or a geared pivot are described"
-        )
     a1, shaft = linkage.ground_angle, complex(linkage.pivot_x, linkage.pivot_y)
     end = shaft + rect(linkage.ground_length, a1)
     bodies = {"crank": _bar("AB", linkage.crank_length, make, make.crank_mass)}
@@ -52,7 +45,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         "name": _NAME,
         "source": "found by synthesis",
         "gravity": with_unit(make.gravity, "m/s2"),
-        "ground": {"A": _place(shaft), "E" if geared or isinstance(linkage, SliderCrank) else "D": _place(end)},
+        "ground": {"A": _place(shaft), "E" if linkage.pivot or isinstance(linkage, SliderCrank) else "D": _place(end)},
         "bodies": bodies,
         "freedoms": {"crank": crank},
         "assembly": {"C": linkage.branch},
@@ -62,9 +55,19 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
         tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": with_unit(a1 + 0.5 * pi, "rad")}}
     else:
         bodies["rocker"] = _bar("DC", linkage.rocker_length, make, make.rocker_mass)
-    if isinstance(linkage, FiveBar):
-        second = linkage.pivot
+    second = linkage.pivot
+    if isinstance(second, SliderMotion):
+        along = with_unit(a1 + second.guide_angle, "rad")
+        bodies["block"] = {"points": {"D": [0, 0]}, "mass": with_unit(make.block, "kg")}
+        tables["slides"] = {"guide": {"body": "block", "through": "E", "direction": along}}
+        position = with_unit(float(second.series(rotation)), "m")
+        tables["freedoms"]["pivot"] = {"joint": "guide", "start": position, "driven": True}
+    elif second is not None:
         bodies["second"] = _bar("ED", second.length, make, None)
+    if isinstance(second, SecondCrank) and second.series.order:
+        angle = with_unit(a1 + float(second.angle(rotation)), "rad")
+        tables["freedoms"]["pivot"] = {"joint": "E", "start": angle, "driven": True}
+    elif isinstance(second, SecondCrank):
         # where the first crank points along x
         phase = a1 + second.phase - second.ratio * (a1 + linkage.crank_phase)
         tables["gears"] = {
@@ -77,6 +80,29 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
     if any(make.load):
         tables["loads"] = ["P" if "points" in bodies["coupler"] else "C"]
     return tables
+
+
+def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
+    """Return the tables of the drives of a linkage whose rocker pivot is a freedom: the speeds of crank and pivot in time.
+
+    The arguments are those of `description`. Of any other linkage there are none: its crank has its speed from there.
+    """
+    pivot = linkage.pivot
+    if pivot is None or not pivot.series.order:
+        return {}
+    speed = direction * make.speed
+    rate = speed / linkage.turns
+    slope, unit = pivot.series.derivative(), "m/s" if isinstance(pivot, SliderMotion) else "rad/s"
+    k = np.arange(1, slope.order + 1)
+    waves = {
+        "kind": "harmonics",
+        "amplitudes": [with_unit(rate * a, unit) for a in slope.amplitudes[1:]],
+        "frequencies": [with_unit(w, "rad/s") for w in rate * k],
+        "phases": [with_unit(a, "rad") for a in k * rotation - np.arctan2(slope.sin, slope.cos)[1:]],
+    }
+    if isinstance(pivot, SecondCrank):
+        waves["mean"] = with_unit(speed * pivot.ratio, unit)
+    return {"crankDrive": {"speed": with_unit(speed, "rad/s")}, "pivotDrive": {"speed": waves}}
 
 
 def _place(z: complex) -> list[Any]:

@@ -18,6 +18,7 @@ from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
 from ..task.constraint import SECOND_LENGTH, stroke
 from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
 from ..task.task import Normal, RockerFunction, Task, UntimedPath, normal_form
+from .alike import format_variants
 from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, path_rate
 
 FloatArray = NDArray[np.float64]
@@ -368,6 +369,7 @@ def headline(solution: Solution) -> str:
         f"transmission angle {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")
         + (f"\n{', '.join(v.defects)}" if v.defects else "")
+        + (f"\nalso found: {format_variants(solution)}" if solution.variants else "")
     )
 
 
@@ -421,6 +423,8 @@ class Assessment:
             head += _places("toggles", toggles(linkage))
         if straight := solution.straight():
             head += f"\n{straight}"
+        if solution.variants:
+            head += f"\nalso found: {format_variants(solution)}"
         return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
 
 

@@ -23,7 +23,7 @@ from ..linkage.linkage import Linkage, SliderCrank, wrapped
 from ..linkage.machine import Make
 from ..task.target import area_between, distance_to, halves, hausdorff, straightness
 from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
-from .described import description
+from .described import description, drives
 
 FloatArray = NDArray[np.float64]
 #: Share of the target's size squared below which an error is rounding.
@@ -268,12 +268,15 @@ class Solution(Shown):
     linkage : Linkage
     evaluation : Evaluation
     verdicts : Verdicts
+    variants : tuple of Solution
+        Mirror images and near copies that it stands for in a ranking, the best first.
     """
 
     task: Task
     linkage: Linkage
     evaluation: Evaluation
     verdicts: Verdicts
+    variants: tuple[Solution, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
@@ -382,20 +385,18 @@ class Solution(Shown):
         }
 
     def described_case(self, make: Make, title: str) -> dict[str, Any]:
-        """Return the tables of a case file that describes the linkage itself, and runs it; see `docs/linkages.md`.
-
-        Raises
-        ------
-        InputError
-            If its rocker pivot is driven.
-        """
+        """Return the tables of a case file that describes the linkage itself, and runs it; see `docs/linkages.md`."""
         at = self.evaluation.rotation
         start = 0.0 if at is None else float(at[0])
         tables = description(self.linkage, make, rotation=start, direction=self.direction)
+        moved = drives(self.linkage, make, rotation=start, direction=self.direction)
         run: dict[str, Any] = {"revolutions": 2.0 * self.linkage.turns}
         if not self.verdicts.full_turn and at is not None:
             run = {"stop_time": with_unit(float(np.ptp(at)) * self.linkage.turns / make.speed, "s")}
-        return {"title": title, "linkage": tables, "run": run}
+        elif moved:
+            turn = tau / make.speed
+            run = {"stop_time": with_unit(2.0 * self.linkage.turns * turn, "s"), "step": with_unit(turn / 360.0, "s")}
+        return {"title": title, "linkage": tables, **moved, "run": run}
 
     def columns(self) -> dict[str, FloatArray]:
         """Return crank rotation, target, traced point or angle, error and transmission angle at each target; SI.

@@ -21,6 +21,7 @@ from ..exact.quick_return import QuickReturn, QuickSwing, quick_returns
 from ..linkage.kind import Kind
 from ..linkage.linkage import UNITS, Linkage
 from ..linkage.pivot import PivotUnknown
+from ..result.alike import grouped
 from ..result.report import solution_columns
 from ..result.solution import Solution, nearest_rotations, ranked
 from ..task.constraint import (
@@ -62,7 +63,7 @@ class Synthesis(Shown):
     task : Task
         With the weights it was solved with.
     solutions : tuple of Solution
-        Sound ones first, then by error; different linkages.
+        Sound ones first, then by error. Each also stands for its mirror images and near copies, its ``variants``.
     method : str
     seed : int
     starts : int
@@ -95,8 +96,18 @@ class Synthesis(Shown):
         return self.solutions[0]
 
     def columns(self) -> dict[str, list[float]]:
-        """Return rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
-        return solution_columns(self.solutions)
+        """Return rank, errors, verdicts (1 or 0) and dimensions of `every` solution; SI, units in the names.
+
+        A variant has the rank of the solution that stands for it as ``variant of``, which is otherwise 0.
+        """
+        columns = solution_columns(self.every)
+        of = [float(rank) for rank, s in enumerate(self.solutions, start=1) for _ in s.variants]
+        return {"rank": columns["rank"], "variant of": [0.0] * len(self.solutions) + of} | columns
+
+    @property
+    def every(self) -> tuple[Solution, ...]:
+        """Return the solutions, and behind them the variants of each."""
+        return (*self.solutions, *(variant for s in self.solutions for variant in s.variants))
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
@@ -228,7 +239,7 @@ def _in_closed_form(
     if tuple(kinds) != usual_kinds(task):
         of = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
         raise InputError(f"a {type(task).__name__} is of the {of}: kinds must be {usual_kinds(task)}")
-    found = quick_returns(task, bounds, constraints)[: search.solutions]
+    found = grouped(quick_returns(task, bounds, constraints))[: search.solutions]
     seconds = perf_counter() - begun
     return Synthesis(
         task=task, solutions=found, method="closed form", seed=search.seed, starts=len(found), seconds=seconds
@@ -307,10 +318,12 @@ def improve(
     done = polish(normal, limits, begin, pivot=pivot, search=search)
     given = linkage.linkage if isinstance(linkage, Solution) else linkage
     same: dict[str, Any] = {name: getattr(given, name) for name in kept}
-    found = tuple(
-        Solution.of(task, replace(s.linkage, **same), s.evaluation.rotation)
-        for s in make_solutions(task, normal, limits, done, pivot, search.solutions)
-    )
+
+    def put_back(s: Solution) -> Solution:
+        made = Solution.of(task, replace(s.linkage, **same), s.evaluation.rotation)
+        return replace(made, variants=tuple(map(put_back, s.variants)))
+
+    found = tuple(map(put_back, make_solutions(task, normal, limits, done, pivot, search.solutions)))
     return _result(task, found, done, len(begin), search, begun)
 
 
@@ -394,15 +407,11 @@ def make_solutions(
         return ranked(there)
 
     solutions = made(distinct(done.kept, 4 * count, pivot))
-    if limits.least is not None:
-        return solutions[:count]
     # what a search began with counts by itself where it is better than all that came of it
-    first = made(done.begun)[:1]
-    return (
-        ranked([*first, *solutions])[:count]
-        if first and ranked([*solutions[:1], *first])[0] is first[0]
-        else solutions[:count]
-    )
+    first = made(done.begun)[:1] if limits.least is None else ()
+    if first and ranked([*solutions[:1], *first])[0] is first[0]:
+        solutions = ranked([*first, *solutions])
+    return grouped(solutions)[:count]
 
 
 def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:

@@ -1,0 +1,88 @@
+"""Solutions that are one linkage for a machine builder: mirror images, and near copies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...display import format_count
+from ..linkage.linkage import LINKS, Linkage, SliderCrank
+from ..linkage.pivot import SecondCrank, geared
+from ..task.task import RockerFunction
+from .solution import Solution
+
+#: Near copies differ by no more: place of a pin, as a share of the longest link; ratio of two lengths of one link.
+SHARE, RATIO = 0.03, 1.25
+
+
+def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
+    """Return the first of all solutions that are alike, in their order, the others as its ``variants``.
+
+    Where the linkage stands, which way the crank turns and where it starts make no difference, nor does the size for the
+    function of a rocker. Linkages with a commanded pivot are all kept.
+    """
+    groups: list[list[Solution]] = []
+    for solution in solutions:
+        group = next((g for g in groups if _alike(g[0], solution) is not None), None)
+        if group is None:
+            groups.append([solution])
+        else:
+            group.append(solution)
+    return tuple(replace(g[0], variants=(*g[0].variants, *g[1:])) for g in groups)
+
+
+def format_variants(solution: Solution) -> str:
+    """Format how many mirror images and near copies a solution stands for, such as "2 mirror images, 1 near copy"."""
+    mirrored = sum(_alike(solution, other) == -1 for other in solution.variants)
+    counts = (("mirror image", mirrored), ("near copy", len(solution.variants) - mirrored))
+    return ", ".join(format_count(count, name) for name, count in counts if count)
+
+
+def _alike(one: Solution, other: Solution) -> int | None:
+    """Return 1 if two linkages are near copies, -1 if one is near the other's mirror image, otherwise None."""
+    a, b = one.linkage, other.linkage
+    if a.kind != b.kind or not all(_geared(x) for x in (a, b)) or _gears(a) != _gears(b):
+        return None
+    links = [np.array([abs(getattr(x, name)) for name in x.links]) for x in (a, b)]
+    if isinstance(one.task, RockerFunction):
+        links = [lengths / lengths.max() for lengths in links]
+    if (np.abs(np.log(links[0] / links[1])) > np.log(RATIO)).any():
+        return None
+    own, *_ = _sides(a)
+    for side in _sides(b):
+        if np.abs(_shape(a, own) - _shape(b, side)).max() <= SHARE:
+            return own * side
+    return None
+
+
+def _geared(linkage: Linkage) -> bool:
+    """Return whether the rocker pivot is fixed or on a geared crank."""
+    return linkage.pivot is None or (isinstance(linkage.pivot, SecondCrank) and linkage.pivot.series.order == 0)
+
+
+def _gears(linkage: Linkage) -> float:
+    return linkage.pivot.ratio if isinstance(linkage.pivot, SecondCrank) else 0.0
+
+
+def _sides(linkage: Linkage) -> tuple[int, ...]:
+    """Return +1 if C lies to the left of B -> D, -1 to the right; with hardly an offset of a guide both, its own first."""
+    if not isinstance(linkage, SliderCrank):
+        return (linkage.branch,)
+    offset = linkage.ground_length
+    side = linkage.branch if offset >= 0.0 else -linkage.branch
+    return (side, -side) if abs(offset) <= SHARE * linkage.largest_link else (side,)
+
+
+def _shape(linkage: Linkage, side: int) -> NDArray[np.float64]:
+    """Return links, coupler point and second crank as shares of the longest link, turned over so that C lies to the left."""
+    point = linkage.point_distance * np.exp(1j * side * linkage.point_angle)
+    second, pivot = 0j, linkage.pivot
+    if isinstance(pivot, SecondCrank):
+        # its direction while the first crank lies along the ground link, times the turns of the gears
+        k, m = geared(pivot.ratio)
+        second = pivot.length * np.exp(1j * side * (k * pivot.phase - m * linkage.crank_phase))
+    links = (abs(getattr(linkage, name)) for name in LINKS)
+    return np.array([*links, point.real, point.imag, second.real, second.imag]) / linkage.largest_link

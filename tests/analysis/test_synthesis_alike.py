@@ -1,0 +1,86 @@
+"""A ranking shows one of several mirror images and near copies; these are counted, and nothing is lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import analysis.synthesis as syn
+from analysis.synthesis.result.alike import grouped
+
+SIZES = {"pivot_x": 0.1, "pivot_y": 0.05, "crank_length": 0.05, "coupler_length": 0.16, "point_distance": 0.09}
+ANGLES = {"ground_angle": 0.4, "crank_phase": 1.1, "point_angle": 0.7}
+FOUR_BAR = syn.Linkage(**SIZES, **ANGLES, ground_length=0.18, rocker_length=0.12, output_angle=0.0)
+GEARED = syn.FiveBar(
+    **SIZES, **ANGLES, ground_length=0.18, rocker_length=0.12, output_angle=0.0,
+    pivot=syn.SecondCrank(0.03, ratio=-2.0, phase=0.3),
+)  # fmt: skip
+SLIDER = syn.SliderCrank(**SIZES, **ANGLES, ground_length=0.04, output_angle=0.0)
+PHI = syn.turn(12)
+
+
+def solution(linkage: syn.Linkage) -> syn.Solution:
+    return syn.Solution.of(syn.TimedPath(points=FOUR_BAR.path(PHI)), linkage)
+
+
+def mirrored(linkage: syn.Linkage) -> syn.Linkage:
+    """Return the mirror image in the x axis, which runs backwards; its path says so."""
+    angles = {name: -getattr(linkage, name) for name in ANGLES}
+    pivot = linkage.pivot
+    if isinstance(pivot, syn.SecondCrank):
+        pivot = replace(pivot, phase=-pivot.phase)
+    made = replace(linkage, **angles, pivot_y=-linkage.pivot_y, branch=-linkage.branch, pivot=pivot)
+    np.testing.assert_allclose(made.path(-PHI), linkage.path(PHI) * [1.0, -1.0], atol=1e-12)
+    return made
+
+
+@pytest.mark.parametrize("linkage", [FOUR_BAR, GEARED, SLIDER], ids=lambda x: x.kind)
+def test_mirror_images_and_near_copies_stand_behind_the_first(linkage: syn.Linkage) -> None:
+    copy = replace(linkage.moved(0.2, 0.1), ground_angle=2.0, coupler_length=0.158)
+    one, *others = grouped([solution(x) for x in (linkage, mirrored(linkage), copy)])
+    assert not others
+    assert one.linkage is linkage
+    assert syn.format_variants(one) == "1 mirror image, 1 near copy"
+    # from its other side the guide has the opposite offset
+    if isinstance(linkage, syn.SliderCrank):
+        turned = {"ground_length": -0.04, "ground_angle": 0.4 + np.pi, "crank_phase": 1.1 - np.pi, "branch": -1}
+        same = replace(linkage, **turned)
+        np.testing.assert_allclose(same.path(PHI), linkage.path(PHI), atol=1e-12)
+        assert syn.format_variants(grouped([solution(x) for x in (linkage, same)])[0]) == "1 near copy"
+
+
+@pytest.mark.parametrize(
+    ("linkage", "change"),
+    [
+        (FOUR_BAR, {"branch": -1}),
+        (FOUR_BAR, {"point_angle": -0.7}),
+        (FOUR_BAR, {"crank_length": 0.057}),
+        (FOUR_BAR.scaled(1.3), {}),
+        (SLIDER, {"ground_length": -0.04}),
+        (SLIDER, {"branch": -1}),
+        (GEARED, {"pivot": syn.SecondCrank(0.03, ratio=-2.0, phase=0.9)}),
+        (GEARED, {"pivot": syn.SecondCrank(0.03, ratio=2.0, phase=0.3)}),
+    ],
+)
+def test_other_linkages_are_ranked(linkage: syn.Linkage, change: dict[str, object]) -> None:
+    first = {x.kind: x for x in (FOUR_BAR, SLIDER, GEARED)}[linkage.kind]
+    assert len(grouped([solution(first), solution(replace(linkage, **change))])) == 2
+
+
+def test_the_ellipse_is_traced_by_one_linkage_in_four_places() -> None:
+    """The target is its own mirror image in two axes."""
+    phi = syn.turn(24)
+    task = syn.TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)]))
+    found = syn.synthesize(task, search=syn.Search(starts=12, candidates=1 << 13, solutions=4))
+    lengths = [sorted(getattr(s.linkage, name) for name in s.linkage.links) for s in found.solutions]
+    apart = [np.abs(np.log(np.divide(a, b))).max() for k, a in enumerate(lengths) for b in lengths[:k]]
+    assert min(apart, default=1.0) > 0.02
+    variants = found.best.variants
+    assert "mirror image" in syn.format_variants(found.best)
+    assert [s.error for s in variants] == pytest.approx([found.best.error] * len(variants), rel=1e-3)
+    columns = found.columns()
+    assert columns["rank"] == [float(k) for k in range(1, len(found.every) + 1)]
+    assert columns["variant of"].count(1.0) == len(variants)
+    assert len(columns["variant of"]) == len(found.every) > len(found.solutions)
