@@ -122,6 +122,18 @@ def write_described(best: Assessment, folder: Path, title: str, *, curve: str, t
     return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
 
 
+def write_linkages(solutions: Sequence[Solution], folder: Path, title: str, *, make: Make) -> list[Path]:
+    """Write the linkages as descriptions that run: the first, and of the others, with their ranks, the sound ones."""
+    from ..files import write_tables
+
+    names = [(s, "linkage.toml" if rank == 1 else f"linkage-{rank}.toml") for rank, s in enumerate(solutions, start=1)]
+    return [
+        write_tables(folder / name, s.described_case(make, title), head=make.masses_in_words())
+        for s, name in names
+        if s is solutions[0] or s.verdicts.sound
+    ]
+
+
 def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, plots: bool, animate: bool) -> list[Path]:
     """Write everything about one solution: drawing, curve, report, parameters and a case that runs; return the paths."""
     from .. import figures
@@ -139,8 +151,6 @@ def write_solution(best: Assessment, folder: Path, title: str, *, make: Make, pl
     if linkage.pivot is None:
         case = folder / ("slider-crank.toml" if linkage.kind == "slider-crank" else "five-bar.toml")
         written.append(write_tables(case, solution.run_case(make, title), head=make.masses_in_words()))
-    tables = solution.described_case(make, title)
-    written.append(write_tables(folder / "linkage.toml", tables, head=make.masses_in_words()))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     written += plotted(plots, solution, folder / "best-linkage.png", title=title)
@@ -226,6 +236,7 @@ def synthesize(
         print_solutions("the same curve from other pivots: the first one's cognates", others)
         written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
     written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
+    written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += plotted(plots, result, folder / "alternatives.png", title=chosen.title)
     print_written(written)
     if not result.best.verdicts.sound:

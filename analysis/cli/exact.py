@@ -20,7 +20,7 @@ from .common import (
     print_written,
     set_option,
 )
-from .design import overrides_of, print_best, print_solutions, write_described
+from .design import overrides_of, print_best, print_solutions, write_described, write_linkages
 
 
 @click.command()
@@ -45,7 +45,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
       linkwork exact examples/five-poses.toml
       linkwork exact examples/sine-function.toml --set task.n=5
     """
-    from ..files import write_csv, write_tables
+    from ..files import write_csv
     from ..synthesis import (
         Generators,
         Guidance,
@@ -78,8 +78,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
             written += write_described(
                 assessment, folder, chosen.title, curve="best-curve", text="best-report", drawn="best"
             )
-            tables = best.described_case(chosen.make, chosen.title)
-            written.append(write_tables(folder / "linkage.toml", tables))
+            written += write_linkages(found.solutions, folder, chosen.title, make=chosen.make)
     if not isinstance(found, Generators):
         written += plotted(plots, found, folder / "poses.png", title=chosen.title)
     if found.solutions:

@@ -26,7 +26,7 @@ from .common import (
     set_option,
     show_table,
 )
-from .design import leave_if_stopped, overrides_of, search_options, write_described
+from .design import leave_if_stopped, overrides_of, search_options, write_described, write_linkages
 
 if TYPE_CHECKING:
     from ..numerics.fourier import FourierSeries
@@ -165,15 +165,13 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
 
 
 def _write_solution(solution: Solution, folder: Path, case: SliderCase, plots: bool) -> list[Path]:
-    from ..files import write_tables
     from ..synthesis import assess
 
     title, make = case.synthesis.title, case.synthesis.make
     if case.drive is not None:
         make = replace(make, speed=case.drive.speed)
     written = write_described(assess(solution), folder, title, curve="curve", text="report", drawn="linkage")
-    tables = solution.described_case(make, title)
-    written.append(write_tables(folder / "linkage.toml", tables, head=make.masses_in_words()))
+    written += write_linkages([solution], folder, title, make=make)
     return written + plotted(plots, solution, folder / "linkage.png", title=title)
 
 

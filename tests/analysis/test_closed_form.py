@@ -17,6 +17,7 @@ from scipy.optimize import root
 
 import analysis.synthesis as syn
 from analysis import cli, figures
+from analysis.run import load_case, simulate
 from linkwork.errors import InputError, ParameterError
 
 FloatArray = NDArray[np.float64]
@@ -367,13 +368,20 @@ def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., R
     return lambda *arguments: CliRunner().invoke(cli.main, ["exact", *map(str, arguments)], catch_exceptions=False)
 
 
+@pytest.mark.usefixtures("own_linkages")
 def test_command_of_five_poses(linkwork: Callable[..., Result], tmp_path: Path) -> None:
     result = linkwork(EXAMPLES / "five-poses.toml", "--no-plots")
     assert result.exit_code == 0
     assert "6 four-bars, driven from either side: 7 of 12 sound" in result.output
     assert {p.name for p in (tmp_path / "out").iterdir()} - {".linkwork"} == {
-        "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "linkage.toml"
+        "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "linkage.toml",
+        *(f"linkage-{rank}.toml" for rank in range(2, 8)),
     }  # fmt: skip
+    case = load_case(tmp_path / "out" / "linkage-7.toml")
+    assert (
+        simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step).status
+        == 0
+    )
     rows = (tmp_path / "out" / "solutions.csv").read_text().splitlines()
     assert len(rows) == 13
 

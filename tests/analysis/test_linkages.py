@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 from analysis.linkages import Dyad, Package, Racked, described, linkage, load_linkage
+from analysis.linkages.description import Slot
+from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import FIVE_BAR, check
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import LinkworkError
@@ -137,20 +139,34 @@ def test_random_dyads_inside_dyads_move_as_with_multipliers(tmp_path):
         compared(seed, tmp_path, GROUPS)
 
 
+def rough(package: Package) -> dict[str, float]:
+    """Friction in every joint that can have it."""
+    slots, found = package.description.slots, {}
+    for name, joint in package.structure.joints.items():
+        if isinstance(joint, Pin) and len(joint.bodies) == 2 and not set(joint.bodies) & set(slots):
+            found[name] = 5e-4
+        elif not isinstance(joint, Pin):
+            found[name] = 0.02
+    return found
+
+
 def test_random_friction_is_that_of_multipliers(tmp_path):
     """Friction by the forces in pins, slides and slots, solved together with the accelerations, is that of a fixed point."""
     joints = set()
     for seed in range(12):
         package, _ = assembled(seed, tmp_path)
-        frictions = {}
-        for name, joint in package.structure.joints.items():
-            pin = name in package.interface.points["ground"] or not hasattr(joint, "through")
-            if len(joint.bodies) == 2 and (not pin or not set(joint.bodies) & set(package.description.slots)):
-                frictions[name] = 5e-4 if pin else 0.02
-        compared(seed, tmp_path, friction=frictions)
-        joints |= {type(package.structure.joints[name]).__name__ for name in frictions}
-        joints |= {"slot" for name in frictions if name in package.description.slots}
-    assert joints == {"Pin", "Slider", "slot"}
+        friction = rough(package)
+        compared(seed, tmp_path, friction=friction)
+        joints |= {type(package.structure.joints[name]) for name in friction}
+        joints |= {Slot for name in friction if name in package.description.slots}
+    assert joints == {Pin, Slider, Slot}
+
+
+@pytest.mark.slow
+def test_many_random_linkages_of_all_kinds_with_friction(tmp_path):
+    for seed in range(400, 460):
+        package, _ = assembled(seed, tmp_path, (*KINDS, "rack", "rack"))
+        compared(seed, tmp_path, (*KINDS, "rack", "rack"), friction=rough(package))
 
 
 @pytest.mark.parametrize(

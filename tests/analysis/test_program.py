@@ -166,18 +166,6 @@ class TestLeastSquares:
         ends = [residuals(normal, known.branch, q, rotation + step)[0] for step in (h, -h)]
         np.testing.assert_allclose(rate, (ends[0] - ends[1]) / (2.0 * h), atol=1e-8)
 
-    def test_without_inequalities_casadi_is_not_needed(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        from analysis.numerics import symbolic
-
-        def missing() -> None:
-            raise ImportError
-
-        monkeypatch.setattr(symbolic, "library", missing)
-        solution = best()
-        assert solution.error < 2e-5
-        with pytest.raises(ImportError):
-            best(*syn.USUAL)
-
 
 class TestBounds:
     @pytest.mark.parametrize(

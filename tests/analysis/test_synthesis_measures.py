@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from math import pi
+from itertools import pairwise
+from math import pi, radians
 from typing import Any, get_args
 
 import numpy as np
@@ -189,6 +190,42 @@ def test_a_guess_that_keeps_the_constraints_is_never_lost(seed: int, timed: bool
     guess = syn.Solution.of(task, known)
     found = syn.synthesize(task, constraints=(), guesses=[guess], search=syn.Search(candidates=16, starts=1, seed=seed))
     assert found.best.error <= guess.error
+
+
+#: From the loosest to the strictest, each contained in the one before.
+NESTED: tuple[tuple[Any, ...], ...] = (
+    (),
+    (syn.LeastTransmission(angle=0.0, over="task"),),
+    (syn.LeastTransmission(angle=radians(20), over="task"),),
+    (syn.LeastTransmission(angle=radians(20)),),
+    (syn.LeastTransmission(angle=radians(40)),),
+)
+
+
+def drawn_task(seed: int) -> syn.Task:
+    """A function of a slider over a turn, or of an even seed over a part of it."""
+    random = np.random.default_rng(seed)
+    if seed % 2:
+        rotation = syn.turn(18)
+        waves = (random.normal() / k**2 * np.cos(k * rotation + random.uniform(0.0, 6.0)) for k in (1, 2, 3))
+        return syn.SliderFunction(rotation=rotation, position=0.1 * sum(waves))
+    rotation = np.linspace(0.0, random.uniform(2.0, 4.0), 14)
+    share = rotation / rotation[-1]
+    bends = (size * random.normal() * np.sin(k * pi * share) for k, size in ((1, 0.02), (2, 0.01)))
+    return syn.SliderFunction(rotation=rotation, position=0.1 * share + sum(bends))
+
+
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(n, marks=pytest.mark.slow) for n in range(4, 24))])
+def test_a_looser_constraint_is_no_worse(seed: int) -> None:
+    errors = []
+    for constraints in NESTED:
+        try:
+            errors.append(syn.synthesize(drawn_task(seed), constraints=constraints).best.error)
+        except syn.InfeasibleError:
+            errors.append(np.inf)
+    for loose, strict in pairwise(errors):
+        # on the way of a task the angle is held between the stations with a margin of some thousandths of a degree
+        assert loose <= 1.002 * strict
 
 
 def test_a_circle_as_a_guess_for_the_square_comes_back_or_better() -> None:

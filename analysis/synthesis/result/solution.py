@@ -22,7 +22,7 @@ from ..linkage.kernels import PLACES
 from ..linkage.linkage import Linkage, SliderCrank, wrapped
 from ..linkage.machine import Make
 from ..task.target import area_between, distance_to, halves, hausdorff, straightness
-from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
+from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, covers_turn, normal_form
 from .described import description, drives
 
 FloatArray = NDArray[np.float64]
@@ -438,14 +438,13 @@ class Solution(Shown):
 
 
 def whole_turn(task: Task, rotation: FloatArray) -> bool:
-    """Return whether the stations of a task cover a whole turn: as far apart across its end as elsewhere.
+    """Return whether the stations of a task cover a whole turn.
 
     Untimed precision points never do: a wide step between two of them says nothing about the way from the last to the first.
     """
     if isinstance(task, PrecisionPoints) and task.rotation is None:
         return False
-    gap = 2.0 * pi - float(np.ptp(rotation))
-    return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
+    return covers_turn(rotation)
 
 
 def target_points(task: Task) -> FloatArray | None:

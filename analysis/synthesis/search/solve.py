@@ -209,7 +209,7 @@ def synthesize(
         # the ratios of gears share the starts and the candidates of a kind
         share = 1 if limits.second is None else len(gears)
         how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
-        total += len(given) + how.starts
+        total += (len(given) + how.starts) * (1 if limits.sound(normal) is None else 2)
         try:
             part = _searched(normal, limits, given, own, how)
         except InfeasibleError as error:
@@ -249,14 +249,24 @@ def _in_closed_form(
 def _searched(
     normal: Normal, limits: Limits, guesses: Sequence[Solution], pivot: PivotUnknown | None, search: Search
 ) -> Polished:
-    """Search for one kind of linkage, from the starts of a scan and from guesses."""
+    """Search for one kind of linkage, from the starts of a scan and from guesses.
+
+    Sound linkages are ranked first: where no limit keeps them sound, they are searched for by themselves too.
+    """
     begin = [_start(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
     scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
     if pivot is not None and limits.second is None:
         scanned = [replace(s, pivot=random_pivot(pivot, s.q[2], normal.unit, random)) for s in scanned]
     begin += scanned
-    return polish(normal, limits, begin, pivot=pivot, search=search)
+    done = polish(normal, limits, begin, pivot=pivot, search=search)
+    sound = limits.sound(normal)
+    if done.interrupted or sound is None:
+        return done
+    try:
+        return _searched(normal, sound, guesses, pivot, search).joined(done)
+    except InfeasibleError:
+        return done
 
 
 def _together(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:

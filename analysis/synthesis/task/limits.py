@@ -44,6 +44,8 @@ FloatArray = NDArray[np.float64]
 LARGEST = 5.0
 #: Ground link of a rocker function by default (m): its angles do not depend on the size.
 GROUND = 0.1
+#: Grashof types whose crank does not turn fully.
+_SWINGING = ("double-rocker", "rocker-crank", "triple-rocker")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,6 +111,12 @@ class Limits:
         """Return whether something holds along the crank's rotation."""
         return any(isinstance(require, Along) for require in self.requires)
 
+    def sound(self, normal: Normal) -> Limits | None:
+        """Return these limits for linkages without defects; None if they keep them sound already, or minimise no error."""
+        if self.turn is not None or self.way is not None or self.least is not None:
+            return None
+        return replace(self, turn=0.0) if normal.whole_turn else replace(self, way=0.0)
+
     @property
     def bounds_only(self) -> bool:
         """Return whether nothing but bounds is asked, so that a least squares method can do it."""
@@ -154,6 +162,8 @@ def make_limits(
     shift[:2] = normal.origin.real, normal.origin.imag
     scale[:7] = normal.unit
     turn, way, grashof = _turning(constraints)
+    if way is not None and normal.whole_turn and grashof not in _SWINGING:
+        turn, way = max(turn or 0.0, way), None
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
     over = Way(turn is not None, normal.rotation, straight, linkage)
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
@@ -235,7 +245,7 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
     type_ = types.pop() if types else None
     if turn is None and (any(isinstance(c, FullTurn) for c in constraints) or type_ in ("crank-rocker", "drag-link")):
         turn = 0.0
-    if type_ in ("double-rocker", "rocker-crank", "triple-rocker"):
+    if type_ in _SWINGING:
         if turn is not None:
             raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
         # on its way it must stay joined all the same

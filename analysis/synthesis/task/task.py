@@ -384,6 +384,12 @@ def _leverage(length: float | None, points: FloatArray) -> float:
     return length
 
 
+def covers_turn(rotation: FloatArray) -> bool:
+    """Return whether crank rotations cover a whole turn: as far apart across its end as elsewhere."""
+    gap = 2.0 * pi - float(np.ptp(rotation))
+    return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Normal:
     """A task in normal form: targets at n stations, in units of the target's size about its centre.
@@ -459,6 +465,11 @@ class Normal:
     def timed(self) -> bool:
         """Return whether the crank rotations are given."""
         return self.rotation is not None
+
+    @property
+    def whole_turn(self) -> bool:
+        """Return whether the task takes a whole turn of the crank, as far as that is known."""
+        return self.closed or (self.rotation is not None and covers_turn(self.rotation))
 
     @property
     def shares(self) -> FloatArray:
