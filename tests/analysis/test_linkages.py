@@ -418,6 +418,46 @@ MISTAKES = [
     ("springs/k", {"at": "C", "law": [[1, 2], [0, 3]]}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": [[1, 2]]}, "linkage.springs.k.law"),
     ("springs/crank", {"at": "C", "stiffness": 1.0, "driven": "no"}, "linkage.springs.crank.driven"),
+    ("bodies/crank/length", float("nan"), "linkage.bodies.crank.length"),
+    ("bodies/crank/length", "50", "linkage.bodies.crank.length"),
+    ("bodies/crank/bar", ["A", "A"], "linkage.bodies.crank.bar"),
+    ("bodies/crank/points", {"B": ["1 mm", 0]}, "linkage.bodies.crank.points.B"),
+    ("bodies/crank/points", ["P"], "linkage.bodies.crank.points"),
+    ("bodies/crank/section", {"kind": "rod", "diameter": "1 mm", "material": "cheese"}, "section.material"),
+    (
+        "bodies/crank/section",
+        {"kind": "plate", "corners": ["A"], "thickness": "8 mm", "material": "steel"},
+        "section.corners",
+    ),
+    ("bodies/ground", {"points": {"Q": [0, 0]}, "mass": 1.0}, "linkage.bodies.ground"),
+    ("bodies/double", {"bar": ["A", "B"], "length": "50 mm", "mass": 1.0}, "4 at A, 2 at D, 4 at B"),
+    ("bodies/rocker/length", "10 mm", "crank angle 0 rad"),
+    ("bodies", {"crank": {"bar": ["A", "B"], "length": 1.0}}, "linkage.bodies have no mass"),
+    ("ground", {}, "linkage.ground"),
+    ("ground/A", [float("inf"), 0], "linkage.ground.A"),
+    ("name", "my linkage", "linkage.name"),
+    ("name", "../x", "linkage.name"),
+    ("name", "five-bar", "linkage.name"),
+    ("loads", ["C", "C"], "linkage.loads has C twice"),
+    ("torques", ["rocker", "rocker"], "linkage.torques has rocker twice"),
+    ("freedoms", ["A"], "linkage.freedoms"),
+    ("freedoms", {"coupler": "A"}, "linkage.freedoms.coupler"),
+    ("freedoms", {"crank 1": "A"}, "linkage.freedoms.crank 1"),
+    ("freedoms/crank/speeed", 1.0, "linkage.freedoms.crank.speed"),
+    ("slots/S", {"pin": "C", "on": "rocker", "through": "D"}, "linkage.slots.S.pin"),
+    ("slots/crank", {"pin": "B", "on": "rocker", "through": "D"}, "linkage.bodies.crank"),
+    ("gears/X", {"bodies": ["crank", "crank"], "ratio": -1}, "linkage.gears.X.bodies"),
+    ("gears/X", {"bodies": ["crank", "coupler"], "ratio": -1}, "linkage.gears.X.bodies"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": 0}, "linkage.gears.X.ratio"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": "1:2"}, "linkage.gears.X.ratio"),
+    ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0}, "linkage.racks.R.radius"),
+    ("springs/k", {"at": "C"}, "linkage.springs.k does nothing"),
+    ("springs/k", {"at": "C", "stiffness": 1.0, "free": "1 mm"}, "linkage.springs.k.free is"),
+    ("springs/k", {"between": ["B", "B"], "stiffness": 1.0}, "linkage.springs.k.between"),
+    ("springs/k", {"between": ["A", "D"], "stiffness": 1.0}, "linkage.springs.k.between"),
+    ("springs/k", {"at": "C", "law": "sin(x, v)"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "1e999*x"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "sqrt(-1 - x*x)"}, "the law of linkage.springs.k"),
 ]
 
 
@@ -426,6 +466,16 @@ def test_mistakes_are_named(tmp_path, path, value, named):
     with pytest.raises(LinkworkError) as error:
         Package(described(changed(path, value))).mechanism(tmp_path)
     assert named in str(error.value)
+
+
+def test_a_free_body_without_mass_is_named(tmp_path):
+    """Its acceleration is no number, and no run may begin."""
+    data = changed("bodies/x", {"bar": ["C", "Q"], "length": 0.1})
+    data["freedoms"] |= {"x": {"joint": "Cx", "driven": False}}
+    data["bodies"]["rocker"]["points"] = {"Cx": [0.05, 0]}
+    data["bodies"]["x"]["bar"] = ["Cx", "Q"]
+    with pytest.raises(LinkworkError, match=r"a mass or inertia in linkage\.bodies"):
+        Package(described(data)).mechanism(tmp_path)
 
 
 def test_other_freedoms_are_proposed(tmp_path):
