@@ -358,6 +358,14 @@ def test_the_conda_recipe_has_the_version_and_the_requirements_of_the_package():
     assert run == {f"python{project['requires-python']}", *project["dependencies"]}
 
 
+def test_rattler_build_renders_the_conda_recipe():
+    rattler = pytest.importorskip("rattler_build")
+    recipe = rattler.Stage0Recipe.from_file(str(ROOT / "packaging" / "conda" / "recipe.yaml"))
+    (variant,) = recipe.render(rattler.VariantConfig(), rattler.RenderConfig())
+    package = variant.recipe().package
+    assert (package.name, package.version) == ("linkwork", __version__)
+
+
 def test_the_citation_is_of_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert (citation["title"], citation["version"]) == ("Linkwork", __version__)

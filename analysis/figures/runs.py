@@ -17,7 +17,7 @@ from linkwork.variables import UNITS, Variable
 from ..mechanisms import MECHANISMS, mechanism_of
 from ..run import Trajectory
 from .dispatch import draw_mechanism, has_picture, plot
-from .style import COLOURS, LINES, MARKED, SMALL, Figure, finish, legend_above, styled, write_notes, write_title
+from .style import COLOURS, LINES, MARKED, SMALL, Figure, finish, legend_above, spoken, styled, write_notes, write_title
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def display_unit(variable: Variable) -> tuple[str, float]:
 def _output(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
     values = run[name]  # an unknown name is refused there
     unit, factor = display_unit(table[name])
-    return _Rows(name=name, unit=unit, curves={"": factor * values})
+    return _Rows(name=spoken(name), unit=unit, curves={"": factor * values})
 
 
 def _telling(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
@@ -222,7 +222,7 @@ def plot_comparison(
 ) -> Figure:
     """Plot outputs of two runs over each other, and the second less the first beside them, a row each.
 
-    Where both are the same, or differ by no more than rounding, it is written in place of the difference.
+    A difference that is no more than rounding is written instead, at the foot if none is more.
 
     Parameters
     ----------
@@ -236,18 +236,26 @@ def plot_comparison(
     """
     n = min(len(first), len(second))
     time, table = first.time[:n], _variables(first)
+    units = [display_unit(table[name]) for name in names]
+    pairs = [(factor * first[name][:n], factor * second[name][:n]) for name, (_, factor) in zip(names, units)]
+    said = [_rounding(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
+    beside = not all(said)
     with styled():
-        figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(names)))
-        rows = figure.subplots(len(names), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
-        for (both, beside), name in zip(rows, names):
-            unit, factor = display_unit(table[name])
-            a, b = factor * first[name][:n], factor * second[name][:n]
+        figure = Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
+        rows = figure.subplots(len(names), 1 + beside, sharex=True, squeeze=False, width_ratios=(3, 2)[: 1 + beside])
+        for axes, name, (unit, _), (a, b), size in zip(rows, names, units, pairs, said):
             for values, label, colour, line in zip((a, b), labels, COLOURS, LINES):
-                both.plot(time, values, line, color=colour, label=label)
-            both.set_ylabel(f"{name}\n[{unit}]")
-            _draw_difference(beside, time, a, b, unit)
+                axes[0].plot(time, values, line, color=colour, label=label)
+            axes[0].set_ylabel(f"{spoken(name)}\n[{unit}]")
+            if beside:
+                _draw_difference(axes[1], time, b - a, unit, size)
         legend_above(rows[0, 0])
-        rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
+        if beside:
+            rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
+        else:
+            each = ", ".join(f"{spoken(name)} by {size}" for name, size in zip(names, said) if size != "0")
+            apart = f"differ by rounding only: {each} at most" if each else "are identical"
+            write_notes(figure, [f"{labels[0]} and {labels[1]} {apart}."])
         for axis in rows[-1]:
             axis.set_xlabel("time [s]")
         write_title(figure, title)
@@ -255,13 +263,20 @@ def plot_comparison(
         return finish(figure)
 
 
-def _draw_difference(axis: Axes, time: FloatArray, a: FloatArray, b: FloatArray, unit: str) -> None:
+def _rounding(a: FloatArray, b: FloatArray, unit: str) -> str:
+    """Return the largest difference with its unit if it is rounding, 0 if there is none, otherwise nothing."""
     largest = float(np.abs(b - a).max(initial=0.0))
     if largest > _ROUNDING * float(np.abs(a).max(initial=0.0)):
-        axis.plot(time, b - a, color=MARKED)
+        return ""
+    return f"{largest:.1g} {unit}" if largest else "0"
+
+
+def _draw_difference(axis: Axes, time: FloatArray, difference: FloatArray, unit: str, size: str) -> None:
+    if not size:
+        axis.plot(time, difference, color=MARKED)
         axis.set_ylabel(f"difference\n[{unit}]")
         return
-    words = f"identical but for rounding,\n{largest:.1g} {unit} at most" if largest else "identical"
+    words = "identical" if size == "0" else f"identical but for rounding,\n{size} at most"
     axis.text(0.5, 0.5, words, transform=axis.transAxes, ha="center", va="center", color=MARKED)
     axis.set_yticks([])
     axis.grid(visible=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 from typing import NamedTuple
 
 from ..files import unknown_name
@@ -279,10 +279,9 @@ def analyse(description: Description) -> Structure:
             )
     steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
     if left:
-        others = _choices(description, found, count)
-        hint = (
-            "; these joints as freedoms would do: " + " or ".join(" and ".join(o) for o in others[:3]) if others else ""
-        )
+        others = [" and ".join(some) for some in islice(_choices(description, found, count), 3)]
+        driven = "a driven spring drives another joint"
+        hint = f"; these joints as freedoms would do: {' or '.join(others)}; {driven}" if others else ""
         raise LinkageError(
             f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: they "
             f"do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"
@@ -291,11 +290,11 @@ def analyse(description: Description) -> Structure:
     return Structure(names, found, freedoms, tuple(steps))
 
 
-def _choices(description: Description, found: Mapping[str, Joint], count: int) -> list[tuple[str, ...]]:
-    """Return the sets of joints from whose coordinates all bodies follow, those with most joints of the ground first."""
+def _choices(description: Description, found: Mapping[str, Joint], count: int) -> Iterator[tuple[str, ...]]:
+    """Yield the sets of joints from whose coordinates all bodies follow, those with most joints of the ground first."""
     simple = [name for name, joint in found.items() if len(joint.bodies) == 2 and name not in description.slots]
     simple.sort(key=lambda name: GROUND not in found[name].bodies)
-    return [some for some in combinations(simple, count) if not _solve(description, found, list(some))[1]]
+    return (some for some in combinations(simple, count) if not _solve(description, found, list(some))[1])
 
 
 def _proposed(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
@@ -355,6 +354,8 @@ def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapp
         return dyad
     groups: dict[str, list[Freed | Dyad]] = {}
     for body, tree in trees.items():
+        if not any(_links(fixed, set(known), {body})):
+            continue
         own: list[Freed | Dyad] = list(tree)
         there = dict.fromkeys((body, *(step.body for step in tree)))
         while inner := next(

@@ -104,9 +104,9 @@ def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None
     figure = figures.plot(trajectory, ["slider.position", "crank.speed", "pin.A.fx"], title="three")
     assert isinstance(figure, figures.Figure)
     assert [axis.get_ylabel() for axis in figure.axes] == [
-        "slider.position\n[mm]",
-        "crank.speed\n[rpm]",
-        "pin.A.fx\n[N]",
+        "slider position\n[mm]",
+        "crank speed\n[rpm]",
+        "pin A fx\n[N]",
     ]
     (line,) = figure.axes[0].lines
     assert np.array_equal(line.get_xdata(), trajectory.time)
