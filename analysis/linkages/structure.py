@@ -279,7 +279,8 @@ def analyse(description: Description) -> Structure:
     steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
     if left:
         others = [" and ".join(some) for some in islice(_choices(description, found, count), 3)]
-        hint = f"; these joints as freedoms would do: {' or '.join(others)}" if others else ""
+        driven = "a driven spring drives another joint"
+        hint = f"; these joints as freedoms would do: {' or '.join(others)}; {driven}" if others else ""
         raise LinkageError(
             f"with {', '.join(f.joint for f in freedoms.values())} as freedoms the bodies {', '.join(left)} are no dyads: they "
             f"do not follow one pair after the other{hint or ', nor with any other joints as freedoms'}"

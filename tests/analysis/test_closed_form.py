@@ -41,6 +41,18 @@ def poses_of(linkage: syn.Linkage, rotation: FloatArray) -> syn.PrecisionPoints:
     return syn.PrecisionPoints(points=linkage.path(rotation), angle=linkage.coupler_angle(rotation))
 
 
+@pytest.mark.parametrize(("n", "seed"), [(4, 3), (4, 47), (5, 474), (5, 666)])
+def test_a_search_has_the_sound_answers_of_the_closed_form(n: int, seed: int) -> None:
+    """Of these, four poses far apart have a wide way between them, and are met with a transmission angle that is small."""
+    random = np.random.default_rng(seed)
+    task = syn.PrecisionPoints(points=random.uniform(-1.0, 1.0, (n, 2)), angle=random.uniform(-1.0, 1.0, n))
+    assert any(solution.verdicts.sound for solution in syn.guidance(task).solutions)
+    quick = syn.Search(starts=4, candidates=1 << 10)
+    best = syn.synthesize(task, constraints=[syn.LeastTransmission(angle=0.0, over="task")], search=quick).best
+    assert best.verdicts.sound
+    assert best.error < 1e-20
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_dyads_of_five_poses_keep_their_length(seed: int) -> None:
     found = syn.guidance(random_poses(seed, 5))

@@ -57,6 +57,8 @@ MOST = 32
 DIFFERENT = 1e-3
 #: The same for paths that race: less than this would end at the same optimum.
 RACED = 0.02
+#: Rotations on the way of a task at which a start is judged, more than a search can afford.
+JUDGED = 400
 #: Share of the quality below which points count as met exactly (units squared).
 EXACT = 1e-14
 
@@ -256,6 +258,7 @@ class Polisher:
         few = normal.timed or normal.n <= FEW
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._refinement: Refinement | None = None
+        self._closely: Program | None = None
         self._programs: dict[tuple[str, bool], Program] = {}
 
     def program(self, objective: Objective, *, exact: bool = False) -> Program:
@@ -383,8 +386,13 @@ class Polisher:
                 start=replace(start, q=inside(start.q, self.limits.low, self.limits.high), quality=quality),
                 feasible=within and np.isfinite(quality),
             )
-        path = self.normal.outline is not None
-        return self.program("curve" if path else "squares", exact=True).kept(start)
+        objective: Objective = "squares" if self.normal.outline is None else "curve"
+        if self.limits.way is None:
+            return self.program(objective, exact=True).kept(start)
+        if self._closely is None:
+            parts = -(-JUDGED // self.normal.n)
+            self._closely = Program(self.normal, self.limits, self.pivot, objective, parts=max(4, parts))
+        return self._closely.kept(start)
 
 
 # Least squares

@@ -78,6 +78,9 @@ class Statement:
         last two are the objective of the limits instead of an error, with stations and without.
     exact : bool
         Whether bounds of the pivot's motion can be held at its extremes, see `exact`; without, a first search is quicker.
+    parts : int
+        Parts of the way from one station to the next at whose ends the transmission angle is held; a margin makes sure of what
+        is between them.
     """
 
     def __init__(
@@ -88,8 +91,10 @@ class Statement:
         objective: Objective = "squares",
         *,
         exact: bool = True,
+        parts: int = 4,
     ) -> None:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
+        self._parts = parts
         #: Turns of the crank, and of a second one, while the rotation searched makes one.
         self._turns = geared(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
         casadi = self._casadi = symbolic.library()
@@ -407,10 +412,10 @@ class Statement:
 
     def _way(self, phi: Any) -> tuple[Any, Any]:
         """Return the stations' rotations and some in between, and the distance from each to the next."""
-        steps = 0.25 * (phi[1:] - phi[:-1])
-        between = [phi[:-1] + k * steps for k in (1, 2, 3)]
+        steps = (phi[1:] - phi[:-1]) / self._parts
+        between = [phi[:-1] + k * steps for k in range(1, self._parts)]
         casadi = self._casadi
-        return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], steps, steps, steps)
+        return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], *[steps] * len(between))
 
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
         """Bound the slider's motion; return what its smoothness adds to the quality."""
