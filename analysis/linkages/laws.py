@@ -42,12 +42,16 @@ def law(value: Any, name: str) -> str:
                 and not node.keywords
             )
             or (isinstance(node, ast.Name) and node.id in (FUNCTIONS if node in called else ("x", "v")))
-            or (isinstance(node, ast.Constant) and type(node.value) in (int, float) and isfinite(node.value))
+            or (isinstance(node, ast.Constant) and _finite(node.value))
             or isinstance(node, (*_NODES, ast.Load))
         )
         if not right:
             raise ParameterError(name, value, wanted)
     return ast.unparse(tree)
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def _table(rows: tuple[tuple[float, float], ...], name: str) -> str:
