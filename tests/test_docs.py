@@ -362,7 +362,7 @@ def test_rattler_build_renders_the_conda_recipe():
     rattler = pytest.importorskip("rattler_build")
     recipe = rattler.Stage0Recipe.from_file(str(ROOT / "packaging" / "conda" / "recipe.yaml"))
     (variant,) = recipe.render(rattler.VariantConfig(), rattler.RenderConfig())
-    package = variant.recipe().package
+    package = variant.recipe.package
     assert (package.name, package.version) == ("linkwork", __version__)
 
 

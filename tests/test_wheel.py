@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import sysconfig
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from packaging.requirements import Requirement
 
+import linkwork
 from analysis.export import SOURCES
 from analysis.export.bill import add_bill_to_wheel
 
@@ -61,6 +65,20 @@ def test_the_wheel_has_two_packages_that_are_typed_and_no_other_module(wheel: Pa
     assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"analysis", "linkwork"}
     assert {"analysis/py.typed", "linkwork/py.typed", "analysis/_examples/run-up.toml"} <= set(names)
     assert any(name.endswith(".dist-info/sboms/linkwork.cdx.json") for name in names)
+
+
+def test_the_wheel_has_its_bill_of_materials(wheel: Path) -> None:
+    """What it carries, the page's library of curves, and what it asks for, with the versions that are asked for."""
+    with ZipFile(wheel) as archive:
+        (place,) = (name for name in archive.namelist() if name.endswith(".dist-info/sboms/linkwork.cdx.json"))
+        bill = json.loads(archive.read(place))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = {r.name: str(r.specifier) for r in map(Requirement, project["dependencies"])}
+    carried = json.loads((ROOT / "studio" / "package.json").read_text(encoding="utf-8"))["dependencies"]
+    assert {c["name"]: c["properties"][0]["value"] for c in bill["components"] if "properties" in c} == asked
+    assert {c["name"]: c["version"] for c in bill["components"] if "version" in c} == carried
+    assert bill["metadata"]["component"]["version"] == linkwork.__version__
+    assert set(bill["dependencies"][0]["dependsOn"]) == {*asked, *carried}
 
 
 def test_the_wheel_has_all_sources_of_fmus(wheel: Path) -> None:

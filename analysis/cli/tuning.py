@@ -80,14 +80,16 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
 def _print(title: str, tuned: Any) -> None:
     from ..mechanisms import mechanism_of
     from ..periodic import unit_of
+    from ..units import display_of
 
     wish = tuned.wish
     rows = []
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
         # a percent of nothing is nothing
-        change = f"{100.0 * (after / before - 1.0):+.4g} %" if before else f"{after:+.4g}"
-        unit = unit_of(mechanism_of(wish.parameters), name)
-        rows.append((name, unit, f"{before:.7g}", f"{after:.7g}", change if after != before else "none"))
+        unit, factor = display_of(unit_of(mechanism_of(wish.parameters), name))
+        change = f"{100.0 * (after / before - 1.0):+.4g} %" if before else f"{factor * after:+.4g} {unit}"
+        changed = change if after != before else "none"
+        rows.append((name, unit, f"{factor * before:.7g}", f"{factor * after:.7g}", changed))
     headings = ("parameter", "unit", "before", "after", "change")
     show_table(f"{title}: the least change", headings, rows, words=headings[:2])
     headings = ("requirement", "wished", "before", "after", "")

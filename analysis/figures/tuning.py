@@ -30,7 +30,10 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     span = [level / scale for level in (tuned.after.response.low, tuned.after.response.high)]
     rows = (
         (f"amplitude of {what} [{unit}]", lambda b: factor * b.amplitude),
-        ("largest Floquet multiplier,\nunstable above 1", lambda b: np.minimum(b.largest_multiplier, _GREATEST)),
+        (
+            f"largest Floquet multiplier,\nunstable above 1 (cut at {_GREATEST:g})",
+            lambda b: np.minimum(b.largest_multiplier, _GREATEST),
+        ),
     )
     panels = []
     for number, (label, value) in enumerate(rows):
@@ -55,9 +58,9 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
             )
         )
     changed = [
-        f"{spoken(name)} {before:.6g} to {after:.6g} {quantity}"
+        f"{spoken(name)} {scaled * before:.6g} to {scaled * after:.6g} {quantity}"
         for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
-        for quantity in [unit_of(tuned.wish.mechanism, name)]
+        for quantity, scaled in [display_of(unit_of(tuned.wish.mechanism, name))]
     ]
     return plot_curves(panels, title=title, notes=[f"Changed: {', '.join(changed)}. Dashed: unstable.", *tuned.missed])
 

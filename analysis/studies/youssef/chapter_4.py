@@ -45,7 +45,7 @@ RESONANCES = {
 #: Resonance (rad/s) at I4 = 1 by the printed coefficients.
 PRINTED_RESONANCE = 30.6120
 #: Variants that are compared, by their names in legends.
-VARIANTS = {Variant.EXACT: "right", Variant.PRINTED: "(4.21) as printed", Variant.FORTRAN: "listing of appendix 2"}
+VARIANTS = {Variant.EXACT: "corrected", Variant.PRINTED: "(4.21) as printed", Variant.FORTRAN: "listing of appendix 2"}
 #: The speeds of appendix 2 (rad/s), closer at the resonances.
 SPEEDS = np.unique(
     np.concatenate([np.arange(9.0, 40.05, 0.1), np.arange(15.0, 15.8, 0.005), np.arange(30.0, 31.3, 0.005)]).round(3)
@@ -110,7 +110,7 @@ def undamped_columns(n: int) -> dict[str, NDArray[np.float64]]:
 
 def growth_verdicts(columns: dict[str, NDArray[np.float64]], n: int, place: str) -> list[Verdict]:
     """Judge whether amplitudes and the width of the resonance grow with I4."""
-    curves = [columns[f"I4 = {ratio:g}; right [1]"] for ratio in INERTIA_RATIOS]
+    curves = [columns[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS]
     ratios = [np.min((larger / smaller)[APART]) for smaller, larger in pairwise(curves)]
     level = LARGE if n == 1 else 0.1 * LARGE
     near_it = np.arange(28.0, 34.0, 0.02) if n == 1 else np.arange(14.8, 16.2, 0.01)
@@ -186,7 +186,7 @@ def compute_second() -> StudyResult:
     exceeds = [np.count_nonzero(harmonic(2, resonant, r) > harmonic(1, resonant, r)) * step for r in INERTIA_RATIOS]
     fast = SPEEDS >= 20.0
     small = max(
-        (columns[f"I4 = {ratio:g}; right [1]"] / harmonic(1, SPEEDS, ratio))[fast].max() for ratio in INERTIA_RATIOS
+        (columns[f"I4 = {ratio:g}; corrected [1]"] / harmonic(1, SPEEDS, ratio))[fast].max() for ratio in INERTIA_RATIOS
     )
     speed, right = peak(2, 1.0, COMPARED_AT)
     _, listed = peak(2, 1.0, COMPARED_AT, Variant.FORTRAN)
@@ -234,7 +234,7 @@ def compute_second() -> StudyResult:
 def draw_undamped(result: StudyResult, n: int) -> Figure:
     """Draw the three inertia ratios, and the variants close to the resonance."""
     c, word = result.columns, ("first", "second")[n - 1]
-    three = {f"I4 = {ratio:g}": c[f"I4 = {ratio:g}; right [1]"] for ratio in INERTIA_RATIOS}
+    three = {f"I4 = {ratio:g}": c[f"I4 = {ratio:g}; corrected [1]"] for ratio in INERTIA_RATIOS}
     variants = {name: c[f"I4 = 1; {name} [1]"] for name in VARIANTS.values()}
     ranges = {1: ((0.003, 30.0), (30.4, 30.8), (0.2, 60.0)), 2: ((5e-5, 1.0), (15.1, 15.5), (3e-4, 1.0))}[n]
     panels = [
@@ -249,7 +249,7 @@ def draw_undamped(result: StudyResult, n: int) -> Figure:
             y_range=y_range,
         )
         for shown, legend, x_range, y_range in (
-            (three, "right", (9.0, 40.0), ranges[0]),
+            (three, "(4.21) corrected", (9.0, 40.0), ranges[0]),
             (variants, "I4 = 1", ranges[1], ranges[2]),
         )
     ]
@@ -268,7 +268,7 @@ def compute_deviation() -> StudyResult:
         columns[f"omega_k less resonance; {name} [rad/s]"] = np.array(
             [OMEGA_K - resonance(chapter_4(ratio), variant=variant)[0] for ratio in RATIOS.tolist()]
         )
-    deviation = columns["omega_k less resonance; right [rad/s]"]
+    deviation = columns["omega_k less resonance; corrected [rad/s]"]
     shown = RATIOS <= 1.5
     slope = deviation[shown][-1] / 1.5
     bent = np.abs(deviation - slope * RATIOS)[shown].max() / deviation[shown].max()
@@ -306,7 +306,7 @@ def draw_deviation(result: StudyResult) -> Figure:
     ]
     panel = Panel(
         x_label="inertia ratio I4",
-        y_label="omega_k less resonance [rad/s]",
+        y_label=r"$\omega_k$ less resonance [rad/s]",
         curves=curves,
         x_range=(0.0, 2.0),
         y_range=(0.0, 2.2),
@@ -348,13 +348,13 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
     """Compute Fig 4.6 or 4.7: the first harmonic with the dampers of the listing."""
     columns = {"speed [rad/s]": CLOSE}
     for omega_c in (0.0, *DAMPERS):
-        columns[f"omega_c = {omega_c:g} 1/s; right [1]"] = harmonic(1, CLOSE, inertia_ratio, omega_c)
+        columns[f"omega_c = {omega_c:g} 1/s; corrected [1]"] = harmonic(1, CLOSE, inertia_ratio, omega_c)
     for variant, name in list(VARIANTS.items())[1:]:
         columns[f"omega_c = {STRONGEST:g} 1/s; {name} [1]"] = harmonic(1, CLOSE, inertia_ratio, STRONGEST, variant)
     mechanism = chapter_4(inertia_ratio, STRONGEST)
     plant = [nonlinear_harmonic_balance(mechanism, speed).harmonic(1) for speed in CLOSE.tolist()]
     columns[f"omega_c = {STRONGEST:g} 1/s; plant [1]"] = np.array(plant) / mechanism.rocker_length
-    weak, strong, none = (columns[f"omega_c = {d:g} 1/s; right [1]"] for d in (DAMPERS[0], STRONGEST, 0.0))
+    weak, strong, none = (columns[f"omega_c = {d:g} 1/s; corrected [1]"] for d in (DAMPERS[0], STRONGEST, 0.0))
     tallest = peak(1, inertia_ratio, DAMPERS[0])
     outside = np.abs(CLOSE - tallest[0]) > OUTSIDE
     shift = peak(1, inertia_ratio, STRONGEST)[0] - tallest[0]
@@ -419,7 +419,7 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
 def draw_damped(result: StudyResult) -> Figure:
     """Draw all dampers by the exact equation, and the strongest by each variant and the plant."""
     c = result.columns
-    dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; right [1]"], label=f"{d:g}") for d in DAMPERS]
+    dampers = [Curve(x=CLOSE, y=c[f"omega_c = {d:g} 1/s; corrected [1]"], label=f"{d:g}") for d in DAMPERS]
     strongest = [
         Curve(x=CLOSE, y=c[f"omega_c = {STRONGEST:g} 1/s; {name} [1]"], label=name, colour=colour, line=line)
         for name, colour, line in zip([*VARIANTS.values(), "plant"], [*COLOURS[:3], "0.1"], ("-", "-", "--", ":"))
@@ -434,8 +434,8 @@ def draw_damped(result: StudyResult) -> Figure:
             x_range=x_range,
         )
         for curves, legend, x_range in (
-            (dampers, "right, omega_c [1/s]", (27.0, 35.0)),
-            (strongest, f"omega_c = {STRONGEST:g} 1/s", (29.0, 33.0)),
+            (dampers, r"corrected, $\omega_c$ [1/s]", (27.0, 35.0)),
+            (strongest, rf"$\omega_c$ = {STRONGEST:g} 1/s", (29.0, 33.0)),
         )
     ]
     return plot_curves(panels, title=result.heading)

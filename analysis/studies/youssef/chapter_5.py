@@ -152,8 +152,8 @@ def draw_sweep(result: StudyResult) -> Figure:
             legend_at="best",
         )
         for y_label, curves, filled in (
-            ("lambda_k^2", edges, [[region]]),
-            ("width of the region in lambda_k^2 [1e-3]", sizes, []),
+            (r"$\lambda_k^2$", edges, [[region]]),
+            (r"width of the region in $\lambda_k^2$ [1e-3]", sizes, []),
         )
     ]
     return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 4.0))
@@ -534,8 +534,8 @@ def draw_damped(result: StudyResult) -> Figure:
             y_range=y_range,
         )
         for y_label, curves, legend, y_range in (
-            ("lambda_k^2", boundaries, "omega_c [1/s], true orbit", BOX.x),
-            ("damper omega_c that removes the region [1/s]", removal, "", (0.0, 1.0)),
+            (r"$\lambda_k^2$", boundaries, r"$\omega_c$ [1/s], true orbit", BOX.x),
+            (r"damper $\omega_c$ that removes the region [1/s]", removal, "", (0.0, 1.0)),
         )
     ]
     return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 4.0))

@@ -161,6 +161,8 @@ def draw(result: StudyResult) -> Figure:
         replace(
             curves_panel(result, points, *bounds, marks=False),
             title="(a) region dashed, our choice",
+            # room above the curves for the legend
+            y_range=(330.0, 490.0),
             legend_at="upper right",
         ),
         straight,
