@@ -203,12 +203,10 @@ class Maker:
         ends = {own for _, own in owned}
         if len(ends) > 1:
             pair = rng.choice(sorted(ends), 2, replace=False)
-            data["springs"][self.name("k")] = {
-                "between": [str(own) for own in pair],
-                "stiffness": 50.0,
-                "damping": 0.5,
-                "free": 0.2,
-            }
+            name, tables = self.name("k"), [data["ground"], *(body["points"] for body in data["bodies"].values())]
+            if not any(set(pair) <= table.keys() for table in tables):
+                ends_of = [str(own) for own in pair]
+                data["springs"][name] = {"between": ends_of, "stiffness": 50.0, "damping": 0.5, "free": 0.2}
         if not owned:
             body = next(iter(data["bodies"]))
             owned = [(body, self.pin(body))]

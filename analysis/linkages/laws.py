@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from itertools import pairwise
+from math import isfinite
 from typing import Any
 
 from linkwork.errors import ParameterError
@@ -34,14 +35,23 @@ def law(value: Any, name: str) -> str:
     called = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):
         right = (
-            (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords)
+            (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Name)
+                and len(node.args) == 1
+                and not node.keywords
+            )
             or (isinstance(node, ast.Name) and node.id in (FUNCTIONS if node in called else ("x", "v")))
-            or (isinstance(node, ast.Constant) and type(node.value) in (int, float))
+            or (isinstance(node, ast.Constant) and _finite(node.value))
             or isinstance(node, (*_NODES, ast.Load))
         )
         if not right:
             raise ParameterError(name, value, wanted)
     return ast.unparse(tree)
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def _table(rows: tuple[tuple[float, float], ...], name: str) -> str:

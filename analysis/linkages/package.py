@@ -6,6 +6,7 @@ import hashlib
 import importlib
 import re
 import sys
+from math import isfinite
 from pathlib import Path
 
 from linkwork import planar
@@ -20,6 +21,7 @@ from .drawing import Picture
 from .dynamics import Motion
 from .equations import Places
 from .laws import FUNCTIONS
+from .mistakes import check_entries
 from .outputs import Outputs
 from .parameters import Drive, interface, size
 from .structure import Structure, analyse
@@ -166,6 +168,7 @@ class Package:
 
     def __init__(self, description: Description) -> None:
         self.description = description
+        check_entries(description)
         self.structure: Structure = analyse(description)
         self.interface = interface(description, self.structure)
         self.motion = Motion(self.interface)
@@ -211,6 +214,7 @@ class Package:
         except AssemblyError as error:
             signs = ", the assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
             raise LinkageError(f"{error}: the start{signs} or the lengths must be others") from None
+        self._check_motion(made)
         MECHANISMS.pop(name, None)
         try:
             register(made)
@@ -219,6 +223,21 @@ class Package:
                 MECHANISMS[name] = known
             raise
         return made
+
+    def _check_motion(self, made: Mechanism) -> None:
+        """Raise LinkageError where the accelerations at the start are no finite numbers."""
+        start = made.published[made.name]
+        x, p = made.state(start.initial), start.parameters.constants()
+        inputs = tuple(float(v.start or 0.0) for v in made.variables if v.causality == "input")
+        acting = made.equations.applied(tuple(float(mode.default) for mode in made.modes), inputs, p)
+        try:
+            if all(map(isfinite, made.equations.derivative(x, acting, p))):
+                return
+        except (ValueError, TypeError, ArithmeticError):
+            pass
+        laws = [f"the law of linkage.springs.{name}" for name, s in self.description.springs.items() if s.law]
+        causes = " or ".join((*laws, "a mass or inertia in linkage.bodies"))
+        raise LinkageError(f"the accelerations at the start are no finite numbers: {causes} must be another")
 
     def _equations(self) -> str:
         motion = self.motion

@@ -258,14 +258,10 @@ def _joined(description: Description, structure: Structure) -> Iterator[Paramete
             yield Parameter(f"{joint.name}.direction", "rad", text, table.direction, "free")
     for name, gear in description.gears.items():
         first, second = gear.bodies
-        if gear.ratio == 0.0:
-            raise ParameterError(f"linkage.gears.{name}.ratio", 0.0, "not be zero")
         yield Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
         text = f"Angle of the {second} where that of the {first} is zero"
         yield Parameter(f"{name}.phase", "rad", text, gear.phase, "free")
     for name, rack in description.racks.items():
-        if rack.radius == 0.0:
-            raise ParameterError(f"linkage.racks.{name}.radius", 0.0, "not be zero")
         yield Parameter(
             f"{name}.radius", "m", f"Travel of the {rack.rack} by the angle of the {rack.gear}", rack.radius, "free"
         )
@@ -387,7 +383,8 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
     )
     for own, value, in_unit, text, rule, role in rows:
         if given(value):
-            number = (Quantity(in_unit) if rule else Quantity(in_unit, least=0.0))(value, f"{where}.{own}")
+            reader = Quantity(in_unit) if rule else Quantity(in_unit, least=0.0)
+            number = reader(value, f"{where}.{own.removesuffix(f'_{kind}')}")
             yield Parameter(
                 f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else ""
             )

@@ -237,12 +237,10 @@ def sliders(structure: Structure) -> dict[str, Slider]:
     return {name: joint for name, joint in structure.joints.items() if isinstance(joint, Slider)}
 
 
-def mobility(description: Description, found: Mapping[str, Joint]) -> int:
-    """Count the freedoms by Gruebler's formula."""
-    moving = len(description.bodies) + len(description.slots)
-    lost = sum(2 * (len(joint.bodies) - 1) for joint in found.values())
-    lost += len(description.gears) + len(description.racks)
-    return 3 * moving - lost
+def lost_freedoms(description: Description, found: Mapping[str, Joint]) -> dict[str, int]:
+    """Return the freedoms that each joint, gear pair and rack takes away."""
+    lost = {name: 2 * (len(joint.bodies) - 1) for name, joint in found.items()}
+    return lost | dict.fromkeys((*description.gears, *description.racks), 1)
 
 
 def analyse(description: Description) -> Structure:
@@ -255,19 +253,20 @@ def analyse(description: Description) -> Structure:
         names the bodies that are left, and other choices of freedoms that would do.
     """
     found = joints(description)
-    count = mobility(description, found)
+    lost, moving = lost_freedoms(description, found), len(description.bodies) + len(description.slots)
+    count = 3 * moving - sum(lost.values())
     freedoms = dict(description.freedoms)
+    says = (
+        f"{description.name} has {count} freedoms by Gruebler's count, 3 of each of {moving} bodies less "
+        f"{', '.join(f'{taken} at {name}' for name, taken in lost.items())}"
+    )
     if not 1 <= count <= MOST_FREEDOMS:
-        raise LinkageError(
-            f"{description.name} has {count} freedoms by Gruebler's count, three of each body less what the joints take away: "
-            f"it must have 1 to {MOST_FREEDOMS}"
-        )
+        raise LinkageError(f"{says}: it must have 1 to {MOST_FREEDOMS}")
     if not freedoms:
         freedoms = _proposed(description, found, count)
     if len(freedoms) != count:
         raise LinkageError(
-            f"{description.name} has {count} freedoms by Gruebler's count, but {len(freedoms)} are given "
-            f"({', '.join(freedoms)}): they must be as many"
+            f"{says}, but {len(freedoms)} are given in linkage.freedoms ({', '.join(freedoms)}): they must be as many"
         )
     for name, freedom in freedoms.items():
         if freedom.joint not in found:

@@ -6,7 +6,6 @@ import importlib
 import itertools
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,9 @@ import pytest
 from analysis.linkages import Dyad, Package, Racked, described, linkage, load_linkage
 from analysis.linkages.description import Slot
 from analysis.linkages.structure import Pin, Slider
-from analysis.mechanisms import FIVE_BAR, check
+from analysis.mechanisms import check
 from analysis.run import Inputs, Trajectory, load_case, simulate
 from linkwork.errors import LinkworkError
-from linkwork.mechanism import Mechanism
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
 
@@ -209,108 +207,6 @@ def test_random_linkages_keep_their_energy(tmp_path, seed):
     assert run["energy.kinetic"].max() > 1e-3
 
 
-def five_bar(p: Any) -> dict[str, Any]:
-    """The five-bar slider in words, of the parameters of the hand-written one."""
-    return {
-        "name": "five-bar-described",
-        "ground": {"A": [0, 0], "O": [p.ground_length, 0]},
-        "bodies": {
-            "crank": {
-                "bar": ["A", "B"], "length": p.crank_length, "mass": 0.3, "inertia": p.crank_inertia - 1.2e-4,
-                "cog": [0.02, 0],
-            },
-            "coupler": {
-                "bar": ["B", "C"], "length": p.coupler_length, "points": {"P": [0.05, 0.03]}, "mass": p.coupler_mass,
-                "inertia": p.coupler_inertia, "cog": [p.coupler_cog_distance, 0.001],
-            },
-            "rocker": {
-                "bar": ["D", "C"], "length": p.rocker_length, "mass": p.rocker_mass, "inertia": p.rocker_inertia,
-                "cog": [p.rocker_cog_distance, 0],
-            },
-            "block": {"points": {"D": [0, 0]}, "mass": p.slider_mass},
-        },
-        "slides": {"G": {"body": "block", "through": "O", "direction": 0.3}},
-        "freedoms": {"crank": {"joint": "A", "speed": 44.0}, "slider": "G"},
-        "springs": {
-            "spring": {
-                "at": "G", "stiffness": p.slider_stiffness, "damping": p.slider_damping, "free": 0.002, "friction": 0.7
-            }
-        },
-        "loads": ["P"],
-        "gravity": 9.81,
-        "gravity_direction": -0.5 * math.pi - 0.2,
-    }  # fmt: skip
-
-
-#: Friction of the five-bar by the forces in its joints: coefficient of the guide, radii of the pins (m).
-ROUGH = {"G": 0.15, "A": 6e-4, "B": 5e-4, "C": 4e-4, "D": 3e-4}
-
-
-@pytest.mark.parametrize("rough", [{}, ROUGH], ids=["smooth", "rough"])
-def test_described_five_bar_is_the_hand_written_one(tmp_path, rough):
-    base = FIVE_BAR.published["table-3.1"].parameters
-    made = Package(described(five_bar(base) | {"friction": rough})).mechanism(tmp_path)
-    base = replace(base, slider_friction_coefficient=rough.get("G", 0.0))
-    base = replace(base, **{f"pin_{name}_friction_radius": rough[name] for name in rough if name != "G"})
-    by_hand = replace(
-        base, crank_mass=0.3, crank_cog_distance=0.02, slider_guide_angle=0.3, slider_spring_free_position=0.002,
-        coupler_cog_distance=math.hypot(base.coupler_cog_distance, 0.001), slider_coulomb_friction=0.7,
-        coupler_cog_angle=math.atan2(0.001, base.coupler_cog_distance), coupler_point_distance=math.hypot(0.05, 0.03),
-        coupler_point_angle=math.atan2(0.03, 0.05), ground_inclination=0.2,
-    )  # fmt: skip
-    k, p = by_hand.constants(), made.published["five-bar-described"].parameters.constants()
-    names = {
-        "pin.A.fx": "A.fx",
-        "pin.B.fy": "B.fy",
-        "pin.C.fx": "C.fx",
-        "pin.D.fy": "D.fy",
-        "slider.guide_force": "G.force",
-    }
-    names |= {"transmission.angle": "C.transmission_angle", "coupler.angle": "coupler.angle", "coupler.point.y": "P.y"}
-    names |= {name: name for name in ("drive.applied_torque", "energy.kinetic", "rocker.angle", "slider.acceleration")}
-    rng, compared = np.random.default_rng(1), 0
-    for _ in range(100):
-        x = (rng.uniform(0, 6.28), rng.uniform(-0.01, 0.01), rng.uniform(-50, 50), rng.uniform(-1, 1), 0.0, 0.0)
-        u = tuple(rng.uniform(-9, 9, 6))
-        for mode in (0.0, 1.0):
-            acting = [m.equations.applied((mode,), u, c) for m, c in ((FIVE_BAR, k), (made, p))]
-            margins = [m.equations.clearance(x, i, c) for m, i, c in ((FIVE_BAR, acting[0], k), (made, acting[1], p))]
-            assert margins[1] == pytest.approx(margins[0], rel=1e-10, abs=1e-10)
-            if margins[0] < 0.1:  # friction may jam the links
-                continue
-            compared += 1
-            one, other = (
-                (
-                    m.equations.derivative(x, i, c),
-                    m.equations.jump(x, i, u, c),
-                    dict(zip(m.output_names, m.equations.outputs(x, i, 0.0, c))),
-                )
-                for m, i, c in ((FIVE_BAR, acting[0], k), (made, acting[1], p))
-            )
-            np.testing.assert_allclose(other[0], one[0], rtol=1e-11, atol=1e-11)
-            np.testing.assert_allclose(other[1], one[1], rtol=1e-11, atol=1e-11)
-            for own, name in names.items():
-                assert other[2][name] == pytest.approx(one[2][own], rel=1e-10, abs=1e-10), own
-    assert compared > 100
-
-
-@pytest.mark.parametrize("switched", [False, True], ids=["smooth", "rough"])
-def test_described_five_bar_costs_little_more(switched):
-    """At most 1.3 times the operations of the hand-written equations, with friction by joint forces switched off and on."""
-    casadi = pytest.importorskip("casadi")
-    from analysis.run.equations import expressions
-
-    def operations(m: Mechanism) -> int:
-        traces = expressions(m, switched)
-        f = casadi.Function("f", [*traces.symbols], [traces.derivative], {"cse": True})
-        ids = [f.instruction_id(n) for n in range(f.n_instructions())]
-        return sum(code not in (casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST) for code in ids)
-
-    data = five_bar(FIVE_BAR.published["table-3.1"].parameters)
-    made = Package(described(data | {"friction": ROUGH})).mechanism()
-    assert operations(made) <= 1.3 * operations(FIVE_BAR)
-
-
 FOUR_BAR = {
     "name": "four-bar-test",
     "ground": {"A": [0, 0], "D": ["150 mm", 0]},
@@ -420,6 +316,46 @@ MISTAKES = [
     ("springs/k", {"at": "C", "law": [[1, 2], [0, 3]]}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": [[1, 2]]}, "linkage.springs.k.law"),
     ("springs/crank", {"at": "C", "stiffness": 1.0, "driven": "no"}, "linkage.springs.crank.driven"),
+    ("bodies/crank/length", float("nan"), "linkage.bodies.crank.length"),
+    ("bodies/crank/length", "50", "linkage.bodies.crank.length"),
+    ("bodies/crank/bar", ["A", "A"], "linkage.bodies.crank.bar"),
+    ("bodies/crank/points", {"B": ["1 mm", 0]}, "linkage.bodies.crank.points.B"),
+    ("bodies/crank/points", ["P"], "linkage.bodies.crank.points"),
+    ("bodies/crank/section", {"kind": "rod", "diameter": "1 mm", "material": "cheese"}, "section.material"),
+    (
+        "bodies/crank/section",
+        {"kind": "plate", "corners": ["A"], "thickness": "8 mm", "material": "steel"},
+        "section.corners",
+    ),
+    ("bodies/ground", {"points": {"Q": [0, 0]}, "mass": 1.0}, "linkage.bodies.ground"),
+    ("bodies/double", {"bar": ["A", "B"], "length": "50 mm", "mass": 1.0}, "4 at A, 2 at D, 4 at B"),
+    ("bodies/rocker/length", "10 mm", "crank angle 0 rad"),
+    ("bodies", {"crank": {"bar": ["A", "B"], "length": 1.0}}, "linkage.bodies have no mass"),
+    ("ground", {}, "linkage.ground"),
+    ("ground/A", [float("inf"), 0], "linkage.ground.A"),
+    ("name", "my linkage", "linkage.name"),
+    ("name", "../x", "linkage.name"),
+    ("name", "five-bar", "linkage.name"),
+    ("loads", ["C", "C"], "linkage.loads has C twice"),
+    ("torques", ["rocker", "rocker"], "linkage.torques has rocker twice"),
+    ("freedoms", ["A"], "linkage.freedoms"),
+    ("freedoms", {"coupler": "A"}, "linkage.freedoms.coupler"),
+    ("freedoms", {"crank 1": "A"}, "linkage.freedoms.crank 1"),
+    ("freedoms/crank/speeed", 1.0, "linkage.freedoms.crank.speed"),
+    ("slots/S", {"pin": "C", "on": "rocker", "through": "D"}, "linkage.slots.S.pin"),
+    ("slots/crank", {"pin": "B", "on": "rocker", "through": "D"}, "linkage.bodies.crank"),
+    ("gears/X", {"bodies": ["crank", "crank"], "ratio": -1}, "linkage.gears.X.bodies"),
+    ("gears/X", {"bodies": ["crank", "coupler"], "ratio": -1}, "linkage.gears.X.bodies"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": 0}, "linkage.gears.X.ratio"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": "1:2"}, "linkage.gears.X.ratio"),
+    ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0}, "linkage.racks.R.radius"),
+    ("springs/k", {"at": "C"}, "linkage.springs.k does nothing"),
+    ("springs/k", {"at": "C", "stiffness": 1.0, "free": "1 mm"}, "linkage.springs.k.free is"),
+    ("springs/k", {"between": ["B", "B"], "stiffness": 1.0}, "linkage.springs.k.between"),
+    ("springs/k", {"between": ["A", "D"], "stiffness": 1.0}, "linkage.springs.k.between"),
+    ("springs/k", {"at": "C", "law": "sin(x, v)"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "1e999*x"}, "linkage.springs.k.law"),
+    ("springs/k", {"at": "C", "law": "sqrt(-1 - x*x)"}, "the law of linkage.springs.k"),
 ]
 
 
@@ -428,6 +364,16 @@ def test_mistakes_are_named(tmp_path, path, value, named):
     with pytest.raises(LinkworkError) as error:
         Package(described(changed(path, value))).mechanism(tmp_path)
     assert named in str(error.value)
+
+
+def test_a_free_body_without_mass_is_named(tmp_path):
+    """Its acceleration is no number, and no run may begin."""
+    data = changed("bodies/x", {"bar": ["C", "Q"], "length": 0.1})
+    data["freedoms"] |= {"x": {"joint": "Cx", "driven": False}}
+    data["bodies"]["rocker"]["points"] = {"Cx": [0.05, 0]}
+    data["bodies"]["x"]["bar"] = ["Cx", "Q"]
+    with pytest.raises(LinkworkError, match=r"a mass or inertia in linkage\.bodies"):
+        Package(described(data)).mechanism(tmp_path)
 
 
 def test_other_freedoms_are_proposed(tmp_path):

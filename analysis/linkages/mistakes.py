@@ -1,0 +1,99 @@
+"""Mistakes in a description that no entry shows alone: names that stand twice, and what joins or moves nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
+
+from linkwork.errors import ParameterError
+
+from .description import GROUND, Description, LinkageError, given
+
+
+def check_entries(description: Description) -> None:
+    """Make sure that the entries of a description fit together.
+
+    Raises
+    ------
+    LinkageError, ParameterError
+        With the place in the file of the first that does not, and what would be right.
+    """
+    d = description
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9-]*", d.name):
+        raise ParameterError("linkage.name", d.name, "have letters, digits and hyphens, and begin with a letter")
+    owners: dict[str, set[str]] = {own: {GROUND} for own in d.ground}
+    for name, body in d.bodies.items():
+        for own in body.all_points:
+            owners.setdefault(own, set()).add(name)
+    found = chain(_bodies(d), _gears(d, owners), _slots(d, owners), _springs(d, owners), _freedoms(d, owners))
+    for where, wrong, right in chain(found, _twice("loads", d.loads), _twice("torques", d.torques)):
+        raise LinkageError(f"linkage.{where} {wrong}: {right}")
+
+
+#: Where the mistake is, what is wrong, what would be right.
+Found = Iterator[tuple[str, str, str]]
+
+
+def _twice(where: str, names: Iterable[str]) -> Found:
+    names = list(names)
+    for name in names:
+        if names.count(name) > 1:
+            yield where, f"has {name} twice", "once is enough"
+
+
+def _bodies(d: Description) -> Found:
+    if not d.ground:
+        yield "ground", "has no points", "at least one body must be pinned to it or slide on it"
+    for name, body in d.bodies.items():
+        if name in (GROUND, *d.slots):
+            yield f"bodies.{name}", "has a name that is taken", "ground and the slots cannot be names of bodies"
+        if len(set(body.bar)) == 1:
+            yield f"bodies.{name}.bar", f"is from {body.bar[0]} to {body.bar[0]}", "its ends must be two points"
+        for own in body.bar:
+            if own in body.points:
+                yield f"bodies.{name}.points.{own}", "is an end of the bar", "each point must be given once"
+    if d.bodies and not any(body.mass or body.section for body in d.bodies.values()):
+        yield "bodies", "have no mass", "one at least must have a mass or a section"
+
+
+def _gears(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    for name, gear in d.gears.items():
+        if gear.bodies[0] == gear.bodies[1]:
+            yield f"gears.{name}.bodies", f"are {gear.bodies[0]} twice", "they must be two"
+        carriers = [set().union(*(of for of in owners.values() if body in of)) for body in gear.bodies]
+        if set(gear.bodies) <= d.bodies.keys() and not carriers[0] & carriers[1] - set(gear.bodies):
+            pair = " and ".join(gear.bodies)
+            yield f"gears.{name}.bodies", f"are {pair}", "they must be pinned to the ground or to one third body"
+        if gear.ratio == 0.0:
+            yield f"gears.{name}.ratio", "is 0", "it must not be zero"
+    for name, rack in d.racks.items():
+        if rack.radius == 0.0:
+            yield f"racks.{name}.radius", "is 0", "it must not be zero"
+
+
+def _slots(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    for name, slot in d.slots.items():
+        if slot.on in owners.get(slot.pin, ()):
+            yield f"slots.{name}.pin", f"is {slot.pin}, a point of {slot.on}", "it must be one of other bodies"
+
+
+def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    for name, spring in d.springs.items():
+        where = f"springs.{name}"
+        ends = [owners.get(own, set()) for own in spring.between]
+        if ends and ends[0] & ends[1]:
+            body, pair = min(ends[0] & ends[1]), " and ".join(spring.between)
+            yield f"{where}.between", f"has {pair}, both of {body}", "they must be points of two bodies"
+        acts = map(given, (spring.stiffness, spring.damping, spring.friction))
+        if not (any(acts) or spring.law or spring.driven):
+            yield where, "does nothing", "it must have a stiffness, damping, friction or law, or be driven"
+
+
+def _freedoms(d: Description, owners: Mapping[str, set[str]]) -> Found:
+    for name, freedom in d.freedoms.items():
+        slide = d.slides.get(freedom.joint)
+        joined = owners.get(freedom.joint, set()) if slide is None else {slide.on, slide.body}
+        if name in d.bodies and len(joined) == 2 and name not in joined:
+            pair = " and ".join(sorted(joined))
+            yield f"freedoms.{name}", f"is of {freedom.joint}, which joins {pair}", f"it must not be called {name}"
