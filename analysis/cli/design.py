@@ -79,8 +79,16 @@ def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
     return settings_of(settings) | given
 
 
-def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[PinForces] | None = None) -> None:
-    """Print ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known."""
+def print_solutions(
+    title: str,
+    solutions: Sequence[Solution],
+    forces: Sequence[PinForces] | None = None,
+    violated: Callable[[Solution], str] | None = None,
+) -> None:
+    """Print ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known.
+
+    ``violated`` returns the constraint that a linkage violates, empty if it keeps all; those that violate one are marked.
+    """
     from ..synthesis import format_transmission, format_variants, quality_cells, quality_headings
 
     headings = ["", *quality_headings(solutions[0].task), "largest link [mm]", "transmission angle [deg]"]
@@ -100,8 +108,13 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
         headings.append("also found")
         for row, s in zip(rows, solutions):
             row.append(format_variants(s))
-    styles = [None if s.verdicts.sound else "yellow" for s in solutions]
-    show_table(title, headings, rows, words=("verdict", "also found"), styles=styles)
+    broken = [violated(s) if violated else "" for s in solutions]
+    if any(broken):
+        headings.append("violates")
+        for row, what in zip(rows, broken):
+            row.append(what)
+    styles = [None if s.verdicts.sound and not what else "yellow" for s, what in zip(solutions, broken)]
+    show_table(title, headings, rows, words=("verdict", "also found", "violates"), styles=styles)
 
 
 def print_best(best: Assessment) -> None:
@@ -226,14 +239,14 @@ def synthesize(
     forces = chosen.forces(result.every)
     title = f"{chosen.title}: {format_count(len(result.solutions), 'linkage')}, {result.seconds:.1f} s"
     print_solutions(title, result.solutions, forces)
-    best = assess(result.best)
+    best = assess(result.best, chosen.violated)
     print_best(best)
     folder = folder_of(out)
     carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
     written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
     if has_cognates(result.best):
         others = alternatives(result.best)
-        print_solutions("the same curve from other pivots: the first one's cognates", others)
+        print_solutions("the same curve from other pivots: the first one's cognates", others, violated=chosen.violated)
         written.append(write_csv(folder / "cognates.csv", solution_columns(others)))
     written += write_solution(best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)

@@ -13,9 +13,11 @@ from typing import Any, ParamSpec
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from .dispatch import picture, plot
@@ -237,6 +239,15 @@ def _(panel: Panel, figure: Figure, axis: Axes) -> None:
     draw_panel(axis, panel)
 
 
+def _name_few_decades(axis: Axis) -> None:
+    """Write ticks at 1, 2 and 5 as plain numbers where a logarithmic axis has less than two decades."""
+    low, high = axis.get_view_interval()
+    if 0.0 < low < high < 100.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+
+
 def draw_panel(axis: Axes, panel: Panel) -> None:
     for boundaries in panel.filled:
         # boundaries that run clockwise are holes in the others
@@ -269,6 +280,8 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         axis.set_xlim(*panel.x_range)
     if panel.y_range:
         axis.set_ylim(*panel.y_range)
+    for log in panel.logarithmic if panel.x_ticks is None else "":
+        _name_few_decades(getattr(axis, f"{log}axis"))
     if panel.equal:
         axis.set_aspect("equal")
     for place in panel.dashed:

@@ -18,7 +18,7 @@ from linkwork.errors import InputError
 from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, unit_table
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
-from .style import BOLD, COLOURS, HAIR, LINE, MARK, PLAIN, SMALL, THIN, finish, styled, write_notes, write_title
+from .style import BOLD, COLOURS, HAIR, LINE, MARK, PLAIN, SMALL, THIN, finish, spoken, styled, write_notes, write_title
 
 FloatArray = NDArray[np.float64]
 
@@ -286,7 +286,9 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
         axis.bar_label(bars, labels, padding=3, fontsize=SMALL)
     if second:
         axis.legend(loc="lower right")
-    axis.set_yticks(np.arange(len(names)), [f"{name} ${SYMBOLS[name]}$" if name in SYMBOLS else name for name in names])
+    axis.set_yticks(
+        np.arange(len(names)), [spoken(name) + (f" ${SYMBOLS[name]}$" if name in SYMBOLS else "") for name in names]
+    )
     axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     axis.grid(visible=False, axis="y")

@@ -487,7 +487,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         if scenes[0].target is None:
             names = names[:-2]
         handles = [Line2D([], [], color=colour, linewidth=2.4, label=name) for name, colour in names]
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 3 * columns))
         for axis in axes[len(scenes) :]:
             axis.set_visible(False)
         write_title(figure, title)

@@ -183,6 +183,16 @@ def test_there_is_a_column_of_differences_only_where_there_is_one(run, factor: f
     assert bool(figure.get_supxlabel()) == bool(said)
 
 
+@pytest.mark.parametrize(("greatest", "there"), [(6.0, {"0.5", "1", "2", "5"}), (600.0, set())])
+def test_few_decades_have_plain_numbers(greatest: float, there: set[str]) -> None:
+    curve = figures.Curve(x=np.array([0.45, greatest]), y=np.array([1.0, 2.0]))
+    (axis,) = figures.plot_curves(
+        [figures.Panel(x_label="x", y_label="y", curves=[curve], logarithmic="x")], title=""
+    ).axes
+    assert there == {label.get_text() for label in axis.get_xticklabels()} & {"0.5", "1", "2", "5"}
+    assert not any(label.get_text() for label in axis.get_xticklabels(minor=True))
+
+
 def test_curves() -> None:
     square = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]])
     panel = Panel(

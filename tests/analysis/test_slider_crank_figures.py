@@ -135,8 +135,8 @@ def bars(axis: Axes) -> dict[str, list[float]]:
 def test_shares_largest_on_top() -> None:
     figure = plot(made())
     _, _, shares = panels(figure)
-    assert bars(shares) == {"rod.length $a_2$": [0.7], "guide.offset $a_4$": [0.2998], "crank.mass $m_1$": [0.0002]}
-    assert list(bars(shares)) == ["rod.length $a_2$", "guide.offset $a_4$", "crank.mass $m_1$"]
+    assert bars(shares) == {"rod length $a_2$": [0.7], "guide offset $a_4$": [0.2998], "crank mass $m_1$": [0.0002]}
+    assert list(bars(shares)) == ["rod length $a_2$", "guide offset $a_4$", "crank mass $m_1$"]
     assert shares.get_title() == "share in the variance, linear"
     said = texts(figure)
     for words in ("70.0%", "30.0%", "< 0.1%"):
@@ -145,10 +145,10 @@ def test_shares_largest_on_top() -> None:
 
 def test_shares_to_second_order_where_they_say_something_else() -> None:
     both = plot(made(shares=[(0.1, 0.6), (0.9, 0.4)]))
-    assert bars(panels(both)[2]) == {"rod.length $a_2$": [0.1, 0.6], "guide.offset $a_4$": [0.9, 0.4]}
+    assert bars(panels(both)[2]) == {"rod length $a_2$": [0.1, 0.6], "guide offset $a_4$": [0.9, 0.4]}
     nan = float("nan")
     second = plot(made(shares=[(nan, 0.6), (nan, 0.4)]))
-    assert bars(panels(second)[2]) == {"rod.length $a_2$": [0.6], "guide.offset $a_4$": [0.4]}
+    assert bars(panels(second)[2]) == {"rod length $a_2$": [0.6], "guide offset $a_4$": [0.4]}
     assert "to second order" in texts(second)
     neither = plot(made(shares=[(nan, nan)]))
     assert "no variance to first or second order" in texts(neither)
@@ -201,7 +201,7 @@ def test_samples_of_a_monte_carlo() -> None:
     assert steps.get_data().edges == pytest.approx(1e3 * (spread.edges[at] - turn.slider_position[at]))
     widths = bars(shares)
     assert sum(width for (width, *_) in widths.values()) == pytest.approx(1.0)
-    assert set(widths) == {"guide.offset $a_4$", "shift.position $S_1$"}
+    assert set(widths) == {"guide offset $a_4$", "shift position $S_1$"}
     assert found.poles("slider.position") == ()
     assert found.poles("slider.load") == pytest.approx([c.crank_angle for c in turn.singularities])
     assert len(panels(plot(found, "slider.load"))) == 3

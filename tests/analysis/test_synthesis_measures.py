@@ -19,6 +19,7 @@ import analysis.synthesis as syn
 from analysis.numerics.fourier import FourierSeries
 from analysis.numerics.overlap import symmetric_difference
 from analysis.slider import slider_motion
+from analysis.synthesis.search.polish import violated
 from analysis.synthesis.search.program import Program
 from analysis.synthesis.search.refine import Refinement
 from analysis.synthesis.search.start import make_start
@@ -226,6 +227,26 @@ def test_a_looser_constraint_is_no_worse(seed: int) -> None:
     for loose, strict in pairwise(errors):
         # on the way of a task the angle is held between the stations with a margin of some thousandths of a degree
         assert loose <= 1.002 * strict
+
+
+def test_what_a_linkage_violates_is_named() -> None:
+    known = drawn(np.random.default_rng(3), least=0.75)
+    task = syn.TimedPath(points=known.path(syn.turn(24)))
+    solution = syn.Solution.of(task, known)
+    angle = min(solution.verdicts.least_transmission, pi - solution.verdicts.greatest_transmission)
+    longest = solution.largest_link
+    assert violated(solution, None, [syn.LeastTransmission(angle=angle - 1e-6), syn.LargestLink(length=longest)]) == ""
+    named = violated(solution, None, [syn.LeastTransmission(angle=angle + radians(2.0))])
+    assert named.startswith("transmission angle by ")
+    assert float(named.split()[-2]) == pytest.approx(2.0, rel=0.05)
+    named = violated(solution, None, [syn.LargestLink(length=longest - 1e-3)])
+    assert named.startswith("bound of ")
+    assert named.endswith(" by 1 mm")
+    # rounding to whole degrees breaks what the optimum just keeps
+    kept = [syn.LargestLink(length=longest)]
+    words = syn.assess(solution, lambda s: violated(s, None, kept)).rounding
+    made = syn.rounded(solution).linkage
+    assert ("violates a constraint: bound of" in words) == (made.largest_link > longest + 1e-9)
 
 
 def test_a_circle_as_a_guess_for_the_square_comes_back_or_better() -> None:

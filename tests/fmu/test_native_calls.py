@@ -422,6 +422,7 @@ def test_times_of_the_setup(library: Library) -> None:
 
     said: list[str] = []
     assert setup(1e-6, 1.0, 2.0) == OK
+    assert setup(None, 1.0, 1.0) == OK
     for tolerance, start, stop, sentence in (
         (None, math.nan, None, "the time at the start is nan s: it must be a finite number"),
         (None, 0.0, -1.0, "the stop time is -1 s: it must not be before the start time"),

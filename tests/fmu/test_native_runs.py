@@ -1057,21 +1057,27 @@ def test_inputs_set_in_an_intermediate_update_hold_from_there(fmi3: Library) -> 
 
 
 def test_a_controller_in_intermediate_updates_is_of_second_order(fmi3: Library) -> None:
-    """A PI controller of the crank's speed, 44 rad/s from 40, over 0.1 s in communication steps of 2.5 ms."""
+    """A PI controller of the crank's speed, 44 rad/s from 40, over 0.1 s, in communication steps of 2.5 ms and in one."""
     proportional, integral, wanted, begin = 5e-4, 0.01, 44.0, 40.0
-    memory = [0.0, wanted - begin, 0.0]  # time, error, integral
-    made: list[Instance] = []
 
-    def control(time: float) -> None:
-        error = wanted - made[0].get("crank.speed")[0]
-        memory[:] = [time, error, memory[2] + 0.5 * (error + memory[1]) * (time - memory[0])]
-        made[0].set(drive__torque=proportional * error + integral * memory[2])
+    def angle(steps: int, **values: float) -> tuple[float, int]:
+        memory = [0.0, wanted - begin, 0.0]  # time, error, integral
+        made: list[Instance] = []
+        times: list[float] = []
 
-    made.append(fmi3.instance(update=lambda environment, time, *rest: control(time)))
-    c = made[0].start(drive__mode=0, initial__crank_speed=begin)
-    for n in range(40):
-        control(n * 2.5e-3)
-        assert c.step(n * 2.5e-3, 2.5e-3) == OK
+        def control(time: float) -> None:
+            error = wanted - made[0].get("crank.speed")[0]
+            memory[:] = [time, error, memory[2] + 0.5 * (error + memory[1]) * (time - memory[0])]
+            made[0].set(drive__torque=proportional * error + integral * memory[2])
+            times.append(time)
+
+        made.append(fmi3.instance(update=lambda environment, time, *rest: control(time)))
+        c = made[0].start(drive__mode=0, initial__crank_speed=begin, **values)
+        for n in range(steps):
+            control(n * 0.1 / steps)
+            assert c.step(n * 0.1 / steps, 0.1 / steps) == OK
+        return c.get("crank.angle")[0], len(times)
+
     values = {v.name: v.start for v in FIVE_BAR.variables} | {"drive.mode": 0, "initial.crank_speed": begin}
     plant = Plant.of_values(FIVE_BAR, values)
 
@@ -1079,9 +1085,15 @@ def test_a_controller_in_intermediate_updates_is_of_second_order(fmi3: Library) 
         plant.inputs["drive.torque"] = proportional * (wanted - x[2]) + integral * x[-1]
         return [*FIVE_BAR.equations.derivative(tuple(x[:-1]), plant._applied(), plant._p), wanted - x[2]]
 
-    exact = solve_ivp(motion, (0.0, 0.1), [*plant.state, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    exact = solve_ivp(motion, (0.0, 0.1), [*plant.state, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[0, -1]
     # 4.1e-4 where inputs are held from one update to the next
-    assert abs(c.get("crank.angle")[0] - exact[0]) < 2e-5
+    assert abs(angle(40)[0] - exact) < 2e-5
+    # in one step: the smaller the tolerance, the more updates, whose number measures the step between them
+    ends, counts = zip(
+        *(angle(1, solver__tolerance=tolerance) for tolerance in (1e-6, 1e-8, 1e-10, 1e-12)), strict=True
+    )
+    order = -np.polyfit(np.log(counts), np.log(np.abs(np.array(ends) - exact)), 1)[0]
+    assert 1.75 < order < 2.25
 
 
 def test_an_input_that_is_not_finite_in_an_update_refuses_the_step(fmi3: Library) -> None:

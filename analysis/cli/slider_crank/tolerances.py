@@ -118,7 +118,9 @@ def tolerances(
         note(message)
     if plot:
         for name in quantities:
-            figure = figures.plot(found, name, at, units=units.system, title=f"{chosen.title}: {name}")
+            figure = figures.plot(
+                found, name, at, units=units.system, title=f"{chosen.title}: {name.replace('.', ' ')}"
+            )
             files.append(save_figure(figure, f"{stem}-tolerances-{name}.png"))
     print_written(files)
 

@@ -34,6 +34,7 @@ from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..linkage import ANGLES, PINS, Kind, Make, PinForces, pin_forces
 from ..result.solution import Solution
+from ..search.polish import violated
 from ..search.solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from ..search.start import Search
 from ..task.constraint import (
@@ -246,6 +247,11 @@ class SynthesisCase:
         """Search for linkages; see `synthesize`."""
         search, (kinds, gears) = self.search.search(progress=progress), (self.search.kinds, self.search.gears)
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
+
+    def violated(self, solution: Solution) -> str:
+        """Return the constraint that a linkage violates most, and by how much; empty if it keeps all, or is in closed form."""
+        closed = isinstance(self.task, QuickReturn | QuickSwing)
+        return "" if closed else violated(solution, self.bounds, self.constraints)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
         """Run the plant for the pin forces of solutions; None where no constraint is about them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, inf, isfinite, log10, pi, radians
 from typing import Any
@@ -428,8 +428,11 @@ class Assessment:
         return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
 
 
-def assess(solution: Solution) -> Assessment:
-    """Compute what errors in the dimensions of a solution cost."""
+def assess(solution: Solution, violated: Callable[[Solution], str] | None = None) -> Assessment:
+    """Compute what errors in the dimensions of a solution cost.
+
+    ``violated`` returns the constraint that a linkage violates, which rounding may bring about; empty if it keeps all.
+    """
     factor, unit = quality_unit(solution.task)
     step = length_step(solution.linkage)
     rounding = rounded(solution, step)
@@ -437,6 +440,10 @@ def assess(solution: Solution) -> Assessment:
         f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
         f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
     )
+    made = Solution.of(solution.task, rounding.linkage, solution.evaluation.rotation)
+    broken = violated(made) if violated and not (violated(solution)) else ""
+    if broken:
+        words += f"; rounded so, it violates a constraint: {broken}"
     return Assessment(solution=solution, dimensions=_dimension_rows(solution, step), rounding=words)
 
 

@@ -6,12 +6,12 @@ path, then goes on in `analysis.synthesis.refine`, the greatest error at given s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from math import inf, pi
+from math import degrees, inf, pi
 from threading import Lock
 from typing import Any
 
@@ -23,14 +23,15 @@ from threadpoolctl import threadpool_limits
 from linkwork.errors import InputError
 
 from ..linkage.kernels import coupler_path_jacobian, link_jacobian
-from ..linkage.linkage import SliderCrank, wrapped
+from ..linkage.linkage import ANGLES, FiveBar, SliderCrank, wrapped
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SliderUnknown, geared
-from ..task.constraint import InfeasibleError
-from ..task.limits import Limits
-from ..task.task import Normal
+from ..result.solution import Solution
+from ..task.constraint import UNKNOWNS, Constraint, InfeasibleError, Stroke
+from ..task.limits import Limits, limits_by_kind
+from ..task.task import Normal, normal_form
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
-from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, over_cores
+from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, over_cores, start_of
 from .statement import Objective
 
 FloatArray = NDArray[np.float64]
@@ -379,7 +380,7 @@ class Polisher:
     def kept(self, start: Start) -> Answer:
         """Judge a start as it is: whether it keeps every constraint and bound."""
         if self.by_least_squares:
-            within = outside(self.normal, self.limits.low, self.limits.high, start) <= KEPT
+            within = outside(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
             quality = sum_of_squares(self.normal, start)
             return replace(
                 Answer.unjoined(start),
@@ -393,6 +394,27 @@ class Polisher:
             parts = -(-JUDGED // self.normal.n)
             self._closely = Program(self.normal, self.limits, self.pivot, objective, parts=max(4, parts))
         return self._closely.kept(start)
+
+
+def violated(
+    solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint | Stroke]
+) -> str:
+    """Return the constraint that a linkage violates most, and by how much; empty if it keeps all bounds and constraints."""
+    task, linkage = solution.task, solution.linkage
+    normal = normal_form(task)
+    ratios = [linkage.pivot.ratio] if isinstance(linkage, FiveBar) else []
+    (limits,) = limits_by_kind(task, normal, bounds, constraints, [linkage.kind], ratios)
+    pivot = limits.second_crank(normal.unit)
+    start = start_of(solution, normal, pivot)
+    answer = Polisher(normal, limits, pivot).kept(start)
+    if answer.feasible:
+        return ""
+    off = outside(normal, limits.low, limits.high, start)
+    if off.max() <= KEPT:
+        return f"{answer.worst} by {answer.excess}"
+    name = UNKNOWNS[int(off.argmax())]
+    over = f"{degrees(off.max()):.3g} deg" if name in ANGLES else f"{1e3 * normal.unit * off.max():.3g} mm"
+    return f"bound of {name} by {over}"
 
 
 # Least squares

@@ -274,7 +274,7 @@ class Program(Statement):
                 best = answer
         assert best is not None
         pivot = float(np.abs(best.start.pivot - start.pivot).max(initial=0.0))
-        within = max(outside(self.normal, self.low, self.high, start), pivot) <= KEPT
+        within = max(outside(self.normal, self.low, self.high, start).max(), pivot) <= KEPT
         return replace(best, feasible=best.feasible and within)
 
     def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:

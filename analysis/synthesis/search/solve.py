@@ -23,7 +23,7 @@ from ..linkage.linkage import UNITS, Linkage
 from ..linkage.pivot import PivotUnknown
 from ..result.alike import grouped
 from ..result.report import solution_columns
-from ..result.solution import Solution, nearest_rotations, ranked
+from ..result.solution import Solution, ranked
 from ..task.constraint import (
     USUAL,
     Constraint,
@@ -43,11 +43,10 @@ from .start import (
     USUAL_SEARCH,
     Answer,
     Search,
-    Start,
     closed_form,
     make_linkage,
-    make_start,
     random_pivot,
+    start_of,
 )
 
 #: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
@@ -253,7 +252,7 @@ def _searched(
 
     Sound linkages are ranked first: where no limit keeps them sound, they are searched for by themselves too.
     """
-    begin = [_start(guess, normal, pivot) for guess in guesses]
+    begin = [start_of(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
     scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
     if pivot is not None and limits.second is None:
@@ -312,7 +311,7 @@ def improve(
     task = _searched_task(task, constraints, pivot, search)
     normal = search_form(task, pivot)
     limits = make_limits(task, normal, bounds, constraints)
-    base, *begin = (_start(of, normal, pivot) for of in (linkage, *guesses))
+    base, *begin = (start_of(of, normal, pivot) for of in (linkage, *guesses))
     random = np.random.default_rng(search.seed)
     begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
     done = polish(normal, limits, begin, pivot=pivot, search=search)
@@ -366,24 +365,6 @@ def search_form(task: Task, pivot: PivotUnknown | None) -> Normal:
     if pivot is not None and isinstance(task, UntimedPath):
         task = replace(task, samples=max(task.samples, STATIONS))
     return normal_form(task)
-
-
-def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
-    """Make a start of a linkage, its untimed stations at the solution's rotations, or where it comes nearest to them.
-
-    Raises InputError if rotations are needed and cannot be found so, because the path is open.
-    """
-    linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
-    if normal.timed:
-        rotation = None
-    elif rotation is None or len(rotation) != normal.n:
-        if normal.points is not None and normal.closed:
-            rotation = nearest_rotations(linkage, normal.places)
-        elif rotation is None:
-            raise InputError("a start for an open path needs the crank rotations of its stations")
-        else:
-            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
-    return make_start(linkage, normal, pivot, rotation)
 
 
 def make_solutions(

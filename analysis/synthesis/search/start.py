@@ -19,7 +19,7 @@ from ..exact.burmester import guidance
 from ..exact.four_bar import function_generators
 from ..linkage.linkage import FiveBar, Linkage, SliderCrank, wrapped
 from ..linkage.pivot import CrankUnknown, PivotUnknown, SecondCrank, SliderMotion, SliderUnknown
-from ..result.solution import Solution
+from ..result.solution import Solution, nearest_rotations
 from ..task.constraint import UNKNOWNS
 from ..task.limits import Limits
 from ..task.task import Motion, Normal, PrecisionPoints, RockerFunction, Task
@@ -207,8 +207,8 @@ def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     return np.clip(q, low, high)
 
 
-def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> float:
-    """Return how far a start is from its bounds (units, rad), in the dimensions that the task sees."""
+def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
+    """Return how far each unknown of a start is from its bounds (units, rad); 0 in a dimension that the task does not see."""
     q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
     off = np.abs(wrapped(q - start.q))
     off[:7] = np.abs(q - start.q)[:7]
@@ -216,7 +216,7 @@ def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> 
     if normal.of_rocker:
         idle = ("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle")
     off[[UNKNOWNS.index(name) for name in idle]] = 0.0
-    return float(off.max())
+    return off
 
 
 def make_linkage(
@@ -266,6 +266,24 @@ def make_start(
             v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
     kind = SliderCrank if isinstance(linkage, SliderCrank) else Linkage
     return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True, linkage=kind)
+
+
+def start_of(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+    """Make a start of a linkage, its untimed stations at the solution's rotations, or where it comes nearest to them.
+
+    Raises InputError if rotations are needed and cannot be found so, because the path is open.
+    """
+    linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
+    if normal.timed:
+        rotation = None
+    elif rotation is None or len(rotation) != normal.n:
+        if normal.points is not None and normal.closed:
+            rotation = nearest_rotations(linkage, normal.places)
+        elif rotation is None:
+            raise InputError("a start for an open path needs the crank rotations of its stations")
+        else:
+            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
+    return make_start(linkage, normal, pivot, rotation)
 
 
 def closed_form(task: Task) -> tuple[Solution, ...]:
