@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -208,6 +209,28 @@ def test_newtons_method_from_the_start_misses_places():
         ends = np.array([oracle.placed(angle, places(np.deg2rad(20.0)), sweeps) for angle in crank[:, None]])
         shares.append(np.mean(np.abs(ends - wanted)[:, 0::3].max(axis=1) < 1e-9))
     assert shares == pytest.approx([0.84, 0.84], abs=0.01)
+
+
+@pytest.mark.parametrize("ratio", [Fraction(1), Fraction(2), Fraction(2, 3)], ids=str)
+def test_two_commanded_cranks_are_driven_by_the_torques_of_the_multipliers(ratio):
+    """Over their common period, as many turns of the first as the denominator."""
+    path, speed = FOLDER / "two-crank-five-bar.toml", 12.0
+    made, speeds = load_linkage(path), np.array([speed, speed * float(ratio)])
+    known, period = made.published[made.name], 2.0 * np.pi / speed * ratio.denominator
+    given = {"leftDrive.speed": speeds[0], "rightDrive.speed": speeds[1]}
+    given |= {"run.revolutions": period * speeds.min() / (2.0 * np.pi), "run.step": period / 12.0}
+    turn = run(path.stem, **given)
+    assert turn.time[-1] == pytest.approx(period)
+    oracle = Multipliers(described(tomllib.loads(path.read_text(encoding="utf-8"))["linkage"]))
+    loads = []
+    for left, right in zip(turn["left.angle"], turn["right.angle"]):
+        places = made.modules[-1].places((left, right, *speeds, 0.0, 0.0), known.parameters.constants())
+        frames = [getattr(places, f"{body}_frame") for body in oracle.bodies]
+        q = np.array([c for f in frames for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
+        loads.append(oracle.solve(q, speeds, np.zeros(2), {0: 0.0, 1: 0.0}, {}, {}).loads)
+    found = np.column_stack([turn[f"{side}Drive.applied_torque"] for side in ("left", "right")])
+    np.testing.assert_allclose(found, loads, atol=1e-8 * np.abs(loads).max())
+    np.testing.assert_allclose(found[-1], found[0], atol=1e-8 * np.abs(loads).max())
 
 
 def test_ranges_of_motion():
