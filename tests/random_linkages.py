@@ -214,14 +214,17 @@ class Maker:
 
 
 def random_linkage(
-    seed: int, kinds: tuple[str, ...] = KINDS
+    seed: int, kinds: tuple[str, ...] = KINDS, dyads: tuple[int, int] = (1, 4)
 ) -> tuple[dict[str, Any], dict[str, tuple[float, float, float]]]:
-    """Return the tables of a random linkage and the places of its bodies (x, y, angle)."""
+    """Return the tables of a random linkage and the places of its bodies (x, y, angle).
+
+    Its dyads are at least ``dyads[0]`` and fewer than ``dyads[1]``.
+    """
     for attempt in range(100):
         maker = Maker(100 * seed + attempt)
         for _ in range(int(maker.rng.integers(1, 4))):
             maker.freedom()
-        for _ in range(int(maker.rng.integers(1, 4))):
+        for _ in range(int(maker.rng.integers(*dyads))):
             maker.dyad(str(maker.rng.choice(kinds)))
         blocks = [slide["body"] for slide in maker.data["slides"].values()]
         # two slides along the axis of one block are parallel

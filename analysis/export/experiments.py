@@ -12,6 +12,7 @@ from math import floor, log10
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
+from linkwork.errors import AssemblyError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 from linkwork.plant import Plant
@@ -37,7 +38,7 @@ _EXPERIMENTS = ("smoke-tests.exp", "application/x-ma-hs-experiments")
 def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     """Return the files of a mechanism's experiments and their manifest, by their places in the archive.
 
-    An unregistered mechanism, or one without cases, has its default experiment alone.
+    An unregistered mechanism, or one without cases, has its default experiment alone, halved until no limit of assembly is met.
     """
     cases = standard_cases(mechanism) if mechanism.cases and mechanism.name in MECHANISMS else {}
     root = Element("Experiments", {"name": mechanism.fmu, "description": "Standard cases of Linkwork"})
@@ -45,12 +46,12 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
 
     def add(name: str, title: str, values: Mapping[str, Any], end: float, inputs: _Inputs) -> None:
         start, step = mechanism.experiment[0], (end - mechanism.experiment[0]) / STEPS
+        stimuli, reference = _reference(mechanism, values, [start + n * step for n in range(STEPS + 1)], inputs)
         node = SubElement(root, "Experiment", {"name": name, "description": title, "tolerance": repr(TOLERANCE)})
         times = {"startTime": start, "stopTime": end, "stepSize": step}
         SubElement(node, "TransientSimulation", {key: repr(value) for key, value in times.items()})
         starts = {v.name: v.start for v in mechanism.variables if v.causality == "parameter"}
         changed = {key: value for key, value in values.items() if key in starts and value != starts[key]}
-        stimuli, reference = _reference(mechanism, values, [start + n * step for n in range(STEPS + 1)], inputs)
         if changed:
             files[f"{name}.ssv"] = _parameter_set(name, changed)
             SubElement(node, "Parameters", {"source": f"{name}.ssv"})
@@ -69,7 +70,18 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
     if not cases:
         starts = {v.name: v.start for v in mechanism.variables}
         constant = {name: float(starts[name]) for name in mechanism.input_names}
-        add("default", "default experiment", starts, mechanism.experiment[1], lambda number, outputs: constant)
+        length, refused = mechanism.experiment[1] - mechanism.experiment[0], None
+        # one that comes to a limit of assembly ends before it
+        for halved in range(10):
+            end = mechanism.experiment[0] + length * 0.5**halved
+            try:
+                add("default", "default experiment", starts, end, lambda number, outputs: constant)
+                break
+            except AssemblyError as error:
+                refused = refused or error
+        else:
+            assert refused is not None
+            raise refused
     files[_EXPERIMENTS[0]] = written(root)
     return {f"{EXPERIMENTS}/{name}": content for name, content in files.items()} | {MANIFEST: _manifest()}
 

@@ -161,7 +161,7 @@ def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
 
 def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
     """Return the reference of the stiffness for the natural frequency; -1 if it is in the energy, None if there is none."""
-    if crank < 0 or len(mechanism.freedoms) < 2:
+    if crank < 0 or len(mechanism.cyclic) == len(mechanism.freedoms):
         return None
     return reference.get(stiffness_name(mechanism), -1)
 

@@ -17,8 +17,12 @@ from analysis.linkages import described, load_linkage, reach
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, orbit_of
 from analysis.run import Trajectory, case_from, compare, cosimulate, load_case, simulate
+from analysis.studio import page_of, state_of
+from analysis.studio.tables import tables_of
 from analysis.synthesis.result.described import description, drives
 from tests.oracles.planar import Multipliers
+
+from .test_studio import _drag, _opened, _shown, in_browser
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
@@ -264,3 +268,39 @@ def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
     wanted = found.path(0.2 + direction * 20.0 * done.time / found.turns)
     np.testing.assert_allclose(np.column_stack([done["P.x"], done["P.y"]]), wanted, atol=1e-9)
     assert done["energy.kinetic"].min() > 0.0
+
+
+def test_two_cranks_alone_have_tables_without_a_natural_frequency():
+    tables = tables_of(load_linkage(FOLDER / "hybrid-press.toml"))
+    assert (tables["natural"], tables["damping"]) == (None, "sheet.damping")
+
+
+@in_browser
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
+    """Its bars keep their lengths over the motion, at first and after each joint was dragged; no number is lost."""
+    # the studio has inputs that are constant
+    case = load_case(path, {"motor.torque": 0.5} if path.stem == "stephenson-2" else {})
+    bars = {n: b.bar for n, b in described(tomllib.loads(path.read_text("utf-8"))["linkage"]).bodies.items() if b.bar}
+    (tmp_path / "page.html").write_text(page_of(state_of(case)), encoding="utf-8")
+    page = _opened(browser, tmp_path / "page.html")
+    root = "document.documentElement.dataset"
+    settled = f"window.studio.solver.id === Number({root}.answer) && {root}.settled === 'true'"
+
+    def values() -> dict[str, float]:
+        page.wait_for_function(settled)
+        found, given = _shown(page)["columns"], page.evaluate("window.studio.state.values")
+        assert np.isfinite(list(given.values())).all()
+        for body, (start, end) in bars.items():
+            if f"{start}x" in found and f"{end}x" in found:
+                along = np.hypot(*(found[f"{end}{c}"] - found[f"{start}{c}"] for c in "xy"))
+                np.testing.assert_allclose(along, given[f"{body}.length"], rtol=1e-9)
+        return given
+
+    first = values()
+    for joint in load_linkage(path).drawing.joints[:4]:
+        if page.locator(f'[data-joint="{joint.name}"] .pin').count():
+            _drag(page, joint.name, 9.0, -7.0)
+            last = values()
+    assert last != first
+    page.close()

@@ -43,10 +43,10 @@ def imported(package: Package, folder: Path) -> Any:
 
 
 def assembled(
-    seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes: Any
+    seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, dyads: tuple[int, int] = (1, 4), **changes: Any
 ) -> tuple[Package, dict[str, tuple[float, float, float]]]:
     """A random linkage with the signs of assembly that give the places from which it was made; and these."""
-    data, places = random_linkage(seed, kinds)
+    data, places = random_linkage(seed, kinds, dyads)
     package = Package(described(data))
     module = imported(package, folder)
     names = [dyad.inner.name for dyad in package.structure.dyads if dyad.assembled]

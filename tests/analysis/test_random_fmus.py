@@ -1,0 +1,69 @@
+"""FMUs of random linkages: the Python one is the plant to the last bit, the native one to its tolerance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.export import NATIVE_FMI3, build, build_native
+from analysis.run import Inputs, cosimulate
+from linkwork.mechanism import Mechanism
+from linkwork.plant import Plant
+from tests.fmu.runner import run_in_process
+from tests.fmu.test_plant_in_fmu import START, outputs_of_fmu, outputs_of_plant
+
+from .test_linkages import assembled
+
+pytestmark = [pytest.mark.usefixtures("own_linkages"), pytest.mark.slow, pytest.mark.fmu]
+
+#: Steps of a run (s), no two alike.
+SIZES = [1e-6, 1.2345e-5, 3e-4, 1e-3, 2.5e-3]
+
+
+def made(seed: int, folder: Any) -> Mechanism:
+    """A random linkage; every third has four or five dyads."""
+    few = {} if seed % 3 else {"dyads": (4, 6)}
+    package, _ = assembled(seed, folder, name=f"random-{seed}", **few)
+    return package.mechanism(folder)
+
+
+@pytest.mark.parametrize("seed", range(400, 424))
+def test_the_python_fmu_is_the_plant(seed, tmp_path):
+    mechanism = made(seed, tmp_path)
+    loads = {c.name: 2.0 for c in mechanism.channels if c.kind == "force"}
+    starts = {v.name: v.start for v in mechanism.variables}
+    expected, times = outputs_of_plant(Plant.of_values(mechanism, starts, tolerance=1e-9, time=START), loads, SIZES)
+    fmu = build(mechanism, tmp_path)
+    assert run_in_process(outputs_of_fmu, fmu, tmp_path, {}, loads, times, SIZES) == expected
+    assert len(times) == len(SIZES)
+
+
+@pytest.mark.parametrize("seed", range(424, 432))
+def test_the_native_fmu_is_the_plant_within_its_tolerance(seed, tmp_path):
+    """And energy gained and lost is that supplied."""
+    mechanism = made(seed, tmp_path)
+    known, step = mechanism.published[mechanism.name], 1e-3
+    modes = {mode.arguments[0]: 0.0 for mode in mechanism.modes}
+    file = build_native(mechanism, NATIVE_FMI3, tmp_path)
+    run = cosimulate(
+        file, known.parameters, Inputs(**modes), initial=known.initial, stop_time=0.02, step=step, tolerance=1e-12
+    )
+    plant = Plant(
+        mechanism,
+        known.parameters,
+        known.initial,
+        tolerance=1e-12,
+        **{m.name.replace(".", "_"): 0 for m in mechanism.modes},
+    )
+    assert len(run) == 21
+    for n in range(len(run)):
+        if n:
+            plant.step(plant.time, step)
+        for name, value in zip(mechanism.output_names, plant.outputs()):
+            assert run[name][n] == pytest.approx(value, rel=1e-8, abs=1e-8 * max(1.0, np.abs(run[name]).max())), (
+                name,
+                n,
+            )
+    assert abs(run["energy.residual"]).max() < 1e-8 * (1.0 + abs(run["energy.kinetic"]).max())
