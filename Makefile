@@ -68,7 +68,6 @@ studio: $(DEV)
 release: $(DEV)
 	rm -rf dist build/site
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
-	$(BIN)/python -m analysis.export.bill dist/*.whl
 	$(BIN)/python build_fmu.py --platforms all --dest dist --publish dist/compatibility
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees docs build/site
 	$(BIN)/python -m zipfile --create dist/linkwork-site.zip build/site/

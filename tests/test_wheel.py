@@ -17,7 +17,6 @@ from packaging.requirements import Requirement
 
 import linkwork
 from analysis.export import SOURCES
-from analysis.export.bill import add_bill_to_wheel
 
 ROOT = Path(__file__).parents[1]
 
@@ -42,7 +41,6 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wheel")
     called(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
     (path,) = folder.glob("*.whl")
-    add_bill_to_wheel(path)
     return path
 
 
@@ -64,7 +62,6 @@ def test_the_wheel_has_two_packages_that_are_typed_and_no_other_module(wheel: Pa
         names = archive.namelist()
     assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"analysis", "linkwork"}
     assert {"analysis/py.typed", "linkwork/py.typed", "analysis/_examples/run-up.toml"} <= set(names)
-    assert any(name.endswith(".dist-info/sboms/linkwork.cdx.json") for name in names)
 
 
 def test_the_wheel_has_its_bill_of_materials(wheel: Path) -> None:

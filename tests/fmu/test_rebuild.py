@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import csv
 import hashlib
 import json
 import os
@@ -17,7 +15,7 @@ from click.testing import CliRunner
 
 from analysis import cli
 from analysis.export import BuildError, rebuild
-from analysis.export.bill import BILL, add_bill_to_wheel
+from analysis.export.bill import BILL
 from analysis.numerics.cache import cache_root
 
 ROOT = Path(__file__).parents[2]
@@ -91,31 +89,6 @@ def test_the_icon_is_where_each_version_of_the_standard_looks(natives: dict[str,
     for name, icon in (("SliderCrank-native", "model.png"), ("SliderCrank-native-fmi3", "terminalsAndIcons/icon.png")):
         with ZipFile(natives[name]) as archive:
             assert archive.read(icon).startswith(b"\x89PNG")
-
-
-def test_bill_of_the_wheel(tmp_path: Path) -> None:
-    wheel, folder = tmp_path / "linkwork-1-py3-none-any.whl", "linkwork-1.dist-info"
-    needs = "Requires-Dist: numpy>=1.26\nRequires-Dist: fmpy>=0.3.20,<1\nRequires-Dist: pint; extra == 'units'\n"
-    with ZipFile(wheel, "w") as archive:
-        archive.writestr("linkwork/a.py", "pass\n")
-        archive.writestr(f"{folder}/METADATA", f"Name: linkwork\n{needs}\n")
-        archive.writestr(f"{folder}/RECORD", f"linkwork/a.py,,\n{folder}/METADATA,,\n{folder}/RECORD,,\n")
-    add_bill_to_wheel(wheel)
-    once = wheel.read_bytes()
-    add_bill_to_wheel(wheel)
-    assert wheel.read_bytes() == once
-    with ZipFile(wheel) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    bill = json.loads(files[f"{folder}/sboms/linkwork.cdx.json"])
-    # what a bill states is in the file, and all but the bill and the list of files, which has its hash
-    hashes = {c["name"]: c["hashes"][0]["content"] for c in bill["components"] if c["type"] == "file"}
-    assert hashes == {name: hashlib.sha256(files[name]).hexdigest() for name in ("linkwork/a.py", f"{folder}/METADATA")}
-    assert [c["purl"] for c in bill["components"] if c["type"] == "library"] == ["pkg:pypi/fmpy", "pkg:pypi/numpy"]
-    rows = {row[0]: row[1:] for row in csv.reader(files[f"{folder}/RECORD"].decode().splitlines())}
-    assert set(rows) == set(files)
-    algorithm, _, digest = rows[f"{folder}/sboms/linkwork.cdx.json"][0].partition("=")
-    stated = base64.urlsafe_b64decode(digest + "=" * (-len(digest) % 4))
-    assert stated == hashlib.new(algorithm, files[f"{folder}/sboms/linkwork.cdx.json"]).digest()
 
 
 def altered(fmu: Path, target: Path, place: str, content: bytes, *, listed: bool) -> Path:
