@@ -15,8 +15,10 @@ from scipy.integrate import solve_ivp
 import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linkages import described, load_linkage, reach
+from analysis.mechanisms import mechanism_of
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, orbit_of
+from analysis.probe import probe
 from analysis.run import Trajectory, case_from, compare, cosimulate, load_case, simulate
 from analysis.studio import page_of, state_of
 from analysis.studio.tables import tables_of
@@ -231,6 +233,37 @@ def test_two_commanded_cranks_are_driven_by_the_torques_of_the_multipliers(ratio
     found = np.column_stack([turn[f"{side}Drive.applied_torque"] for side in ("left", "right")])
     np.testing.assert_allclose(found, loads, atol=1e-8 * np.abs(loads).max())
     np.testing.assert_allclose(found[-1], found[0], atol=1e-8 * np.abs(loads).max())
+
+
+@pytest.mark.slow
+@pytest.mark.fmu
+@pytest.mark.parametrize("path", FILES[::3], ids=lambda path: path.stem)
+def test_the_fmu_of_a_linkage_probes_clean(path, tmp_path):
+    assert probe(build_native(load_linkage(path), NATIVE_FMI3, tmp_path), calls=300, seconds=3.0).findings == []
+
+
+@in_browser
+@pytest.mark.fmu
+def test_a_geared_five_bar_that_was_found_becomes_an_fmu_and_a_page(browser, tmp_path):
+    found = syn.FiveBar(
+        **FOUR_BAR, ground_length=0.15, crank_length=0.05, coupler_length=0.16, rocker_length=0.15,
+        pivot=syn.SecondCrank(length=0.04, ratio=-2.0, phase=0.7),
+    )  # fmt: skip
+    tables = {"linkage": description(found, syn.Make(speed=20.0)), "run": {"revolutions": 1.0}}
+    case = case_from(tables, folder=FOLDER)
+    file = build_native(mechanism_of(case.parameters), NATIVE, tmp_path)
+    fmu = cosimulate(
+        file, case.parameters, case.inputs, initial=case.initial, stop_time=0.3, step=0.01, tolerance=1e-11
+    )
+    wanted = found.path(20.0 * fmu.time)
+    np.testing.assert_allclose(np.column_stack([fmu["P.x"], fmu["P.y"]]), wanted, atol=1e-8)
+    (tmp_path / "page.html").write_text(page_of(state_of(case)), encoding="utf-8")
+    page = _opened(browser, tmp_path / "page.html")
+    shown = _shown(page)["columns"]
+    np.testing.assert_allclose(
+        shown["P.x"], found.path(shown["crank.angle"] - case.initial.crank_angle)[:, 0], atol=1e-9
+    )
+    page.close()
 
 
 def test_ranges_of_motion():
