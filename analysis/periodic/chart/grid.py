@@ -392,7 +392,8 @@ MEASURABLE = 1e-2
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Choose three points of a grid for long runs: the most stable, the least stable, and the one nearest to a boundary.
 
-    The last is the point with the least margin, to either side, that a long run can still measure.
+    The first lies off the edges if there is such a point, where the picture shows it whole. The last has the least margin, to
+    either side, that a long run can still measure.
 
     Returns
     -------
@@ -402,7 +403,10 @@ def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     margin = 1.0 - found.largest
     if margin.count() == 0:
         return []
-    places = list(dict.fromkeys((int(margin.argmax()), int(margin.argmin()))))
+    inner = np.ma.masked_all_like(margin)
+    inner[1:-1, 1:-1] = margin[1:-1, 1:-1]
+    stable = inner if inner.count() else margin
+    places = list(dict.fromkeys((int(stable.argmax()), int(margin.argmin()))))
     size = np.ma.abs(margin)
     size.ravel()[places] = np.ma.masked
     near = np.ma.masked_where(size < MEASURABLE, size)
