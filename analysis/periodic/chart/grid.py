@@ -403,8 +403,9 @@ def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     margin = 1.0 - found.largest
     if margin.count() == 0:
         return []
-    inner = np.ma.masked_all_like(margin)
-    inner[1:-1, 1:-1] = margin[1:-1, 1:-1]
+    edges = np.ones(margin.shape, dtype=bool)
+    edges[1:-1, 1:-1] = False
+    inner = np.ma.masked_where(edges, margin)
     stable = inner if inner.count() else margin
     places = list(dict.fromkeys((int(stable.argmax()), int(margin.argmin()))))
     size = np.ma.abs(margin)
