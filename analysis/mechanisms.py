@@ -158,7 +158,7 @@ def _faults_of_equations(m: Mechanism) -> Iterator[str]:
 def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
     if m.drawing is None:
         return
-    known = next(iter(m.published.values()))
+    known = m.first_set
     p, x = known.parameters.constants(), m.state(known.initial)
     names = [joint.name for joint in m.drawing.joints]
     found = m.drawing.positions(x, m.idle(p), p)

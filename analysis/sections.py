@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import pi
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,23 +62,7 @@ class _Section:
 
 
 @dataclass(frozen=True, slots=True)
-class _Uniform(_Section):
-    """A section of a link between two pins: its area (m2), and twelve times the square of its radius of gyration (m2)."""
-
-    _area: ClassVar[Any]
-    _across: ClassVar[Any]
-
-    def mass(self, length: Amount) -> float:
-        """Return the mass (kg) of a length (m)."""
-        return float(self._area * self.density * _length(length))  # type: ignore[attr-defined]
-
-    def inertia(self, length: Amount) -> float:
-        """Return the moment of inertia (kg.m2) about the centre of mass, normal to the plane of motion."""
-        return float(self.mass(length) * (self._across + _length(length) ** 2) / 12.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Rod(_Uniform):
+class Rod(_Section):
     """A round rod.
 
     Attributes
@@ -97,12 +81,17 @@ class Rod(_Uniform):
     diameter: Amount
     density: Amount
 
-    _area = property(lambda self: 0.25 * pi * self.diameter**2)
-    _across = property(lambda self: 0.75 * self.diameter**2)
+    def mass(self, length: Amount) -> float:
+        """Return the mass (kg) of a length (m)."""
+        return float(0.25 * pi * self.diameter**2 * self.density * _length(length))
+
+    def inertia(self, length: Amount) -> float:
+        """Return the moment of inertia (kg.m2) about the centre of mass, across the rod: m (3 r^2 + L^2)/12."""
+        return float(self.mass(length) * (0.75 * self.diameter**2 + _length(length) ** 2) / 12.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Tube(_Uniform):
+class Tube(_Section):
     """A round tube.
 
     Attributes
@@ -127,12 +116,18 @@ class Tube(_Uniform):
         if self.inner >= self.outer:
             raise ParameterError("inner", self.inner, f"be less than the outer diameter of {self.outer:g} m")
 
-    _area = property(lambda self: 0.25 * pi * (self.outer**2 - self.inner**2))
-    _across = property(lambda self: 0.75 * (self.outer**2 + self.inner**2))
+    def mass(self, length: Amount) -> float:
+        """Return the mass (kg) of a length (m)."""
+        return float(0.25 * pi * (self.outer**2 - self.inner**2) * self.density * _length(length))
+
+    def inertia(self, length: Amount) -> float:
+        """Return the moment of inertia (kg.m2) about the centre of mass, across the tube: m (3 (ro^2 + ri^2) + L^2)/12."""
+        across = 0.75 * (self.outer**2 + self.inner**2)
+        return float(self.mass(length) * (across + _length(length) ** 2) / 12.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Bar(_Uniform):
+class Bar(_Section):
     """A rectangular bar.
 
     Attributes
@@ -154,8 +149,13 @@ class Bar(_Uniform):
     thickness: Amount
     density: Amount
 
-    _area = property(lambda self: self.width * self.thickness)
-    _across = property(lambda self: self.width**2)
+    def mass(self, length: Amount) -> float:
+        """Return the mass (kg) of a length (m)."""
+        return float(self.width * self.thickness * self.density * _length(length))
+
+    def inertia(self, length: Amount) -> float:
+        """Return the moment of inertia (kg.m2) about the centre of mass, normal to the plane of motion: m (L^2 + w^2)/12."""
+        return float(self.mass(length) * (self.width**2 + _length(length) ** 2) / 12.0)
 
 
 #: Sections of links between two pins.

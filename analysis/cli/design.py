@@ -96,23 +96,21 @@ def print_solutions(
         [str(rank), *quality_cells(s), f"{1e3 * s.largest_link:.6g}", format_transmission(s.verdicts)]
         for rank, s in enumerate(solutions, start=1)
     ]
-    if forces:
-        headings.append("pin force [N]")
-        for row, force in zip(rows, forces):
-            row.append(f"{force.greatest:.4g} on {force.pin}")
-    headings.append("verdict")
-    for row, s in zip(rows, solutions):
-        v = s.verdicts
-        row.append(", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]))
-    if any(s.variants for s in solutions):
-        headings.append("also found")
-        for row, s in zip(rows, solutions):
-            row.append(format_variants(s))
     broken = [violated(s) if violated else "" for s in solutions]
-    if any(broken):
-        headings.append("violates")
-        for row, what in zip(rows, broken):
-            row.append(what)
+    columns = {
+        "pin force [N]": [f"{force.greatest:.4g} on {force.pin}" for force in forces or ()],
+        "verdict": [
+            ", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects])
+            for v in (s.verdicts for s in solutions)
+        ],
+        "also found": [format_variants(s) for s in solutions],
+        "violates": broken,
+    }
+    for heading, cells in columns.items():
+        if any(cells):
+            headings.append(heading)
+            for row, cell in zip(rows, cells):
+                row.append(cell)
     styles = [None if s.verdicts.sound and not what else "yellow" for s, what in zip(solutions, broken)]
     show_table(title, headings, rows, words=("verdict", "also found", "violates"), styles=styles)
 

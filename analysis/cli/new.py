@@ -119,7 +119,7 @@ def _parameter_rows(mechanism: Mechanism, *, sections: bool) -> dict[str, str]:
     from ..files import line
     from ..run import parameters_from
 
-    made = next(iter(mechanism.published.values())).parameters
+    made = mechanism.first_set.parameters
     rows = {}
     computed = set()
     for link in mechanism.links if sections else ():
@@ -149,12 +149,12 @@ def _whose_masses(mechanism: Mechanism) -> str:
         kinds="\n".join(f"#   {kind}: {', '.join(table.readers)}" for kind, table in SECTIONS.items()),
         materials=", ".join(DENSITIES),
         other=", ".join(other),
-        source=next(iter(mechanism.published.values())).source,
+        source=mechanism.first_set.source,
     )
 
 
 def _parameters(mechanism: Mechanism) -> Iterator[str]:
-    source = next(iter(mechanism.published.values())).source
+    source = mechanism.first_set.source
     yield f"# All numbers, masses too, are those of {source}: give your own."
     yield f'mechanism = "{mechanism.name}"'
     yield from _grouped(_parameter_rows(mechanism, sections=False))
@@ -165,7 +165,7 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     from ..files import entries, in_words, line
     from ..run import RunTable, acting_on, signal_kinds
 
-    published = next(iter(mechanism.published.values()))
+    published = mechanism.first_set
     meaning = {v.name: v.description for v in mechanism.variables}
     words = {c.argument: meaning[c.name] for c in mechanism.channels}
     yield "# What acts may vary: then it is a table with a kind, such as speed = { kind = ..., ... }."

@@ -141,7 +141,7 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
 
 def _swept(mechanism: Mechanism, found: Reach) -> Array:
     """Return coordinates from the start on through the range of the first freedom, the others at their start."""
-    known = next(iter(mechanism.published.values()))
+    known = mechanism.first_set
     rows = np.tile(mechanism.state(known.initial)[: len(mechanism.freedoms)], (_TRACED + 1, 1))
     rows[1:, 0] = np.linspace(found.low, found.high, _TRACED)
     return rows
@@ -150,7 +150,7 @@ def _swept(mechanism: Mechanism, found: Reach) -> Array:
 @plot.register
 def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
     """Draw a planar mechanism at its start, and the paths of its points through the range of its first freedom."""
-    known = next(iter(mechanism.published.values()))
+    known = mechanism.first_set
     with styled():
         figure = Figure(figsize=(1.3 * _SIDE, _SIDE))
         axis = figure.add_subplot()
@@ -168,7 +168,7 @@ def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: st
         figure = Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
         for number, mechanism in enumerate(mechanisms):
             axis = figure.add_subplot(rows, columns, number + 1)
-            known = next(iter(mechanism.published.values()))
+            known = mechanism.first_set
             at = places(mechanism, known.parameters, _swept(mechanism, reach(mechanism)))
             draw(axis, mechanism, known.parameters, at, letters=False)
             axis.set_axis_off()
@@ -187,7 +187,7 @@ def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, 
         If there are fewer than two frames.
     """
     check_frames(frames)
-    known = next(iter(mechanism.published.values()))
+    known = mechanism.first_set
     found = reach(mechanism)
     swept = _swept(mechanism, found)[1:]
     at = places(mechanism, known.parameters, swept)

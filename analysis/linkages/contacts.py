@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .description import GROUND
 from .dynamics import Motion
 from .structure import Pin
 from .writing import function
@@ -62,9 +61,9 @@ class Contacts:
                 # the block of a slot has no mass: its friction acts on the body that has the pin
                 at = f"b.at_{slot.pin}" if slot else f"b.{second}_frame.origin"
                 second = self.motion.owner(slot.pin) if slot else second
-                along = f"{rub} * b.{name}_line.c, {rub} * b.{name}_line.s, {at}"
-                on = {first: f"force({along})", second: f"force({along.replace(rub, '-' + rub)})"}
-            wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies if body != GROUND)
+                one, other = (f"force({r} * b.{name}_line.c, {r} * b.{name}_line.s, {at})" for r in (rub, f"-{rub}"))
+                on = {first: one, second: other}
+            wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies)
             units.append(f"    Rubbing(({wrenches}), {rub} * {slip}),")
         doc = "Compute the friction in the joints for forces of 1 N in them."
         signature = "rubbing(b: Places, p: Constants) -> tuple[Rubbing, ...]"

@@ -35,7 +35,8 @@ class Motion:
         self.along = springs_at(self.description, interface)
         self.bodies = tuple(self.description.bodies)
         self.reactions: list[Reaction] = []
-        self.racked: list[Racked] = []
+        #: in the order in which their forces are computed
+        self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, Racked)]
 
     def owner(self, own: str) -> str:
         """Return a body that has a point, one that moves if there is one."""
@@ -199,21 +200,20 @@ class Motion:
             if by != GROUND:
                 rows.append(f"on_{by} = added(on_{by}, on_{on})")
 
+        def toothed(step: Geared | Racked, name: str, force: str) -> None:
+            rows.append(f"{name} = {force}")
+            rows.append(f"on_{step.body} = less(on_{step.body}, {name})")
+            if step.mate != GROUND:
+                rows.append(f"on_{step.mate} = added(on_{step.mate}, {name})")
+
         def back(step: Step) -> None:
             if isinstance(step, Freed):
                 supported(step.joint, step.parent, step.body)
             elif isinstance(step, Geared):
-                rows.append(f"on_teeth = {self._mesh(step)}")
-                rows.append(f"on_{step.body} = less(on_{step.body}, on_teeth)")
-                if step.mate != GROUND:
-                    rows.append(f"on_{step.mate} = added(on_{step.mate}, on_teeth)")
+                toothed(step, "on_teeth", self._mesh(step))
                 supported(step.pin, step.parent, step.body)
             elif isinstance(step, Racked):
-                rows.append(f"in_{step.rack} = {self._teeth(step)}")
-                self.racked.append(step)
-                rows.append(f"on_{step.body} = less(on_{step.body}, in_{step.rack})")
-                if step.mate != GROUND:
-                    rows.append(f"on_{step.mate} = added(on_{step.mate}, in_{step.rack})")
+                toothed(step, f"in_{step.rack}", self._teeth(step))
                 supported(step.joint, step.parent, step.body)
             else:
                 first, second = step.ends

@@ -92,12 +92,12 @@ class Places:
         through = f"minus({self.point(step.parent, '', own)}, turned({parent_turn}, {travel}))"
         return self.hung(through, turn, step.body, joint.through)
 
-    def racked(self, step: Racked) -> None:
-        """Write the place of a rack from the angle of its gear, or of a gear from the position of its rack."""
+    def pinion(self, step: Racked) -> None:
+        """Write the place of a gear from the position of its rack."""
         radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
-        turn, carrier = f"{step.body}_turn", self.interface.turn(step.parent)
-        own_terms, own_constants = self.angles.get(step.parent, ({}, []))
-        if step.turns and step.linear:
+        turn = f"{step.body}_turn"
+        if step.linear:
+            own_terms, own_constants = self.angles[step.parent]
             travel, start = self.travels[step.slide.name]
             terms = dict(own_terms)
             for number, factor in travel.items():
@@ -105,29 +105,32 @@ class Places:
             constants = [*own_constants, f"({' + '.join((*start, f'-{offset}'))}) / {radius}"]
             self.angles[step.body] = terms, constants
             self.lines.append(f"{turn} = {self.angled(terms, constants)}")
-        elif step.turns:
+        else:
             holder, block = step.slide.bodies
-            origin = self.at(holder, step.slide.through)
+            carrier, origin = self.interface.turn(step.parent), self.at(holder, step.slide.through)
             line = self.inclined(self.interface.turn(holder), step.slide)
             self.lines.append(f"{turn} = rolled({carrier}, {line}, {origin}, {block}_frame.origin, {offset}, {radius})")
-        else:
-            terms, constants = self.angles[step.mate]
-            share = {
-                n: f"{radius} * ({terms.get(n, '0.0')} - {own_terms.get(n, '0.0')})"
-                for n in terms.keys() | own_terms.keys()
-            }
-            angle = " + ".join(constants) or "0.0"
-            start = [f"{radius} * ({angle} - ({' + '.join(own_constants) or '0.0'}))", offset]
-            self.travels[step.slide.name] = share, start
-            way = " + ".join((*(f"{f} * {self.interface.drives[n].variable}" for n, f in share.items()), *start))
-            frame = self.slid(step, step.slide, carrier, f"travelled({way}, {self.share(share)}, v)")
-            sign = "" if step.slide.bodies[1] == step.body else "-"
-            inclined = [f"{sign}p.{step.slide.name}_direction"] if step.slide.inclined else []
-            self.angles[step.body] = own_terms, [*own_constants, *inclined]
-            self.lines.append(f"{step.body}_frame = {frame}")
-            return
         pin = self.at(step.parent, step.pin.name)
         self.lines.append(f"{step.body}_frame = {self.hung(pin, turn, step.body, step.pin.name)}")
+
+    def rack(self, step: Racked) -> None:
+        """Write the place of a rack from the angle of its gear."""
+        radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
+        (terms, constants), (own_terms, own_constants) = self.angles[step.mate], self.angles[step.parent]
+        share = {
+            n: f"{radius} * ({terms.get(n, '0.0')} - {own_terms.get(n, '0.0')})"
+            for n in terms.keys() | own_terms.keys()
+        }
+        angle = " + ".join(constants) or "0.0"
+        start = [f"{radius} * ({angle} - ({' + '.join(own_constants) or '0.0'}))", offset]
+        self.travels[step.slide.name] = share, start
+        way = " + ".join((*(f"{f} * {self.interface.drives[n].variable}" for n, f in share.items()), *start))
+        travel = f"travelled({way}, {self.share(share)}, v)"
+        frame = self.slid(step, step.slide, self.interface.turn(step.parent), travel)
+        sign = "" if step.slide.bodies[1] == step.body else "-"
+        inclined = [f"{sign}p.{step.slide.name}_direction"] if step.slide.inclined else []
+        self.angles[step.body] = own_terms, [*own_constants, *inclined]
+        self.lines.append(f"{step.body}_frame = {frame}")
 
     def share(self, terms: dict[int, str]) -> str:
         """Return the derivatives of an angle by the coordinates, as a tuple."""
@@ -327,7 +330,7 @@ class Places:
                 self.geared(step)
             elif isinstance(step, Racked):
                 self.lines.append(f"# {step.body}, in the teeth of {step.mate}")
-                self.racked(step)
+                (self.pinion if step.turns else self.rack)(step)
             else:
                 self.dyad(step)
         margin = "1.0"

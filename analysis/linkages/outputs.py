@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from .description import given
 from .dynamics import Motion
-from .structure import Pin, sliders
+from .structure import Pin, Slider, sliders
 from .writing import function, quoted
 
 
@@ -63,18 +63,16 @@ class Outputs:
         for own in sorted(moving - set(self.description.ground)):
             for axis in "xy":
                 yield Output(f'output("{own}.{axis}", "m", "Point {own}, {axis}", "", *POSITION)', f"b.at_{own}.{axis}")
-        freed = {drive.joint for drive in self.interface.drives}
-        for name, joint in sliders(self.structure).items():
-            if name not in freed:
-                block = joint.bodies[1]
-                yield Output(
-                    f'output("{name}.position", "m", "Position of the {block} on the line of {name}", "", *POSITION)',
-                    f"{name}_position",
-                )
-                yield Output(
-                    f'output("{name}.velocity", "m/s", "Its rate", "", *RATE, rate_of="{name}.position")',
-                    f"{name}_velocity",
-                )
+        for slide in self._following():
+            name, block = slide.name, slide.bodies[1]
+            yield Output(
+                f'output("{name}.position", "m", "Position of the {block} on the line of {name}", "", *POSITION)',
+                f"{name}_position",
+            )
+            yield Output(
+                f'output("{name}.velocity", "m/s", "Its rate", "", *RATE, rate_of="{name}.position")',
+                f"{name}_velocity",
+            )
         for name, spring in self.description.springs.items():
             if spring.between:
                 free = f" + p.{name}_free_length" if given(spring.free) else ""
@@ -132,6 +130,11 @@ class Outputs:
         yield from (Output("", value) for value in ("potential", f"x[{2 * n}]", f"x[{2 * n + 1}]"))
         yield Output("", f"kinetic + potential - start_energy + x[{2 * n}] - x[{2 * n + 1}]")
 
+    def _following(self) -> list[Slider]:
+        """Return the slides whose positions follow from the freedoms."""
+        freed = {drive.joint for drive in self.interface.drives}
+        return [slide for name, slide in sliders(self.structure).items() if name not in freed]
+
     def function(self) -> str:
         """Write the function of all outputs."""
         s = "s, " if self.description.springs else ""
@@ -141,9 +144,7 @@ class Outputs:
             "b = m.places",
             *(["s = m.springs"] if s else []),
         ]
-        freed = {drive.joint for drive in self.interface.drives}
-        slides = {name: joint for name, joint in sliders(self.structure).items() if name not in freed}
-        rows += [f"{name}_position, {name}_velocity = {self.interface.travel(slides[name])}" for name in slides]
+        rows += [f"{d.name}_position, {d.name}_velocity = {self.interface.travel(d)}" for d in self._following()]
         rows += ["kinetic = kinetic_energy(m.masses)", f"potential = potential_energy(m.masses, {s}p)"]
         rows += ["return (", *(f"    {output.value}," for output in self.all()), ")"]
         signature = "outputs(x: tuple[float, ...], i: Applied, start_energy: float, p: Constants) -> tuple[float, ...]"

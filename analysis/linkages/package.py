@@ -228,10 +228,8 @@ class Package:
         """Raise LinkageError where the accelerations at the start are no finite numbers."""
         start = made.published[made.name]
         x, p = made.state(start.initial), start.parameters.constants()
-        inputs = tuple(float(v.start or 0.0) for v in made.variables if v.causality == "input")
-        acting = made.equations.applied(tuple(float(mode.default) for mode in made.modes), inputs, p)
         try:
-            if all(map(isfinite, made.equations.derivative(x, acting, p))):
+            if all(map(isfinite, made.equations.derivative(x, made.idle(p), p))):
                 return
         except (ValueError, TypeError, ArithmeticError):
             pass

@@ -48,7 +48,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     period = mechanism.freedoms[freedom].period
     if most is None:
         most = 0.5 * period or (pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0)
-    known = next(iter(mechanism.published.values()))
+    known = mechanism.first_set
     p = known.parameters.constants()
     acting, x = mechanism.idle(p), list(mechanism.state(known.initial))
     middle = x[freedom]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import cache
 from types import FunctionType, ModuleType, SimpleNamespace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from linkwork.mechanism import Mechanism
 
 from ..numerics import symbolic
 from ..numerics.tracing import Rebound
+
+if TYPE_CHECKING:
+    from ..numerics.codegen import MachineCode
 
 #: The functions that a run needs, by their numbers among `Machine.addresses`.
 DERIVATIVE, OUTPUTS, CLEARANCE, JUMP = range(4)
@@ -167,6 +170,15 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
     )
 
 
+def _compiled(traces: Traced, functions: Mapping[str, Any]) -> MachineCode:
+    """Return machine code of expressions, by their names, in the symbols of traced equations."""
+    from ..numerics.codegen import MachineCode
+
+    casadi = symbolic.library()
+    arguments = [casadi.SX.sym("t"), *traces.symbols]
+    return MachineCode([casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()])
+
+
 class Machine:
     """Machine code of a mechanism's equations, and what is derived once from parameters for it.
 
@@ -177,15 +189,8 @@ class Machine:
     """
 
     def __init__(self, mechanism: Mechanism, switched: bool) -> None:
-        from ..numerics.codegen import MachineCode
-
-        casadi = symbolic.library()
         traces = expressions(mechanism, switched)
-        t = casadi.SX.sym("t")
-        arguments = [t, *traces.symbols]
-        self._code = MachineCode(
-            [casadi.Function(name, arguments, [getattr(traces, name)], {"cse": True}) for name in _NAMES]
-        )
+        self._code = _compiled(traces, {name: getattr(traces, name) for name in _NAMES})
         self.addresses: NDArray[np.int64] = np.array([self._code.addresses[name] for name in _NAMES], dtype=np.int64)
         self.fingerprint = self._code.fingerprint
 
@@ -206,12 +211,10 @@ def machine(mechanism: Mechanism, switched: bool = False) -> Machine:
 
 
 @cache
-def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...]) -> Any:
+def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...]) -> MachineCode:
     """Return machine code of the equation ``chosen``: some of the outputs, which costs what these need."""
-    from ..numerics.codegen import MAKING, MachineCode
+    from ..numerics.codegen import MAKING
 
-    casadi = symbolic.library()
     traces = expressions(mechanism, switched)
-    arguments = [casadi.SX.sym("t"), *traces.symbols]
     with MAKING:
-        return MachineCode([casadi.Function("chosen", arguments, [traces.outputs[list(columns)]], {"cse": True})])
+        return _compiled(traces, {"chosen": traces.outputs[list(columns)]})

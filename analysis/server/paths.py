@@ -122,7 +122,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
                     f"{1e3 * solution.evaluation.worst:.3g}",
                     format_transmission(v),
                     f"{1e3 * solution.largest_link:.4g}",
-                    ", ".join([v.grashof, *v.defects, *([also] if (also := format_variants(solution)) else [])]),
+                    ", ".join(filter(None, (v.grashof, *v.defects, format_variants(solution)))),
                 ]
             )
             title = f"Linkage {rank} for a path that was drawn"

@@ -321,10 +321,15 @@ class Mechanism:
         """Number of components of the state."""
         return 2 * len(self.freedoms) + 2
 
+    @property
+    def first_set(self) -> PublishedSet:
+        """The first of the published sets."""
+        return next(iter(self.published.values()))
+
     @cached_property
     def constants(self) -> Any:
         """The type of the equations' constants."""
-        return type(next(iter(self.published.values())).parameters.constants())
+        return type(self.first_set.parameters.constants())
 
     @cached_property
     def switch_place(self) -> int:

@@ -540,14 +540,15 @@ def gear_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
 
     The pitch point is at ``radius`` to the right of t from the pin, to the left where it is negative.
     """
-    pull = on.x * t.c + on.y * t.s
-    x, y = pull * t.c, pull * t.s
-    return Wrench(x, y, (pin.x + radius * t.s) * y - (pin.y - radius * t.c) * x)
+    return _in_teeth(pin, t, radius, on.x * t.c + on.y * t.s)
 
 
 def rack_on_gear(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
     """Return the force of its rack on a gear, as in `gear_on_rack`."""
-    pull = moment_about(on, pin) / radius
+    return _in_teeth(pin, t, radius, moment_about(on, pin) / radius)
+
+
+def _in_teeth(pin: Vector, t: Turn, radius: float, pull: float) -> Wrench:
     x, y = pull * t.c, pull * t.s
     return Wrench(x, y, (pin.x + radius * t.s) * y - (pin.y - radius * t.c) * x)
 

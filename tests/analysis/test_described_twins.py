@@ -32,6 +32,13 @@ def rough(case: Any) -> Any:
     return case._replace(parameters=replace(p, slider_friction_coefficient=0.1, **radii))
 
 
+def spring(p: Any) -> dict[str, Any]:
+    return {
+        "at": "G", "stiffness": p.slider_stiffness, "damping": p.slider_damping,
+        "free": p.slider_spring_free_position, "friction": p.slider_coulomb_friction,
+    }  # fmt: skip
+
+
 def five_bar(p: Any) -> dict[str, Any]:
     """The five-bar slider in words, of the parameters of the hand-written one."""
     inertia = p.crank_inertia - p.crank_mass * p.crank_cog_distance**2
@@ -58,12 +65,7 @@ def five_bar(p: Any) -> dict[str, Any]:
         },
         "slides": {"G": {"body": "block", "through": "O", "direction": p.slider_guide_angle}},
         "freedoms": {"crank": {"joint": "A", "speed": 44.0}, "slider": "G"},
-        "springs": {
-            "spring": {
-                "at": "G", "stiffness": p.slider_stiffness, "damping": p.slider_damping,
-                "free": p.slider_spring_free_position, "friction": p.slider_coulomb_friction,
-            }
-        },
+        "springs": {"spring": spring(p)},
         "assembly": {"C": p.assembly_branch},
         "loads": ["P"],
         "gravity": p.gravity,
@@ -93,12 +95,7 @@ def slider_crank(p: Any) -> dict[str, Any]:
         },
         "slides": {"G": {"body": "piston", "through": "R", "direction": 0.5 * math.pi * up}},
         "freedoms": {"crank": {"joint": "A", "speed": 5.0}},
-        "springs": {
-            "spring": {
-                "at": "G", "stiffness": p.slider_stiffness, "damping": p.slider_damping,
-                "free": p.slider_spring_free_position, "friction": p.slider_coulomb_friction,
-            }
-        },
+        "springs": {"spring": spring(p)},
         "assembly": {"C": p.assembly_branch},
         "loads": ["C"],
         "gravity": math.hypot(p.gravity_x, p.gravity_y),

@@ -39,7 +39,7 @@ from ..motion import (
     unit_of,
     value_of,
 )
-from ..response import distance, natural_frequency
+from ..response import distance, natural_frequency, oscillating
 from ..stability import Confirmation, SpecialPoint, confirm
 from .boundary import (
     BRANCH_POINTS,
@@ -567,8 +567,9 @@ def damping_name(mechanism: Mechanism) -> str:
     InputError
         If the mechanism has no damping.
     """
-    free = [freedom.coordinate for n, freedom in enumerate(mechanism.freedoms) if n not in mechanism.cyclic]
-    for name in (*(mechanism.names("damping", free[0]) if free else ()), *mechanism.names("damping")):
+    first = [mechanism.freedoms[number].coordinate for number in oscillating(mechanism)[:1]]
+    own = [name for coordinate in first for name in mechanism.names("damping", coordinate)]
+    for name in (*own, *mechanism.names("damping")):
         return name
     raise InputError(f"a {mechanism.name} has no damping: name both parameters of the chart")
 

@@ -4,6 +4,6 @@ from .branch import distance as distance
 from .branch import follow as follow
 from .branch import switch as switch
 from .frequency import Response as Response
-from .frequency import first_freedom as first_freedom
 from .frequency import frequency_response as frequency_response
 from .frequency import natural_frequency as natural_frequency
+from .frequency import oscillating as oscillating

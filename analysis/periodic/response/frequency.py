@@ -55,11 +55,15 @@ MASS_SAMPLES = 1024
 LATTICE = 633
 
 
+def oscillating(mechanism: Mechanism) -> tuple[int, ...]:
+    """Return the numbers of the freedoms that are not a crank's."""
+    return tuple(number for number in range(len(mechanism.freedoms)) if number not in mechanism.cyclic)
+
+
 def first_freedom(mechanism: Mechanism) -> int:
     """Return the number of the first freedom that is not a crank's; raises ParameterError if there is none."""
-    for number in range(len(mechanism.freedoms)):
-        if number not in mechanism.cyclic:
-            return number
+    for number in oscillating(mechanism):
+        return number
     raise ParameterError("mechanism", mechanism.name, "have a second freedom for a natural frequency")
 
 

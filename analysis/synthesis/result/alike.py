@@ -44,7 +44,7 @@ def format_variants(solution: Solution) -> str:
 def _alike(one: Solution, other: Solution) -> int | None:
     """Return 1 if two linkages are near copies, -1 if one is near the other's mirror image, otherwise None."""
     a, b = one.linkage, other.linkage
-    if a.kind != b.kind or not all(_geared(x) for x in (a, b)) or _gears(a) != _gears(b):
+    if a.kind != b.kind or _gears(a) is None or _gears(a) != _gears(b):
         return None
     links = [np.array([abs(getattr(x, name)) for name in x.links]) for x in (a, b)]
     if isinstance(one.task, RockerFunction):
@@ -58,13 +58,12 @@ def _alike(one: Solution, other: Solution) -> int | None:
     return None
 
 
-def _geared(linkage: Linkage) -> bool:
-    """Return whether the rocker pivot is fixed or on a geared crank."""
-    return linkage.pivot is None or (isinstance(linkage.pivot, SecondCrank) and linkage.pivot.series.order == 0)
-
-
-def _gears(linkage: Linkage) -> float:
-    return linkage.pivot.ratio if isinstance(linkage.pivot, SecondCrank) else 0.0
+def _gears(linkage: Linkage) -> float | None:
+    """Return the ratio of the gears of a second crank, 0 with a fixed rocker pivot; None where the pivot is commanded."""
+    pivot = linkage.pivot
+    if pivot is None:
+        return 0.0
+    return pivot.ratio if isinstance(pivot, SecondCrank) and pivot.series.order == 0 else None
 
 
 def _sides(linkage: Linkage) -> tuple[int, ...]:

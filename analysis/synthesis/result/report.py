@@ -440,10 +440,9 @@ def assess(solution: Solution, violated: Callable[[Solution], str] | None = None
         f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
         f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
     )
-    made = Solution.of(solution.task, rounding.linkage, solution.evaluation.rotation)
-    broken = violated(made) if violated and not (violated(solution)) else ""
-    if broken:
-        words += f"; rounded so, it violates a constraint: {broken}"
+    if violated and not violated(solution):
+        broken = violated(Solution.of(solution.task, rounding.linkage, solution.evaluation.rotation))
+        words += f"; rounded so, it violates a constraint: {broken}" if broken else ""
     return Assessment(solution=solution, dimensions=_dimension_rows(solution, step), rounding=words)
 
 

@@ -32,7 +32,7 @@ from ..task.task import Normal, normal_form
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
 from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, over_cores, start_of
-from .statement import Objective
+from .statement import PARTS, Objective
 
 FloatArray = NDArray[np.float64]
 #: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
@@ -259,14 +259,13 @@ class Polisher:
         few = normal.timed or normal.n <= FEW
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._refinement: Refinement | None = None
-        self._closely: Program | None = None
-        self._programs: dict[tuple[str, bool], Program] = {}
+        self._programs: dict[tuple[str, bool, int], Program] = {}
 
-    def program(self, objective: Objective, *, exact: bool = False) -> Program:
+    def program(self, objective: Objective, *, exact: bool = False, parts: int = PARTS) -> Program:
         """Return the program with this objective; with a fixed pivot all are exact."""
-        key = objective, exact and self.pivot is not None
+        key = objective, exact and self.pivot is not None, parts
         if key not in self._programs:
-            self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1])
+            self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1], parts=parts)
         return self._programs[key]
 
     def fit(self, start: Start) -> Answer:
@@ -388,12 +387,8 @@ class Polisher:
                 feasible=within and np.isfinite(quality),
             )
         objective: Objective = "squares" if self.normal.outline is None else "curve"
-        if self.limits.way is None:
-            return self.program(objective, exact=True).kept(start)
-        if self._closely is None:
-            parts = -(-JUDGED // self.normal.n)
-            self._closely = Program(self.normal, self.limits, self.pivot, objective, parts=max(4, parts))
-        return self._closely.kept(start)
+        parts = PARTS if self.limits.way is None else max(PARTS, -(-JUDGED // self.normal.n))
+        return self.program(objective, exact=True, parts=parts).kept(start)
 
 
 def violated(

@@ -31,6 +31,8 @@ Objective = Literal["squares", "worst", "transmission", "curve", "least", "least
 GRID, BETWEEN = 96, 2.5e-3
 #: Margin of a Grashof type, as a share of the links' sum: at zero a four-bar is a change-point.
 MARGIN = 1e-4
+#: Parts of the way from one station to the next at whose ends a search holds the transmission angle.
+PARTS = 4
 #: Least rotation of the crank from one untimed station to the next, as a share of an even one.
 ADVANCE = 1e-3
 #: Least rotation over which an open path is traced (rad).
@@ -91,7 +93,7 @@ class Statement:
         objective: Objective = "squares",
         *,
         exact: bool = True,
-        parts: int = 4,
+        parts: int = PARTS,
     ) -> None:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
         self._parts = parts
