@@ -22,7 +22,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import check
-from ..numerics.cache import code_folder, hashes_below, keep_hashes, read_hashes
+from ..numerics.cache import alone, code_folder, hashes_below, keep_hashes, read_hashes
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import with_bill
@@ -199,15 +199,15 @@ def compile_library(
     """
     require("ziglang")
     cache = code_folder(f"zig-{target}")
-    known, kept = cache / "hashes", read_hashes(cache / "hashes")
-    found = hashes_below(cache / "o")
-    if any(found.get(name) != digest for name, digest in kept.items()):
-        sys.stderr.write(f"linkwork: {cache}: a file has changed or is gone: all are compiled again\n")
-        shutil.rmtree(cache)
-        cache.mkdir(mode=0o700)
-    if not known.is_file():
-        sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
-    with tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
+    known = cache / "hashes"
+    with alone(cache), tempfile.TemporaryDirectory(prefix="linkwork-zig-") as own:
+        found = hashes_below(cache / "o")
+        if any(found.get(name) != digest for name, digest in read_hashes(known).items()):
+            sys.stderr.write(f"linkwork: {cache}: a file has changed or is gone: all are compiled again\n")
+            shutil.rmtree(cache)
+            cache.mkdir(mode=0o700)
+        if not known.is_file():
+            sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
         done = subprocess.run(
             [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, "-lm"],
             cwd=folder,
@@ -216,9 +216,9 @@ def compile_library(
             text=True,
             check=False,
         )
-    if done.returncode != 0:
-        raise BuildError(f"{library} cannot be compiled for {target}:\n{done.stderr}")
-    keep_hashes(known, hashes_below(cache / "o"))
+        if done.returncode != 0:
+            raise BuildError(f"{library} cannot be compiled for {target}:\n{done.stderr}")
+        keep_hashes(known, hashes_below(cache / "o"))
 
 
 def _universal(parts: Sequence[bytes]) -> bytes:

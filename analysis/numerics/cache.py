@@ -11,6 +11,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from filelock import FileLock
 from platformdirs import user_cache_dir
 
 #: Bytes that must fit into a folder for code.
@@ -37,6 +38,11 @@ def code_folder(name: str) -> Path:
     if _usable(folder) and _ours(folder, user):
         return folder
     return Path(tempfile.mkdtemp(prefix="linkwork-"))
+
+
+def alone(folder: Path) -> FileLock:
+    """Return a lock on a folder of the cache: of the processes that hold it with ``with``, one at a time goes on."""
+    return FileLock(folder.with_suffix(".lock"))
 
 
 def put(path: Path, content: bytes) -> None:

@@ -39,7 +39,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from linkwork.errors import LinkworkError
 
 from . import linking
-from .cache import code_folder, keep
+from .cache import alone, code_folder, keep
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -354,17 +354,18 @@ class Kernel:
                         sys.stderr.write(f"linkwork: {folder}: {error.strerror}: compiled code is not kept\n")
                         self._compiled = self._compile(None)
                         return self._compiled
-                    if not any(folder.glob("**/*.nb[ic]")):
-                        raise
                     # an error of `linking`, or of any kind where a file is too short
-                    warnings.warn(
-                        f"the compiled code in {folder} is damaged ({error!r}): it is compiled again",
-                        RuntimeWarning,
-                        stacklevel=3,
-                    )
-                    shutil.rmtree(folder)
-                    folder.mkdir(mode=0o700)
-                    self._compiled = self._compile(folder)
+                    with alone(folder):
+                        if not any(folder.glob("**/*.nb[ic]")):
+                            raise
+                        warnings.warn(
+                            f"the compiled code in {folder} is damaged ({error!r}): it is compiled again",
+                            RuntimeWarning,
+                            stacklevel=3,
+                        )
+                        shutil.rmtree(folder)
+                        folder.mkdir(mode=0o700)
+                        self._compiled = self._compile(folder)
         return self._compiled
 
     def _compile(self, folder: Path | None) -> Any:
