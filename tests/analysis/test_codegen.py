@@ -7,6 +7,8 @@ import io
 import math
 import os
 import stat
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -278,6 +280,25 @@ def test_damaged_machine_code_is_compiled_again(
     with pytest.warns(RuntimeWarning, match="is damaged .* it is compiled again"):
         assert made()(2.0) == 4.0
     assert made()(3.0) == 6.0  # from the cache, without a warning
+
+
+def test_processes_that_find_the_same_damaged_code_all_go_on(tmp_path: Path) -> None:
+    (tmp_path / "doubled.py").write_text(_DOUBLED, encoding="utf-8")
+    variables = {**os.environ, "LINKWORK_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, str(tmp_path / "doubled.py")]
+    subprocess.run(command, env=variables, check=True, timeout=100)
+    for path in (tmp_path / "cache").rglob("*.nbi"):
+        path.write_bytes(b"junk")
+    processes = [subprocess.Popen(command, env=variables, stdout=subprocess.PIPE) for _ in range(4)]
+    assert [process.communicate(timeout=100)[0] for process in processes] == [b"4.0\n"] * 4
+
+
+_DOUBLED = """
+from numba import float64
+from analysis.numerics.codegen import Kernel
+def doubled(x): return 2 * x
+print(Kernel(doubled, (float64(float64),), "a test")(2.0))
+"""
 
 
 def test_machine_code_of_functions_is_kept_and_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

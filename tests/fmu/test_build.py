@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -14,7 +15,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 
 import build_fmu
-from analysis.export import BuildError, build, compile_library
+from analysis.export import PLATFORMS, BuildError, build, compile_library
 from build_fmu import FMUS
 
 from .conftest import changed_sources, model_description
@@ -219,3 +220,24 @@ def test_a_changed_file_of_the_compilers_cache_is_made_again(
         made[0].write_bytes(content)
     assert [path.read_bytes() for path in made] == [b"code"] * 2
     assert capsys.readouterr().err.count("all are compiled again") == 1
+
+
+@pytest.mark.slow
+def test_processes_that_compile_at_the_same_time_wait_for_each_other(tmp_path: Path) -> None:
+    """What Zig compiles for itself is there for none of them; the hash of a file that is half written would not hold."""
+    (tmp_path / "a.c").write_text('#include <stdio.h>\nint main(void) { puts("here"); return 0; }\n', encoding="utf-8")
+    code = "import sys; from analysis.export import compile_library as c; c(sys.argv[1], ['a.c'], sys.argv[2], sys.argv[3])"
+    target = PLATFORMS["x86_64-windows"].target
+    variables = {**os.environ, "LINKWORK_CACHE_DIR": str(tmp_path / "cache")}
+
+    def started(name: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", code, str(tmp_path), name, target]
+        return subprocess.Popen(
+            command, cwd=Path(build_fmu.__file__).parent, env=variables, stderr=subprocess.PIPE, text=True
+        )
+
+    processes = [started(f"{name}.exe") for name in "abc"]
+    said = [process.communicate(timeout=500)[1] for process in processes]
+    assert [process.returncode for process in processes] == [0, 0, 0], said
+    assert sum("Zig compiles what it needs" in text for text in said) == 1
+    assert not any("all are compiled again" in text for text in said)
