@@ -517,3 +517,25 @@ def test_starts_of_the_scan_are_what_their_quality_says(kind: syn.Kind, gears: t
             assert linkage.kind == kind
             assert linkage.least_transmission > radians(38.0)
             assert syn.Solution.of(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
+
+
+def test_a_poor_answer_says_how_much_of_the_target_is_wrong_and_what_may_do_better() -> None:
+    """A circle by a circle half as large, whose point is the crank pin: three quarters of its area; a rocker at rest."""
+    turned = syn.turn(720)
+    circle = syn.TargetPath(points=0.2 * np.column_stack([np.cos(turned), np.sin(turned)]), closed=True)
+    links = {"crank_length": 0.1, "coupler_length": 0.3, "ground_length": 0.3, "rocker_length": 0.25}
+    places = {"pivot_x": 0.0, "pivot_y": 0.0, "ground_angle": 0.0, "crank_phase": 0.0, "output_angle": 0.0}
+    linkage = syn.Linkage(**links, **places, point_distance=0.0, point_angle=0.0)
+    poor = syn.Solution.of(syn.UntimedPath(path=circle), linkage)
+    assert poor.share == pytest.approx(0.75, rel=1e-3)
+    assert "75 % of the target's area" in syn.format_poor(poor)
+    assert "geared five-bar" in syn.format_poor(poor)
+    assert syn.format_poor(poor) in syn.assess(poor).report
+    good = syn.Solution.of(syn.UntimedPath(path=circle), replace(linkage, crank_length=0.2))
+    assert good.share == pytest.approx(0.0, abs=1e-4)
+    assert syn.format_poor(good) == ""
+    at = syn.turn(12)
+    still = syn.RockerFunction(rotation=at, angle=linkage.rocker_angle(at) + np.where(np.arange(12) % 2, 0.5, -0.5))
+    off = syn.Solution.of(still, linkage)
+    assert off.share == pytest.approx(0.5 / np.ptp(still.angle), rel=1e-9)
+    assert "swing" in syn.format_poor(off)

@@ -17,7 +17,7 @@ from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCr
 from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
 from ..task.constraint import SECOND_LENGTH, stroke
 from ..task.limit_position import dead_centres, mechanical_advantage, time_ratio, toggles
-from ..task.task import Normal, RockerFunction, Task, UntimedPath, normal_form
+from ..task.task import Normal, PrecisionPoints, RockerFunction, SliderFunction, Task, UntimedPath, normal_form
 from .alike import format_variants
 from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, path_rate
 
@@ -26,6 +26,13 @@ FloatArray = NDArray[np.float64]
 LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
 #: Angles of a moved pivot, besides the coefficients of its motion.
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
+#: Share of the target above which an answer is called poor, and what may do better by the kind of linkage.
+POOR = 0.05
+_BETTER = {
+    "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions for it",
+    "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions for it",
+    "geared-five-bar": "other ratios of its gears (search.gears), or a smoother or smaller target, may do better",
+}
 #: Step of the differences of exact derivatives, in rad or as a share of the longest link.
 DIFFERENCE = 1e-5
 
@@ -373,6 +380,29 @@ def headline(solution: Solution) -> str:
     )
 
 
+def format_poor(solution: Solution) -> str:
+    """Return a sentence on a poor answer: the share of the target that is wrong, and what may do better; else nothing.
+
+    See `Solution.share`; an answer is poor if more than `POOR` of the target is wrong.
+    """
+    task, share = solution.task, solution.share
+    if not POOR < share < inf:
+        return ""
+    if solution.by_area:
+        said = f"{100.0 * share:.2g} % of the target's area is wrong"
+    else:
+        of = "swing" if isinstance(task, RockerFunction) else "size"
+        said = f"the rms error is {100.0 * share:.2g} % of the target's {of}"
+    better = _BETTER[solution.linkage.kind]
+    if solution.linkage.pivot is not None and solution.linkage.kind == "four-bar":
+        better = "more harmonics of its pivot's motion, or a smoother or smaller target, may do better"
+    elif isinstance(task, SliderFunction):
+        better = "a smaller stroke or swing of the crank may do better"
+    elif isinstance(task, PrecisionPoints):
+        better = "fewer points may be met exactly"
+    return f"a poor answer: {said}; {better}"
+
+
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Format rows in columns, the first to the left, the others to the right."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
@@ -425,6 +455,8 @@ class Assessment:
             head += f"\n{straight}"
         if solution.variants:
             head += f"\nalso found: {format_variants(solution)}"
+        if poor := format_poor(solution):
+            head += f"\n{poor}"
         return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
 
 

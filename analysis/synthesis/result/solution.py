@@ -310,6 +310,28 @@ class Solution(Shown):
         return self.evaluation.value
 
     @property
+    def by_area(self) -> bool:
+        """Return whether the error is the area between two closed curves, without weights."""
+        task = self.task
+        if not (isinstance(task, UntimedPath) and task.path.closed and task.measure == "area"):
+            return False
+        return task.path.enclosed_area > 0.0 and bool(np.all(np.asarray(task.weights) == 1.0))
+
+    @property
+    def share(self) -> float:
+        """Return the error as a share of the target.
+
+        Where `by_area`, the area between the curves by the area that the target encloses. Else the rms error by the target's
+        size, which is the diagonal of the box round it, or by the swing of a rocker function.
+        """
+        task = self.task
+        if self.by_area:
+            assert isinstance(task, UntimedPath)
+            return self.error / task.path.enclosed_area
+        size = float(np.ptp(task.angle)) if isinstance(task, RockerFunction) else normal_form(task).unit
+        return self.evaluation.rms / size if size > 0.0 else 0.0
+
+    @property
     def rotation(self) -> FloatArray:
         """Return the crank rotations over which the task is done: its stations, or a turn."""
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
