@@ -26,10 +26,11 @@ from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
+from .cautions import MANY_STEPS, PATIENCE, SHARE, fastest_decay, stiffness
 from .equations import like_parameters, modules_of
 from .inputs import Encoded, Inputs, align, compiled_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, problem_of, verdict
-from .sampling import of_functions
+from .sampling import of_functions, sample
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -39,6 +40,8 @@ _STATUS = {AssemblyError: 3, InputError: 2}
 _NO_START = -2
 #: The same of a run that was interrupted.
 _PAUSED = -3
+#: The same of a stiff run that would need more than `cautions.SHARE` of the most steps.
+_HOPELESS = -4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +79,7 @@ class Task:
         """Return the shapes of the result arrays: see `_integrate`."""
         m, n, size = len(self.parameters), len(self.settings.times), self.mechanism.size
         samples = (size, len(self.mechanism.channels)) if self.outputs is None else (len(self.outputs),)
-        return [(m, 4 + size), *((m, n, numbers) for numbers in samples)]
+        return [(m, 5 + size), *((m, n, numbers) for numbers in samples)]
 
     def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Split a flat array into views of these shapes."""
@@ -168,21 +171,36 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
     from . import records as k
 
     status, messages = [k.FINISHED] * len(ends), [""] * len(ends)
-    for i in np.flatnonzero(ends[:, 0] != k.FINISHED).tolist():
-        (code, steps, lost), t, x = ends[i, [0, 1, 3]].astype(int).tolist(), float(ends[i, 2]), ends[i, 4:]
+    for i in np.flatnonzero((ends[:, 0] != k.FINISHED) | (ends[:, 4] >= MANY_STEPS)).tolist():
+        (code, samples, lost), t, x = ends[i, [0, 1, 3]].astype(int).tolist(), float(ends[i, 2]), ends[i, 5:]
         if i in prepared.failures:
             error = prepared.failures[i]
             status[i] = next(code for kind, code in _STATUS.items() if isinstance(error, kind))
             messages[i] = str(error)
         elif code == _PAUSED:
-            status[i], messages[i] = NOT_RUN, f"interrupted at t = {t:.6g} s" if steps else "not run: interrupted"
+            status[i], messages[i] = NOT_RUN, f"interrupted at t = {t:.6g} s" if samples else "not run: interrupted"
         elif code == k.BAD_INPUT:
             status[i], messages[i] = code, str(task.run(i).lost(lost, t, x))
         else:
             switched = task.mechanism.switched(prepared.batch.p[i])
             limit = task.run(i).limit if switched else None
-            status[i], messages[i] = verdict(task.mechanism, task.settings, code, t, x, limit)
+            status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit)
+            steps, passed, span = float(ends[i, 4]), t - task.settings.times[0], np.ptp(task.settings.times)
+            if code == k.RUNNING and steps < task.settings.max_steps:
+                message = f"stopped at t = {t:.9g} s, as about {steps * span / passed:.2g} steps would be needed"
+            messages[i] = "; ".join(filter(None, (message, _stiff(task, i, x, t, steps))))
     return status, messages
+
+
+def _stiff(task: Task, i: int, x: NDArray[np.float64], t: float, steps: float) -> str:
+    """Return the sentence on a run that is stiff; empty if it is not."""
+
+    def decay_rate() -> float:
+        run = task.run(i)
+        u = sample(run.encoded, t, x, run.encoded.source.laws)
+        return fastest_decay(task.mechanism, x, run.applied(u), run.p)
+
+    return stiffness(decay_rate, steps, t - float(task.settings.times[0]))
 
 
 def _integrate(
@@ -195,7 +213,8 @@ def _integrate(
     """Solve the runs and return whether all of them were finished.
 
     ``ends`` gets a row for each run: the compiled code's status, the number of samples, the time of the end (s), the number
-    of the channel that was not finite, the state at the end. ``samples`` get the samples, NaN after the end of a run.
+    of the channel that was not finite, the number of steps, the state at the end. ``samples`` get the samples, NaN after
+    the end of a run.
     """
     from . import compiled
     from . import records as k
@@ -217,11 +236,18 @@ def _integrate(
     status[list(prepared.failures)] = _NO_START
     own, recorded = batch._replace(laws=batch.laws.copy()), k.Samples(settings.times, states, forces)
     watch = k.watch_nothing(mechanism.size)
-    todo = status == k.RUNNING
+    todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
     while todo.any() and not heard:
         compiled.run(problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL)
-        todo = (status == k.RUNNING) & (carries["steps"] < settings.max_steps)
+        todo = (status == k.RUNNING) & (steps < settings.max_steps)
+        passed = carries["begin"] + carries["elapsed"] - settings.times[0]
+        for i in np.flatnonzero(
+            todo & (steps >= PATIENCE) & (steps * span >= SHARE * settings.max_steps * passed)
+        ).tolist():
+            if _stiff(task, i, state.x[i], settings.times[0] + passed[i], float(steps[i])):
+                status[i], todo[i] = _HOPELESS, False
     status[todo] = _PAUSED
+    status[status == _HOPELESS] = k.RUNNING
     counts = carries["sample"]
     if task.outputs is not None:
         for i, count in enumerate(counts.tolist()):
@@ -230,13 +256,9 @@ def _integrate(
     for i in np.flatnonzero(counts < n).tolist():
         for part in samples:
             part[i, counts[i] :] = np.nan
-    ends[:, 0], ends[:, 1], ends[:, 2], ends[:, 3] = (
-        status,
-        counts,
-        carries["begin"] + carries["elapsed"],
-        carries["lost"],
-    )
-    ends[:, 4:] = state.x
+    ended = carries["begin"] + carries["elapsed"]
+    ends[:, :5] = np.column_stack([status, counts, ended, carries["lost"], steps])
+    ends[:, 5:] = state.x
     return not todo.any()
 
 

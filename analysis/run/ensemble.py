@@ -60,7 +60,7 @@ class Ensemble:
         solver.status of each run: 2 where an input was not usable, 3 where the links could not be joined, at the start or
         later; -1 of a run that was interrupted or not begun.
     messages : tuple of str
-        Why a run ended early or did not start; empty if it reached its end.
+        Why a run ended early or did not start; of a run to its end, that it is stiff, or nothing.
     counts : ndarray of int, shape (m,)
         Samples that each run reached; 0 of one that did not start.
     parameters : tuple

@@ -28,11 +28,12 @@ from analysis import (
     ramp,
     sample_times,
     simulate,
+    simulate_many,
     steps,
     table,
 )
 from analysis.mechanisms import FIVE_BAR
-from analysis.run import Event, compiled, prepared
+from analysis.run import Event, batches, compiled, prepared
 from analysis.run.inputs import encode
 from analysis.run.sampling import sample
 from analysis.run.simulation import SCIPY_METHODS
@@ -517,6 +518,22 @@ def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: 
     assert other.message == ""
     assert other.statistics["evaluations"] < 1_000
     assert other["slider.position"][-1] == pytest.approx(whole["slider.position"][-1], rel=1e-5)
+
+
+def test_stiff_runs_of_an_ensemble_say_so_and_end_as_if_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "PATIENCE", 100_000)
+    monkeypatch.setattr(batches, "PATIENCE", 100_000)
+    for stop_time, status in ((4e-5, 0), (1e-3, 4)):
+        given: dict[str, Any] = {"stop_time": stop_time, "step": 1e-6, "max_steps": 3_000_000}
+        many = simulate_many([TABLE_3_1, LIGHT], Inputs(speed=SPEED), **given)
+        assert many.status.tolist() == [0, status]
+        assert (many.messages[0], "stiff" in many.messages[1], "'Radau'" in many.messages[1]) == ("", True, True)
+        # where it is looked at, in the middle of a batch, differs by some steps
+        alone = simulate(LIGHT, Inputs(speed=SPEED), **given)
+        assert many.status[1] == alone.status
+        assert ("2.7e+06 steps would be needed" in many.messages[1]) == bool(status)
+        assert ("2.7e+06 steps would be needed" in alone.message) == bool(status)
+        assert many.counts[1] < 100 < many.counts[0] or not status
 
 
 @pytest.mark.parametrize("method", ["compiled", "RK45"])
