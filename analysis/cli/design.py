@@ -219,7 +219,6 @@ def synthesize(
         TradeOffInterrupted,
         alternatives,
         assess,
-        format_poor,
         has_cognates,
         load_synthesis_case,
         solution_columns,
@@ -251,8 +250,8 @@ def synthesize(
     written += write_linkages(result.solutions, folder, chosen.title, make=chosen.make)
     written += plotted(plots, result, folder / "alternatives.png", title=chosen.title)
     print_written(written)
-    if poor := format_poor(result.best):
-        print_error(f"note: {poor}")
+    if best.poor:
+        print_error(f"note: {best.poor}")
     if not result.best.verdicts.sound:
         print_error(f"note: none of them is free of defects: the first has {result.best.verdicts}")
     leave_if_stopped(stopped, "the best so far is kept")

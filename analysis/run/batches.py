@@ -26,11 +26,11 @@ from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
-from .cautions import MANY_STEPS, PATIENCE, SHARE, fastest_decay, stiffness
+from .cautions import MANY_STEPS, too_slow
 from .equations import like_parameters, modules_of
 from .inputs import Encoded, Inputs, align, compiled_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, problem_of, verdict
-from .sampling import of_functions, sample
+from .sampling import of_functions
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -40,8 +40,8 @@ _STATUS = {AssemblyError: 3, InputError: 2}
 _NO_START = -2
 #: The same of a run that was interrupted.
 _PAUSED = -3
-#: The same of a stiff run that would need more than `cautions.SHARE` of the most steps.
-_HOPELESS = -4
+#: The same of a stiff run that was given up, see `cautions.too_slow`.
+_GIVEN_UP = -4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +79,7 @@ class Task:
         """Return the shapes of the result arrays: see `_integrate`."""
         m, n, size = len(self.parameters), len(self.settings.times), self.mechanism.size
         samples = (size, len(self.mechanism.channels)) if self.outputs is None else (len(self.outputs),)
-        return [(m, 5 + size), *((m, n, numbers) for numbers in samples)]
+        return [(m, 5 + size + len(self.mechanism.channels)), *((m, n, numbers) for numbers in samples)]
 
     def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Split a flat array into views of these shapes."""
@@ -170,9 +170,9 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
     """Return the solver.status and solver.message of each run."""
     from . import records as k
 
-    status, messages = [k.FINISHED] * len(ends), [""] * len(ends)
+    status, messages, size = [k.FINISHED] * len(ends), [""] * len(ends), task.mechanism.size
     for i in np.flatnonzero((ends[:, 0] != k.FINISHED) | (ends[:, 4] >= MANY_STEPS)).tolist():
-        (code, samples, lost), t, x = ends[i, [0, 1, 3]].astype(int).tolist(), float(ends[i, 2]), ends[i, 5:]
+        (code, samples, lost), t, x = ends[i, [0, 1, 3]].astype(int).tolist(), float(ends[i, 2]), ends[i, 5 : 5 + size]
         if i in prepared.failures:
             error = prepared.failures[i]
             status[i] = next(code for kind, code in _STATUS.items() if isinstance(error, kind))
@@ -184,23 +184,13 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
         else:
             switched = task.mechanism.switched(prepared.batch.p[i])
             limit = task.run(i).limit if switched else None
-            status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit)
-            steps, passed, span = float(ends[i, 4]), t - task.settings.times[0], np.ptp(task.settings.times)
-            if code == k.RUNNING and steps < task.settings.max_steps:
-                message = f"stopped at t = {t:.9g} s, as about {steps * span / passed:.2g} steps would be needed"
-            messages[i] = "; ".join(filter(None, (message, _stiff(task, i, x, t, steps))))
+            steps, passed, needed = float(ends[i, 4]), t - float(task.settings.times[0]), 0.0
+            if code == _GIVEN_UP:
+                code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
+            status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
+            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
+            messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages
-
-
-def _stiff(task: Task, i: int, x: NDArray[np.float64], t: float, steps: float) -> str:
-    """Return the sentence on a run that is stiff; empty if it is not."""
-
-    def decay_rate() -> float:
-        run = task.run(i)
-        u = sample(run.encoded, t, x, run.encoded.source.laws)
-        return fastest_decay(task.mechanism, x, run.applied(u), run.p)
-
-    return stiffness(decay_rate, steps, t - float(task.settings.times[0]))
 
 
 def _integrate(
@@ -213,8 +203,8 @@ def _integrate(
     """Solve the runs and return whether all of them were finished.
 
     ``ends`` gets a row for each run: the compiled code's status, the number of samples, the time of the end (s), the number
-    of the channel that was not finite, the number of steps, the state at the end. ``samples`` get the samples, NaN after
-    the end of a run.
+    of the channel that was not finite, the number of steps, state and channels at the end. ``samples`` get the samples, NaN
+    after the end of a run.
     """
     from . import compiled
     from . import records as k
@@ -241,13 +231,10 @@ def _integrate(
         compiled.run(problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL)
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
         passed = carries["begin"] + carries["elapsed"] - settings.times[0]
-        for i in np.flatnonzero(
-            todo & (steps >= PATIENCE) & (steps * span >= SHARE * settings.max_steps * passed)
-        ).tolist():
-            if _stiff(task, i, state.x[i], settings.times[0] + passed[i], float(steps[i])):
-                status[i], todo[i] = _HOPELESS, False
+        for i in np.flatnonzero(todo & too_slow(steps, passed, span, settings.max_steps)).tolist():
+            if task.run(i).stiff(state.x[i], state.u[i], float(steps[i]), float(passed[i])):
+                status[i], todo[i] = _GIVEN_UP, False
     status[todo] = _PAUSED
-    status[status == _HOPELESS] = k.RUNNING
     counts = carries["sample"]
     if task.outputs is not None:
         for i, count in enumerate(counts.tolist()):
@@ -258,7 +245,7 @@ def _integrate(
             part[i, counts[i] :] = np.nan
     ended = carries["begin"] + carries["elapsed"]
     ends[:, :5] = np.column_stack([status, counts, ended, carries["lost"], steps])
-    ends[:, 5:] = state.x
+    ends[:, 5:] = np.column_stack([state.x, state.u])
     return not todo.any()
 
 

@@ -13,7 +13,7 @@ from linkwork.mechanism import Mechanism
 #: Steps from which on a run may be stiff: a usual one takes some 50 a turn.
 MANY_STEPS = 50_000
 #: Steps after which a stiff run ends if it needs more than this share of the most steps.
-PATIENCE, SHARE = 1_000_000, 0.1
+_PATIENCE, _SHARE = 1_000_000, 0.1
 #: Decay rate times step size from which on stability limits the step: explicit methods of this order bear some 5.
 _STABLE = 2.0
 #: Residual of the energy balance relative to tolerance and greatest energy, and at most to the greatest energy, beyond which it
@@ -42,6 +42,14 @@ def stiffness(decay_rate: Callable[[], float], steps: float, duration: float) ->
         f"{steps:.3g} steps of {duration / steps:.2g} s, since the run is stiff: a disturbance dies out within "
         f"{1.0 / decay:.2g} s (too small a mass or too great a damping?); the implicit method 'Radau' takes far fewer"
     )
+
+
+def too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:
+    """Return whether a run, if it is stiff, is to end after so many steps: it would need too many of the most for its span.
+
+    ``steps`` and ``passed``, the time that has passed (s), are of one run or arrays of several.
+    """
+    return (steps >= _PATIENCE) & (steps * span >= _SHARE * most * passed)
 
 
 def energy_balance(names: Sequence[str], values: NDArray[np.float64], tolerance: float) -> str:

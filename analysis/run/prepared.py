@@ -17,7 +17,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.workers import interruptible
 from .angles import WholeTurns
-from .cautions import PATIENCE, SHARE, energy_balance, fastest_decay, stiffness
+from .cautions import energy_balance, fastest_decay, stiffness, too_slow
 from .equations import OUTPUTS, chosen_outputs, machine
 from .events import Event, RunInterrupted, shown
 from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
@@ -120,6 +120,10 @@ class Run:
         idle = np.zeros(len(self.mechanism.channels))
         return self.mechanism.limit(x.tolist(), self.applied(idle), self.p)
 
+    def stiff(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
+        """Return the sentence on a run that is stiff, by its state and channels after a time (s); empty if it is not."""
+        return stiffness(lambda: fastest_decay(self.mechanism, x, self.applied(u), self.p), steps, passed)
+
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """Return the error for an input that is not finite, by the number of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
@@ -162,10 +166,10 @@ class Run:
         carry, x, u = state.carries[0], state.x[0], state.u[0]
         status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
-        stiff, expected, span = "", 0.0, times[-1] - times[0]
+        stiff, needed, span = "", 0.0, times[-1] - times[0]
         with interruptible() as interrupted, shown(progress, span) as show:
             try:
-                while status[0] == k.RUNNING and carry["steps"] < most and expected < SHARE * most and not interrupted:
+                while status[0] == k.RUNNING and carry["steps"] < most and not needed and not interrupted:
                     entered = clock.perf_counter()
                     compiled.run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
@@ -175,8 +179,8 @@ class Run:
                     carry["found"] = 0
                     passed, steps = float(carry["begin"] + carry["elapsed"] - times[0]), float(carry["steps"])
                     show(passed)
-                    stiff = stiffness(lambda: fastest_decay(self.mechanism, x, self.applied(u), self.p), steps, passed)
-                    expected = steps * span / passed if stiff and steps >= PATIENCE else 0.0
+                    stiff = self.stiff(x, u, steps, passed)
+                    needed = steps * span / passed if stiff and too_slow(steps, passed, span, most) else 0.0
                     if status[0] == k.RUNNING:
                         turns.take(x, u, source.laws, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
@@ -189,9 +193,7 @@ class Run:
         if carry["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
-        code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit)
-        if code and expected:
-            message = f"stopped at t = {t:.9g} s, as about {expected:.2g} steps would be needed"
+        code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
         values = turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
         message = "; ".join(filter(None, (message, stiff, balance)))
@@ -274,10 +276,11 @@ def verdict(
     t: float,
     x: NDArray[np.float64],
     limit: Callable[[NDArray[np.float64]], str] | None = None,
+    needed: float = 0.0,
 ) -> tuple[int, str]:
     """Return the solver.status and solver.message for a status of the compiled code.
 
-    ``limit`` says what a limit is; without it, it is that of assembly.
+    ``limit`` says what a limit is; without it, it is that of assembly. ``needed`` are the steps for which a run was given up.
     """
     from . import records as k
 
@@ -287,6 +290,8 @@ def verdict(
         return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.where(x.tolist())}"
     if status == k.NO_STEP:
         return 4, f"the step size fell below what {at} can resolve, {mechanism.where(x.tolist())}"
+    if status == k.RUNNING and needed:
+        return 4, f"stopped at {at}, as about {needed:.2g} steps would be needed"
     if status == k.RUNNING:
         return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.where(x.tolist())}"
     return 0, ""

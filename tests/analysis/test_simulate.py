@@ -33,7 +33,7 @@ from analysis import (
     table,
 )
 from analysis.mechanisms import FIVE_BAR
-from analysis.run import Event, batches, compiled, prepared
+from analysis.run import Event, cautions, compiled, prepared
 from analysis.run.inputs import encode
 from analysis.run.sampling import sample
 from analysis.run.simulation import SCIPY_METHODS
@@ -504,7 +504,7 @@ LIGHT = replace(
 
 
 def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solver, "PATIENCE", 100_000)
+    monkeypatch.setattr(cautions, "_PATIENCE", 100_000)
     whole, cut = (
         simulate(LIGHT, Inputs(speed=SPEED), stop_time=t, step=1e-6, max_steps=3_000_000) for t in (4e-5, 1e-3)
     )
@@ -521,8 +521,7 @@ def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: 
 
 
 def test_stiff_runs_of_an_ensemble_say_so_and_end_as_if_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solver, "PATIENCE", 100_000)
-    monkeypatch.setattr(batches, "PATIENCE", 100_000)
+    monkeypatch.setattr(cautions, "_PATIENCE", 100_000)
     for stop_time, status in ((4e-5, 0), (1e-3, 4)):
         given: dict[str, Any] = {"stop_time": stop_time, "step": 1e-6, "max_steps": 3_000_000}
         many = simulate_many([TABLE_3_1, LIGHT], Inputs(speed=SPEED), **given)

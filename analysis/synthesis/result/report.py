@@ -424,11 +424,14 @@ class Assessment:
         Headings, then a row for each dimension: name, value, error, and what that does to output and quality function.
     rounding : str
         The cost of rounding the dimensions, in a line.
+    poor : str
+        `format_poor` of the solution.
     """
 
     solution: Solution
     dimensions: list[tuple[str, str, str, str, str]]
     rounding: str
+    poor: str
 
     @property
     def report(self) -> str:
@@ -455,8 +458,8 @@ class Assessment:
             head += f"\n{straight}"
         if solution.variants:
             head += f"\nalso found: {format_variants(solution)}"
-        if poor := format_poor(solution):
-            head += f"\n{poor}"
+        if self.poor:
+            head += f"\n{self.poor}"
         return "\n\n".join([head, table(self.dimensions), self.rounding, table(_stations(solution))]) + "\n"
 
 
@@ -475,7 +478,9 @@ def assess(solution: Solution, violated: Callable[[Solution], str] | None = None
     if violated and not violated(solution):
         broken = violated(Solution.of(solution.task, rounding.linkage, solution.evaluation.rotation))
         words += f"; rounded so, it violates a constraint: {broken}" if broken else ""
-    return Assessment(solution=solution, dimensions=_dimension_rows(solution, step), rounding=words)
+    return Assessment(
+        solution=solution, dimensions=_dimension_rows(solution, step), rounding=words, poor=format_poor(solution)
+    )
 
 
 def report(solution: Solution) -> str:

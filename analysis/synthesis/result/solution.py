@@ -315,7 +315,7 @@ class Solution(Shown):
         task = self.task
         if not (isinstance(task, UntimedPath) and task.path.closed and task.measure == "area"):
             return False
-        return task.path.enclosed_area > 0.0 and bool(np.all(np.asarray(task.weights) == 1.0))
+        return bool(np.all(np.asarray(task.weights) == 1.0))
 
     @property
     def share(self) -> float:
