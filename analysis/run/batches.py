@@ -188,7 +188,7 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
             if code == _GIVEN_UP:
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
-            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
+            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed)
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages
 

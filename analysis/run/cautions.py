@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,15 @@ MANY_STEPS = 50_000
 _PATIENCE, _SHARE = 1_000_000, 0.1
 #: Decay rate times step size from which on stability limits the step: explicit methods of this order bear some 5.
 _STABLE = 2.0
+#: Radians of the fastest vibration in a step from which on the step follows it: at the usual tolerance it takes about one.
+_FOLLOWED = 0.3
 #: Residual of the energy balance relative to tolerance and greatest energy, and at most to the greatest energy, beyond which it
 #: is reported: a usual run has 2, one of 2000 turns 12.
 _RESIDUAL, _MOST = 1e4, 0.05
 
 
-def fastest_decay(mechanism: Mechanism, x: NDArray[np.float64], held: Any, p: Any) -> float:
-    """Return the greatest rate at which a small disturbance of a state dies out (1/s), by differences of the rates."""
+def disturbance_rates(mechanism: Mechanism, x: NDArray[np.float64], held: Any, p: Any) -> NDArray[np.complex128]:
+    """Return the eigenvalues of small disturbances of a state (1/s), by differences of the rates."""
     rates, columns = mechanism.equations.derivative, []
     for i, size in enumerate(np.maximum(np.abs(x), 1e-3) * 1e-6):
         ends = []
@@ -31,17 +34,27 @@ def fastest_decay(mechanism: Mechanism, x: NDArray[np.float64], held: Any, p: An
             beside[i] += sign * size
             ends.append(np.array(rates(tuple(beside.tolist()), held, p)))
         columns.append((ends[0] - ends[1]) / (2.0 * size))
-    return float(-np.linalg.eigvals(np.column_stack(columns)).real.min())
+    return np.linalg.eigvals(np.column_stack(columns)).astype(complex)
 
 
-def stiffness(decay_rate: Callable[[], float], steps: float, duration: float) -> str:
-    """Return a sentence on a run that takes its many steps only because disturbances die out fast; empty if it does not."""
-    if steps < MANY_STEPS or (decay := decay_rate()) * duration < _STABLE * steps:
-        return ""
-    return (
-        f"{steps:.3g} steps of {duration / steps:.2g} s, since the run is stiff: a disturbance dies out within "
-        f"{1.0 / decay:.2g} s (too small a mass or too great a damping?); the implicit method 'Radau' takes far fewer"
-    )
+def stiffness(rates: NDArray[np.complex128], steps: float, duration: float, usual: float) -> str:
+    """Return a sentence on a run of many steps because disturbances die out fast or vibrate fast; empty if it is not one.
+
+    A vibration is fast beyond the ``usual`` angular frequency (rad/s), which samples or drive explain.
+    """
+    step = duration / steps
+    decay, vibration = float(-rates.real.min()), float(np.abs(rates.imag).max())
+    if decay * step >= _STABLE:
+        return (
+            f"{steps:.3g} steps of {step:.2g} s, since the run is stiff: a disturbance dies out within "
+            f"{1.0 / decay:.2g} s (too small a mass or too great a damping?); the implicit method 'Radau' takes far fewer"
+        )
+    if vibration * step >= _FOLLOWED and vibration > usual:
+        return (
+            f"{steps:.3g} steps of {step:.2g} s, since they follow a vibration of {vibration / (2.0 * pi):.3g} Hz, too fast "
+            "for the samples to show it (too small a mass or too stiff a spring?); damping would end it"
+        )
+    return ""
 
 
 def too_slow(steps: Any, passed: Any, span: float, most: int) -> Any:

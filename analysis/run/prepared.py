@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.workers import interruptible
 from .angles import WholeTurns
-from .cautions import energy_balance, fastest_decay, stiffness, too_slow
+from .cautions import MANY_STEPS, disturbance_rates, energy_balance, stiffness, too_slow
 from .equations import OUTPUTS, chosen_outputs, machine
 from .events import Event, RunInterrupted, shown
 from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
@@ -30,6 +31,8 @@ STEPS_PER_CALL = 50_000
 EVENTS_PER_CALL = 1_000
 #: Energy (J) and inputs from which on energy and accelerations at the start are looked at.
 _GREAT = 1e100
+#: Harmonics of a drive that a usual motion shows.
+_HARMONICS = 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,8 +124,13 @@ class Run:
         return self.mechanism.limit(x.tolist(), self.applied(idle), self.p)
 
     def stiff(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
-        """Return the sentence on a run that is stiff, by its state and channels after a time (s); empty if it is not."""
-        return stiffness(lambda: fastest_decay(self.mechanism, x, self.applied(u), self.p), steps, passed)
+        """Return the sentence on a stiff or fast vibrating run, by state and channels after a time (s); or nothing."""
+        if steps < MANY_STEPS:
+            return ""
+        times, mechanism = self.settings.times, self.mechanism
+        turning = [abs(x[len(mechanism.freedoms) + i]) for i in mechanism.cyclic]
+        usual = max([pi * (len(times) - 1) / float(np.ptp(times)), *(_HARMONICS * speed for speed in turning)])
+        return stiffness(disturbance_rates(mechanism, x, self.applied(u), self.p), steps, passed, usual)
 
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """Return the error for an input that is not finite, by the number of its channel."""

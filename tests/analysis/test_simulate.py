@@ -520,6 +520,21 @@ def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: 
     assert other["slider.position"][-1] == pytest.approx(whole["slider.position"][-1], rel=1e-5)
 
 
+@pytest.mark.parametrize(("mass", "warned"), [(1e-7, True), (1e-3, False)])
+def test_steps_that_follow_a_fast_vibration_are_noted(mass: float, warned: bool) -> None:
+    weightless = dict.fromkeys((f"{link}_mass" for link in ("crank", "coupler", "rocker", "slider")), mass)
+    inertias = dict.fromkeys((f"{link}_inertia" for link in ("crank", "coupler", "rocker")), 1e-3 * mass)
+    parameters = replace(TABLE_3_1, slider_damping=0.0, **weightless, **inertias)
+    run = simulate(parameters, Inputs(speed=SPEED), stop_time=2.0 if warned else 200.0, step=0.01)
+    assert run.status == 0
+    assert run.statistics["steps"] > cautions.MANY_STEPS
+    assert ("follow a vibration of" in run.message) == warned
+    if warned:
+        # the block and half of each link beside it on the spring
+        frequency = float(run.message.split("vibration of ")[1].split()[0])
+        assert 0.5 < frequency / (np.sqrt(TABLE_3_1.slider_stiffness / mass) / (2.0 * np.pi)) < 1.0
+
+
 def test_stiff_runs_of_an_ensemble_say_so_and_end_as_if_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cautions, "_PATIENCE", 100_000)
     for stop_time, status in ((4e-5, 0), (1e-3, 4)):

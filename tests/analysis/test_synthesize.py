@@ -411,6 +411,15 @@ class TestPrecisionPoints:
         np.testing.assert_allclose(solution.linkage.path(rotation), points, atol=1e-7)
         assert np.all(np.diff(rotation) > 0.0) or np.all(np.diff(rotation) < 0.0)
 
+    @pytest.mark.slow
+    @pytest.mark.parametrize(("seed", "span"), [(1, 2.0), (2, 3.5), (3, 3.5), (4, 5.5), (5, 5.5), (6, 5.5)])
+    def test_nine_points_of_a_hidden_crank_rocker(self, seed: int, span: float) -> None:
+        random = np.random.default_rng([9, seed])
+        points = drawn(random, least=0.75).path(np.sort(random.uniform(0.0, span, 9)))
+        found = syn.synthesize(syn.PrecisionPoints(points=points)).best
+        assert found.verdicts.sound
+        assert found.evaluation.worst < 5e-6 * np.hypot(*np.ptp(points, axis=0))
+
     def test_five_timed_points(self) -> None:
         rotation = np.array([0.0, 1.0, 2.2, 3.0, 4.5])
         points = known(6).path(rotation)
@@ -441,6 +450,22 @@ class TestPrecisionPoints:
         linkage = known(8)
         task = syn.Motion(points=linkage.path(phi), angle=linkage.coupler_angle(phi) + 0.3, rotation=phi)
         assert self.met(task, starts=12).error < 1e-12
+
+
+@pytest.mark.slow
+def test_an_aerofoil_is_drawn_as_well_from_any_seed() -> None:
+    """NACA 4415, by the formulas of NACA report 460."""
+    x = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 60)))
+    half = 0.75 * (0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4)
+    fore = x < 0.4
+    camber = np.where(fore, 0.25 * (0.8 * x - x * x), (0.2 + 0.8 * x - x * x) / 9.0)
+    slope = np.arctan(np.where(fore, 0.5, 2.0 / 9.0) * (0.4 - x))
+    middle, off = np.column_stack([x, camber]), half[:, None] * np.column_stack([-np.sin(slope), np.cos(slope)])
+    path = syn.TargetPath(points=np.vstack([(middle + off)[::-1], (middle - off)[1:-1]]), closed=True)
+    task = syn.UntimedPath(path=path)
+    errors = [syn.synthesize(task, search=syn.Search(seed=seed)).best.error for seed in range(4)]
+    assert max(errors) < 1.02 * min(errors)
+    assert max(errors) < 0.00115
 
 
 class TestStraight:

@@ -271,7 +271,10 @@ class Polisher:
     def fit(self, start: Start) -> Answer:
         """Fit the squared errors from a start; where points are met exactly, maximise the transmission angle."""
         fitted = self.by_least_squares
-        answer = fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start)
+        return self.best_exact(fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start))
+
+    def best_exact(self, answer: Answer) -> Answer:
+        """Return the linkage with the greatest transmission angle beside an answer that meets its points exactly."""
         if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
             met = self.program("transmission").solve(answer.start)
             if met.feasible:
@@ -306,13 +309,15 @@ class Polisher:
 
     def finish(self, answer: Answer) -> Answer:
         """Go on where a search was cut off on a flat slope: else what is found there would depend on the last digits."""
-        program = None if self.by_least_squares or self.normal.exact else self.program("squares")
-        if program is None:
+        if self.by_least_squares:
             return answer
+        program = self.program("squares")
         if not answer.converged and self.pivot is None:
             longer = program.solve(answer.start, iterations=LONG)
             if longer.feasible and longer.start.quality < answer.start.quality:
-                answer = longer
+                answer = self.best_exact(longer)
+        if self.normal.exact:
+            return answer
         last = self.program("squares", exact=True)
         return last.exact(answer, lambda start, places: last.solve(start, places=places))
 

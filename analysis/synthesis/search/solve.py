@@ -36,7 +36,7 @@ from ..task.constraint import (
 )
 from ..task.limits import GEARS, Limits, as_asked, limits_by_kind, make_limits, usual_kinds
 from ..task.task import Normal, Task, UntimedPath, normal_form, reweighted
-from .polish import Polished, distinct, infeasible, polish
+from .polish import EXACT, Polished, distinct, infeasible, kept_answers, polish
 from .scan import scan
 from .start import (
     QUICK_SEARCH,
@@ -51,6 +51,8 @@ from .start import (
 
 #: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
 STATIONS = 144
+#: Untimed points that a four-bar can meet exactly, and how many times the starts they are searched from until they are met.
+MOST_EXACT, AGAIN = 9, 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -254,11 +256,15 @@ def _searched(
     """
     begin = [start_of(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
-    scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
+    again = AGAIN if normal.exact and not normal.timed and normal.n <= MOST_EXACT else 1
+    scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=again * search.starts)
     if pivot is not None and limits.second is None:
         scanned = [replace(s, pivot=random_pivot(pivot, s.q[2], normal.unit, random)) for s in scanned]
-    begin += scanned
-    done = polish(normal, limits, begin, pivot=pivot, search=search)
+    done = polish(normal, limits, [*begin, *scanned[: search.starts]], pivot=pivot, search=search)
+    rest, met = scanned[search.starts :], bool(done.kept) and done.kept[0].start.quality < EXACT
+    if rest and not met and not done.interrupted:
+        more = polish(normal, limits, rest, pivot=pivot, search=search)
+        done = replace(done.joined(more), kept=tuple(kept_answers([*done.kept, *more.kept])))
     sound = limits.sound(normal)
     if done.interrupted or sound is None:
         return done
