@@ -295,7 +295,7 @@ def stability(
     \b
     Examples:
       linkwork stability --published table-3.1 --no-chart
-      linkwork stability --published rig-2-spring-c --x-range '200 rpm' '1500 rpm' --y-range 0 '6e3 dyn.s/cm'
+      linkwork stability --published rig-2-spring-c --x-range '200 rpm' '1500 rpm' --y-range '1e3 dyn.s/cm' '6e3 dyn.s/cm'
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
     from .. import figures

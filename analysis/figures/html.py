@@ -24,6 +24,8 @@ from .style import COLOURS, LINE, MARKED, SHADE, SHADES
 
 #: Pixels to the inch, height of the title, margins left and right of a panel, width of the legend, and gap below a panel.
 _PIXELS, _TITLE, _LEFT, _RIGHT, _LEGEND, _GAP = 105, 50, 85, 85, 300, 55
+#: Height of a label above its point, and of a line of text (pixels); share of the axis within which labels are stacked.
+_ABOVE, _LINE_HEIGHT, _CLOSE = 35, 15, 0.08
 #: Samples of a scale of colours.
 _COLOURS = 65
 #: Plotly's names of Matplotlib's lines and markers.
@@ -204,7 +206,12 @@ def _(panel: Panel, axes: _Axes) -> None:
         look = {"fill": "toself", "fillcolor": SHADE, "opacity": 0.22, "mode": "none", "hoverinfo": "skip"}
         axes.trace(type="scatter", x=_values(ring[:, 0]), y=_values(ring[:, 1]), showlegend=False, **look)
     for number, curve in enumerate(panel.curves):
-        axes.trace(**_trace(curve, _hex(curve.colour or COLOURS[number % len(COLOURS)]), panel), **legend)
+        trace = _trace(curve, _hex(curve.colour or COLOURS[number % len(COLOURS)]), panel)
+        if trace["mode"] == "text" and trace["showlegend"]:
+            # Plotly's own key of a text is "Aa": a line takes its place
+            axes.trace(**trace | {"x": [None], "y": [None], "mode": "lines"}, **legend)
+            trace["showlegend"] = False
+        axes.trace(**trace, **legend)
     for name, number, those in shades_by_label(panel):
         for n, shade in enumerate(those):
             look = {
@@ -225,8 +232,13 @@ def _(panel: Panel, axes: _Axes) -> None:
     for arrow in panel.arrows:
         x, begin, end = at("x", arrow.x), at("y", arrow.begin), at("y", arrow.end)
         axes.note(x, end, ax=x, ay=begin, ayref="y", arrowhead=2, arrowwidth=1.5)
+    along = [float(x) for curve in panel.curves for x in np.ravel(curve.x) if isfinite(x)]
+    close = _CLOSE * (max(along) - min(along)) if along else 0.0
     for label in panel.labels:
-        axes.note(at("x", label.x), at("y", label.y), label.text, ax=45, ay=-35, arrowhead=0, arrowwidth=1)
+        # the higher of two near ones has its text above the other's
+        level = sum(bool(abs(other.x - label.x) < close and other.y < label.y) for other in panel.labels)
+        text_at = {"ax": 45, "ay": -_ABOVE - _LINE_HEIGHT * level}
+        axes.note(at("x", label.x), at("y", label.y), label.text, **text_at, arrowhead=0, arrowwidth=1)
     for text, place in (panel.verticals or {}).items():
         axes.over(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
     for place in panel.dashed:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from fractions import Fraction
-from math import isfinite, pi
+from math import isfinite, lcm, pi
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -17,7 +17,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.fourier import trigonometric
-from ..run import Inputs, driven, given, simulate, started, takes_published
+from ..run import Inputs, driven, given, simulate, speed_ratio, started, takes_published
 from ..units import Amount, in_si
 from .model import (
     FloatArray,
@@ -33,8 +33,6 @@ from .model import (
 
 #: Least samples of a period that carry its harmonics.
 LEAST_SAMPLES = 16
-#: Turns of a crank at most in the common period with another.
-MOST_TURNS = 64
 #: Newton steps at most from an angle to the time at which it is reached.
 MOST_ITERATIONS = 60
 
@@ -343,17 +341,14 @@ def settled_motion(
     channel, speed = speeds[crank]
     if not speed:
         raise InputError(f"{channel.argument} is {speed}: it must be a finite number that is not zero")
-    turn = mechanism.freedoms[crank].period / abs(speed)
-    # all cranks have made whole turns after the common period
+    whole, period = [1], mechanism.freedoms[crank].period
     for k in its.commanded:
-        other, period = speeds[k][1], mechanism.freedoms[k].period
-        if period and other:
-            ratio = Fraction(abs(other) * turn / period).limit_denominator(MOST_TURNS)
-            if abs(ratio * period - abs(other) * turn) > 1e-9 * abs(other) * turn:
-                raise InputError(
-                    f"{speeds[k][0].argument} is {other}, {channel.argument} {speed}: their ratio must be one of whole numbers"
-                )
-            turn *= ratio.denominator
+        (other, value), own = speeds[k], mechanism.freedoms[k].period
+        if own and value:
+            ratio = speed_ratio(other.argument, value, channel.argument, speed)
+            whole.append((ratio * Fraction(period / own).limit_denominator()).denominator)
+    # all cranks have made whole turns after the common period
+    turn = lcm(*whole) * period / abs(speed)
     last = turn * (turns - 2 + np.arange(2 * samples + 1) / samples)
     run = simulate(
         parameters,

@@ -58,6 +58,7 @@ from .inputs import Inputs as Inputs
 from .inputs import align as align
 from .inputs import encode as encode
 from .inputs import given as given
+from .inputs import speed_ratio as speed_ratio
 from .masses import Mass as Mass
 from .masses import in_sentences as in_sentences
 from .masses import mass_origins as mass_origins

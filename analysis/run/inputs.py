@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import lru_cache
 from itertools import chain
 from typing import Any
@@ -25,6 +26,8 @@ from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, Sta
 
 #: Types that count as numbers.
 NUMBER = (int, float, np.floating, np.integer)
+#: Turns, at most, that one crank makes while another makes whole turns: beyond that they have no common period to speak of.
+MOST_TURNS = 100
 _SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
 
@@ -224,6 +227,17 @@ def _argument_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the inputs of a mechanism and of the flags that choose its modes."""
     modes = [name for mode in mechanism.modes for name in mode.arguments]
     return tuple(dict.fromkeys([*(c.argument for c in mechanism.channels if c.kind != "rate"), *modes]))
+
+
+def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
+    """Return the ratio of two speeds (rad/s) as a fraction of whole numbers; raise InputError if it is none."""
+    ratio = Fraction(value / speed).limit_denominator(MOST_TURNS)
+    if abs(ratio * speed - value) > 1e-9 * abs(value) or (value != 0.0 and ratio == 0):
+        raise InputError(
+            f"{reference} = {speed:.9g} rad/s and {name} = {value:.9g} rad/s have no common period: their ratio is "
+            f"{value / speed:.9g}, and must be a fraction of whole numbers up to {MOST_TURNS}"
+        )
+    return ratio
 
 
 def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:

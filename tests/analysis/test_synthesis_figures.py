@@ -11,14 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
-from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry import LineString, MultiPoint, Point, Polygon
 
 import analysis.synthesis as syn
 from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
+from analysis.files.drawings import Polyline
 from analysis.numerics.fourier import FourierSeries
-from analysis.synthesis.result.drawing import LAYERS
+from analysis.synthesis.result.drawing import LAYERS, rounded_hull
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 
@@ -322,6 +323,15 @@ def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
         for hole in inside:
             assert plate.exterior.distance(hole) == pytest.approx(0.01, rel=2e-3) or len(inside) == 3
             assert plate.exterior.distance(hole) > 0.0099
+
+
+@pytest.mark.parametrize("corner", [0.1 + 0.08j, 0.1 - 0.08j, 0.3 + 0.0j, 0.1 + 0.0j])
+def test_a_plate_is_the_hull_of_its_pins_widened(corner: complex) -> None:
+    pins = np.array([0.0j, 0.2 + 0.0j, corner])
+    points, bulges = rounded_hull(pins, 0.01)
+    plate = Polygon(flattened(Polyline(layer="plate", points=points, bulges=bulges, closed=True)))
+    hull = MultiPoint([(z.real, z.imag) for z in pins]).convex_hull.buffer(0.01, quad_segs=64)
+    assert plate.symmetric_difference(hull).area < 1e-3 * hull.area
 
 
 def flattened(outline) -> np.ndarray:

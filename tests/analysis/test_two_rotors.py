@@ -109,6 +109,8 @@ def test_linear_models_along_a_motion_go_through_the_common_period_of_both_crank
     wanted = _cart((speed, 30.0), (0.0, 0.0), np.arange(64) * period / 64)
     place = [f.coordinate for f in MECHANISM.freedoms].index("cart.position")
     np.testing.assert_allclose(settled[:, place], wanted, atol=1e-6 * np.abs(wanted).max())
+    with pytest.raises(InputError, match="no common period"):
+        settled_motion(P, Inputs(left_speed=speed, right_speed=30.0001))
     for orbit in (
         orbit_of(P, _drive(speed, ratio)),
         orbit_of(P, Drive(speed=30.0, crank="right.speed", ratios={"left.angle": 1 / ratio})),

@@ -18,12 +18,9 @@ from linkwork.parameters import field_name
 
 from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ...run import InductionMotor, Inputs, driven, given, started, takes_published
+from ...run import InductionMotor, Inputs, driven, given, speed_ratio, started, takes_published
 from ...units import Amount, in_si
 from .flow import Crank, Flow, crank_of, flow
-
-#: Turns, at most, that one crank makes while another makes whole turns: beyond that they have no common period to speak of.
-MOST_TURNS = 100
 
 #: A torque on the crank: constant, a motor's, or both.
 Torque = float | InductionMotor | Sequence[float | InductionMotor]
@@ -37,17 +34,6 @@ class VaryingInputError(InputError):
         super().__init__(
             f"{channel} is a {type(value).__name__}: what acts on a periodic motion must be constant, or an induction motor"
         )
-
-
-def _ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
-    """Return the ratio of two speeds as a fraction of whole numbers; raise InputError if it is none."""
-    ratio = Fraction(value / speed).limit_denominator(MOST_TURNS)
-    if abs(ratio * speed - value) > 1e-9 * abs(value) or (value != 0.0 and ratio == 0):
-        raise InputError(
-            f"{reference} = {speed:.9g} rad/s and {name} = {value:.9g} rad/s have no common period: their ratio is "
-            f"{value / speed:.9g}, and must be a fraction of whole numbers up to {MOST_TURNS}"
-        )
-    return ratio
 
 
 @in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units, speeds=variable_units)
@@ -114,12 +100,13 @@ class Drive:
             first = next((name for name, value in known.items() if value > 0.0), None)
             if first is None or len(known) < len(speeds):
                 raise InputError(f"speeds are {dict(speeds)} rad/s: they must be finite, and one of them above zero")
-            ratios = {name: _ratio(name, v, first, speeds[first]) for name, v in speeds.items() if name != first}
+            ratios = {name: speed_ratio(name, v, first, speeds[first]) for name, v in speeds.items() if name != first}
             for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
                 object.__setattr__(self, name, value)
         if self.ratios:
             ratios = {
-                n: r if isinstance(r, Fraction) else _ratio(n, float(r), "crank", 1.0) for n, r in self.ratios.items()
+                n: r if isinstance(r, Fraction) else speed_ratio(n, float(r), "crank", 1.0)
+                for n, r in self.ratios.items()
             }
             object.__setattr__(self, "ratios", ratios)
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
@@ -420,7 +407,9 @@ def _turning(
     for n in mechanism.cyclic:
         if n != first and n in speeds:
             ratios[n] = (
-                _ratio(commanded[n].name, speeds[n], commanded[first].name, speed) if first in speeds else Fraction(0)
+                speed_ratio(commanded[n].name, speeds[n], commanded[first].name, speed)
+                if first in speeds
+                else Fraction(0)
             )
         elif n != first and speed != 0.0:
             ratios[n] = Fraction(round(start[n] / speed))
