@@ -28,12 +28,15 @@ from analysis.export import (
     NATIVE,
     NATIVE_FMI3,
     PLATFORMS,
+    WASM,
     build,
     build_native,
     compile_library,
     source_files,
     this_platform,
 )
+from analysis.run import given
+from analysis.run.fmu import FmuRun
 from linkwork.five_bar import MECHANISM
 from linkwork.plant import Plant
 from tests.fmu.c_host import compile_host, run_host, unpack
@@ -155,6 +158,26 @@ def compiled_step() -> float:
     return (time.perf_counter() - begun) / STEPS
 
 
+def as_component(native: Path, component: Path) -> list[tuple[float, float]]:
+    """Compare a communication step of a WebAssembly component with the native library's: its length, and their ratio."""
+    entry = MECHANISM.published["table-3.1"]
+    inputs, initial = given(MECHANISM, Inputs(speed=entry.crank_speed), entry.initial)
+    values = dict.fromkeys(MECHANISM.input_names, 0.0) | {"drive.speed": entry.crank_speed}
+
+    def step(fmu: Path, length: float) -> float:
+        modes = inputs.modes(MECHANISM)
+        with FmuRun(fmu, entry.parameters, initial, modes=modes, tolerance=1e-9, start_time=0.0, inputs=values) as run:
+            begun = time.perf_counter()
+            for k in range(20):
+                assert run.step(k * length, length)[0] == 0
+            return time.perf_counter() - begun
+
+    return [
+        (length, best(lambda length=length: step(component, length)) / best(lambda length=length: step(native, length)))
+        for length in (1.0, 0.1, STEP)
+    ]
+
+
 def main() -> None:
     """Measure and print the table."""
     console = Console()
@@ -172,6 +195,8 @@ def main() -> None:
         host = compile_host(folder)
         seconds = {what: (by_host(host, fmu, folder), best(lambda f=fmu: by_fmpy(f))) for what, fmu in fmus.items()}
         counted, bare = right_hand_sides(folder)
+        web = folder / "web"
+        ratios = as_component(fmus["native FMU, FMI 3.0"], build_native(MECHANISM, NATIVE_FMI3, web, [WASM]))
 
     compiled_step()  # the first one loads what is compiled
     table = Table(title=f"Table 3.1 at 420 rpm, 1 ms steps, tolerance 1e-9; microseconds a step, best of {REPEATS}")
@@ -193,6 +218,8 @@ def main() -> None:
     ):
         verdict = "met" if met(ratio) else "missed"
         console.print(f"native FMU from C: {ratio:.2f} {what}; goal {goal}: {verdict}", highlight=False)
+    for length, ratio in ratios:
+        console.print(f"a step of {length:g} s of the WebAssembly component: {ratio:.1f} times the native one's")
 
 
 if __name__ == "__main__":

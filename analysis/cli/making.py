@@ -44,7 +44,7 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
     callback=_several,
     metavar="PLATFORM,...",
     help="What native FMUs are compiled for: all, or some of x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, "
-    "aarch64-darwin; by default this one.",
+    "aarch64-darwin, and wasm32-wasip2 for FMI 3.0; by default this one.",
 )
 @click.option(
     "--publish",

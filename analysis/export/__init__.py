@@ -5,7 +5,7 @@ from .builds import Built, build_all, kinds_here
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .interface import Entry, interface, with_starts
-from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
+from .native_fmu import PLATFORMS, WASM, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
 from .rebuild import Compared, rebuild
 from .web import build_web, crank_number
@@ -17,6 +17,7 @@ __all__ = [
     "PLATFORMS",
     "PYTHON",
     "SOURCES",
+    "WASM",
     "BuildError",
     "Built",
     "Compared",

@@ -12,7 +12,7 @@ from ..mechanisms import MECHANISMS
 from .archive import try_out
 from .compatibility import publish
 from .description import KINDS, PYTHON
-from .native_fmu import PLATFORMS, build_native, this_platform
+from .native_fmu import EVERYWHERE, PLATFORMS, WASM, build_native, this_platform
 from .python_fmu import build
 
 #: In place of names of platforms: all of them.
@@ -51,7 +51,8 @@ def build_all(
     kinds : sequence of str, optional
         Of `KINDS`; by default all that can be built here.
     platforms : sequence of str, optional
-        Of `PLATFORMS`, or ``all``: what native FMUs are compiled for; this one by default.
+        Of `PLATFORMS`, or ``all`` of them: what native FMUs are compiled for; this one by default. `WASM` is for those of FMI
+        3.0 alone; the others do without it.
     publish_to : path, optional
         Folder for what `publish` writes of each that runs here.
 
@@ -70,17 +71,22 @@ def build_all(
     for what, names, there in (
         ("model", models, known),
         ("kind of FMU", kinds, KINDS),
-        ("platform", platforms, (ALL, *PLATFORMS)),
+        ("platform", platforms, (ALL, *EVERYWHERE)),
     ):
         for name in names:
             if name not in there:
                 raise unknown_name(name, there, f"{what} {name!r}")
     chosen = [KINDS[name] for name in kinds or kinds_here()]
     here = this_platform() if any(kind is not PYTHON for kind in chosen) else ""
-    native = tuple(PLATFORMS) if ALL in platforms else tuple(platforms) or (here,)
+    every = [*PLATFORMS, *(name for name in platforms if name == WASM)]
+    asked = tuple(every) if ALL in platforms else tuple(platforms) or (here,)
     for name in models or known:
         for kind in chosen:
             python = kind is PYTHON
+            native = asked if kind.fmi == 3 else tuple(name for name in asked if name != WASM)
+            if not (native or python or kinds):
+                continue
+            native = native or asked
             made = build(known[name], dest) if python else build_native(known[name], kind, dest, native)
             if python or here in native:
                 try_out(made)

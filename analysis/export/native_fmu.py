@@ -26,6 +26,7 @@ from ..numerics.cache import alone, code_folder, hashes_below, keep_hashes, read
 from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import with_bill
+from .component import MANIFEST, MEMORY, component, manifest
 from .description import Kind, build_description, description
 from .equations_c import generated
 from .experiments import experiments
@@ -60,7 +61,17 @@ OPTIONS = (
     "-ffunction-sections", "-Wl,--gc-sections", "-s",
 )  # fmt: skip
 
+#: The same as one module for WebAssembly, that imports nothing but what it is told to.
+WASM_OPTIONS = (
+    *(option for option in OPTIONS if option not in ("-shared", "-fPIC", "-fvisibility=hidden")),
+    "-mexec-model=reactor", "-Wl,-z,stack-size=262144",
+)  # fmt: skip
+#: The platform of FMI-LS-WASM, for FMI 3.0 alone: one binary that runs wherever a WebAssembly runtime does.
+WASM = "wasm32-wasip2"
+EVERYWHERE = PLATFORMS | {WASM: Platform("wasm32-wasi", "wasm", "", WASM)}
+
 _SHELL = ("face.h", "model.h", "plant.h", "step.h", "plant.c", "instance.h", "instance.c", "saved.c")
+_COMPONENT = ("component.c",)
 _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
@@ -104,12 +115,12 @@ def build_native(
     dest : path
         Folder for the FMU; made if it is not there.
     platforms : sequence of str, optional
-        Names of `PLATFORMS`; that of this process by default.
+        Names of `PLATFORMS`, or `WASM`; that of this process by default.
 
     Raises
     ------
     BuildError
-        If Zig is not installed, a file does not compile, or the FMU is not valid.
+        If Zig is not installed, a file does not compile, the FMU is not valid, or FMI 2.0 is to be for `WASM`.
     InputError
         If there is no such platform.
     MechanismError
@@ -118,11 +129,13 @@ def build_native(
     check(mechanism)
     platforms = [this_platform()] if platforms is None else list(platforms)
     for name in platforms:
-        if name not in PLATFORMS:
-            raise unknown_name(name, PLATFORMS, f"platform {name!r}")
+        if name not in EVERYWHERE:
+            raise unknown_name(name, EVERYWHERE, f"platform {name!r}")
+    if kind.fmi == 2 and WASM in platforms:
+        raise BuildError(f"{kind.file_name(mechanism)} cannot be for {WASM}: FMI-LS-WASM is a layer of FMI 3.0")
     dest = Path(dest)
     dest.mkdir(parents=True, exist_ok=True)
-    sources = source_files(mechanism, kind)
+    sources = source_files(mechanism, kind, web=WASM in platforms)
     identifier = kind.identifier(mechanism)
     entries = {f"sources/{name}": text.encode() for name, text in sources.items()}
     entries |= compile_binaries(identifier, kind, sources, platforms)
@@ -130,6 +143,8 @@ def build_native(
     entries["sources/buildDescription.xml"] = build_description(identifier, COMPILED)
     if kind.fmi == 3:
         entries |= terminal_files(mechanism)
+    if WASM in platforms:
+        entries[MANIFEST] = manifest()
     made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
     variables = [entry.variable for entry in interface(mechanism)]
     icon = "model.png" if kind.fmi == 2 else "terminalsAndIcons/icon.png"
@@ -139,15 +154,19 @@ def build_native(
     return write(with_bill(target.stem, entries, native=True, fmi=kind.fmi), target)
 
 
-def source_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
+def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict[str, str]:
     """Return all C files of a native FMU by name: the shell, the headers of the standard, and the generated files.
+
+    With ``web`` also what makes a WebAssembly component of it.
 
     `COMPILED` includes all the others. The functions of the standard have the prefix FMI2_FUNCTION_PREFIX or
     FMI3_FUNCTION_PREFIX if it is defined; nothing else is visible outside.
     """
     shell = SOURCES / "native"
     headers = resources.files("fmpy") / "c-code"
-    files = {name: (shell / name).read_text(encoding="utf-8") for name in (f"fmi{kind.fmi}.c", *_SHELL)}
+    files = {
+        name: (shell / name).read_text(encoding="utf-8") for name in (f"fmi{kind.fmi}.c", *_SHELL, *_COMPONENT[:web])
+    }
     files |= {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[kind.fmi]}
     if kind.fmi == 2:
         files["fmi2Functions.h"] = _with_prefix(files["fmi2Functions.h"], (headers / "fmi3Functions.h").read_text())
@@ -173,13 +192,15 @@ def compile_binaries(
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         for number, name in enumerate(platforms):
-            platform = PLATFORMS[name]
+            platform = EVERYWHERE[name]
             place = platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3
             library = f"{identifier}.{platform.suffix}"
             with shown(False, float(len(platforms)), f"compiling for {name}") as show:
                 show(float(number))
-                compile_library(folder, COMPILED, library, platform.target, (*OPTIONS, *platform.options))
-            found.setdefault(f"binaries/{place}/{library}", []).append((Path(folder) / library).read_bytes())
+                options = (*WASM_OPTIONS, *MEMORY) if name == WASM else (*OPTIONS, *platform.options)
+                compile_library(folder, COMPILED, library, platform.target, options)
+            made = (Path(folder) / library).read_bytes()
+            found.setdefault(f"binaries/{place}/{library}", []).append(component(made) if name == WASM else made)
     return {place: parts[0] if len(parts) == 1 else _universal(parts) for place, parts in found.items()}
 
 

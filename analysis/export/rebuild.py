@@ -15,7 +15,7 @@ from ..files import check_fmu, first_line
 from .archive import BuildError
 from .bill import BILL
 from .description import NATIVE, NATIVE_FMI3
-from .native_fmu import PLATFORMS, compile_binaries
+from .native_fmu import EVERYWHERE, compile_binaries
 
 _FAT, _X86, _ARM = b"\xca\xfe\xba\xbe", b"\x07\x00\x00\x01", b"\x0c\x00\x00\x01"
 
@@ -83,7 +83,7 @@ def _compiled(files: dict[str, bytes], tools: dict[str, str]) -> Iterator[Compar
     for place in sorted(name for name in files if name.startswith("binaries/")):
         wanted = [
             name
-            for name, platform in PLATFORMS.items()
+            for name, platform in EVERYWHERE.items()
             if place.split("/")[1] == (platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3)
         ]
         head = files[place][:8]

@@ -18,18 +18,13 @@ from ..run import MOTOR, at_rest, expressions, kloss
 from .archive import SOURCES
 from .description import NATIVE
 from .equations_c import beginning, c_of, generated
-from .native_fmu import OPTIONS, compile_library
+from .native_fmu import EVERYWHERE, WASM, WASM_OPTIONS, compile_library
 
-TARGET = "wasm32-wasi"
 #: What a browser's module shares with a native FMU, and what it has of its own.
 _SHARED = ("model.h", "plant.h", "plant.c", "step.h")
 _OWN = Path(__file__).with_name("browser")
 #: The equations to which the page adds a motor's torque: the shell calls them by other names.
 _DRIVEN = ("derivative", "outputs", "clearance", "forward")
-_OPTIONS = (
-    *(option for option in OPTIONS if option not in ("-shared", "-fPIC", "-fvisibility=hidden")),
-    "-mexec-model=reactor", "-Wl,-z,stack-size=262144",
-)  # fmt: skip
 
 
 def build_web(mechanism: Mechanism) -> bytes:
@@ -48,7 +43,7 @@ def build_web(mechanism: Mechanism) -> bytes:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         files = [name for name in sources if name.endswith(".c")]
-        compile_library(folder, files, "module.wasm", TARGET, _OPTIONS)
+        compile_library(folder, files, "module.wasm", EVERYWHERE[WASM].target, WASM_OPTIONS)
         return (Path(folder) / "module.wasm").read_bytes()
 
 

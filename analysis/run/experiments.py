@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from linkwork.errors import LinkworkError
 
 from ..files import check_fmu, first_line
+from .component import FOLDER
 from .fmu import read_description, unpacking_folder
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
@@ -260,6 +261,11 @@ def verify(fmu: str | Path, *, allowed: float | None = None) -> Iterator[Outcome
     folder = tempfile.mkdtemp(dir=unpacking_folder())
     try:
         extract(str(fmu), folder)
+        if [place.name for place in Path(folder).glob("binaries/*")] == [FOLDER]:
+            raise ExperimentError(
+                f"{fmu} is a WebAssembly component alone, and FMPy, which runs the experiments, needs a library for this "
+                "platform: 'linkwork check --all --fmu' runs the component on all standard cases"
+            )
         for experiment in experiments:
             yield _run(experiment, description, folder, allowed)
     finally:

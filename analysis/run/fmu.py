@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-from fmpy import extract, read_model_description
+from fmpy import extract, platform, platform_tuple, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model, FMU3Slave
@@ -27,6 +27,7 @@ from linkwork.parameters import fmi_name
 
 from ..files import check_fmu
 from ..mechanisms import InitialState, Parameters, mechanism_of
+from .component import ComponentModel, ComponentSlave, component_of
 
 
 class CosimulationError(LinkworkError):
@@ -133,6 +134,7 @@ class _Instance:
     #: The attribute of FMPy's model description that has the interface; the class that runs it, by the version of FMI.
     described: ClassVar[str]
     _classes: ClassVar[Mapping[str, type]]
+    _component: ClassVar[type]
 
     def __init__(
         self,
@@ -168,7 +170,7 @@ class _Instance:
             self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
             extract(str(fmu), self._folder)
             with chdir("."):  # FMPy leaves the working folder changed where a library cannot be loaded
-                self._fmu = self._classes[self.description.fmiVersion[0]](
+                self._fmu = self._running(described.modelIdentifier)(
                     guid=self.description.guid,
                     unzipDirectory=self._folder,
                     modelIdentifier=described.modelIdentifier,
@@ -187,6 +189,14 @@ class _Instance:
         self._outputs = self._references(self.output_names)
         self._set_reals = getattr(self._fmu, f"set{self._real}")
         self._get_reals = getattr(self._fmu, f"get{self._real}")
+
+    def _running(self, identifier: str) -> type:
+        """Return the class that runs the FMU: a WebAssembly component where there is no library for this platform."""
+        assert self._folder is not None
+        native = Path(self._folder) / "binaries" / (platform_tuple if self._fmi3 else platform)
+        if native.is_dir() or not component_of(self._folder, identifier).is_file():
+            return self._classes[self.description.fmiVersion[0]]
+        return self._component
 
     @property
     def _fmi3(self) -> bool:
@@ -265,6 +275,7 @@ class FmuRun(_Instance):
     interface = "co-simulation"
     described = "coSimulation"
     _classes = MappingProxyType({"2": FMU2Slave, "3": FMU3Slave})
+    _component = ComponentSlave
 
     def step(self, time: float, step: float) -> tuple[int, str]:
         """Take one communication step; returns solver.status and solver.message, 0 and an empty string where it succeeds."""
@@ -296,6 +307,7 @@ class FmuModel(_Instance):
     interface = "model exchange"
     described = "modelExchange"
     _classes = MappingProxyType({"2": FMU2Model, "3": FMU3Model})
+    _component = ComponentModel
 
     def _initialise(self, values: Mapping[str, float], tolerance: float, start_time: float) -> None:
         super()._initialise(values, tolerance, start_time)

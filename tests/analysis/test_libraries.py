@@ -95,6 +95,7 @@ NEEDING = {
     "pandas": "from analysis import simulate; simulate('table-3.1', stop_time=0.01).to_dataframe()",
     "waitress": "import analysis.server",
     "anywidget": "import analysis.studio.widget",
+    "wasmtime": "from analysis.export.component import component; component(b'')",
     "distributed": "from analysis.libraries import require; require('dask', 'distributed')",
 }
 

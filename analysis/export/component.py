@@ -1,0 +1,353 @@
+"""A WebAssembly component around a native FMU, after the draft of FMI-LS-WASM.
+
+The draft is commit c1aac17 of modelica/fmi-ls-wasm of July 2026. One component has both interfaces, co-simulation and model
+exchange. Within it is the core module that Zig makes of the FMU's C, behind the frame that is written here: types, resources,
+and one lifted function for each method. `native/component.c` has the functions, with the methods' own names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from xml.etree.ElementTree import Element
+
+from ..libraries import require
+from .description import written
+
+#: The layered standard, and its manifest.
+STANDARD = "org.modelica.fmi-ls-wasm"
+MANIFEST = f"extra/{STANDARD}/manifest.xml"
+#: Pages of 64 KiB that the memory begins with; the frame has it, because what the FMU's module calls needs it too.
+PAGES = 16
+MEMORY = ("-Wl,--import-memory", f"-Wl,--initial-memory={PAGES << 16}")
+_PACKAGE, _VERSION = "fmi:fmi3", "3.0.0"
+
+#: The types that both interfaces share.
+_TYPES = {
+    "value-reference": "u32",
+    "status": "enum<ok,warning,discard,error,fatal>",
+    "fmu-state": "list<u8>",
+    "interval-qualifier": "enum<interval-not-yet-known,interval-unchanged,interval-changed>",
+    "interval-fraction": "record<counter:u64,resolution:u64>",
+    "dependency-kind": "enum<dependent,constant,fixed,tunable,discrete>",
+    "variable-dependency": (
+        "record<dependent-value-reference:value-reference,element-index-of-dependent:u32,"
+        "independent-value-reference:value-reference,element-index-of-independent:u32,kind:dependency-kind>"
+    ),
+    "discrete-states-info": (
+        "record<new-discrete-states-needed:bool,terminate-simulation:bool,nominals-of-continuous-states-changed:bool,"
+        "values-of-continuous-states-changed:bool,next-event-time-defined:bool,next-event-time:f64>"
+    ),
+}
+_VALUES = {
+    **{f"float{n}": f"f{n}" for n in (32, 64)},
+    **{f"int{n}": f"s{n}" for n in (8, 16, 32, 64)},
+    **{f"uint{n}": f"u{n}" for n in (8, 16, 32, 64)},
+    "boolean": "bool", "string": "string", "binary": "list<u8>", "clock": "bool",
+}  # fmt: skip
+_REFERENCES, _SEED = (
+    "value-references:list<value-reference>",
+    "unknowns:list<value-reference>,knowns:list<value-reference>,seed:list<f64>",
+)
+_FRACTION, _REQUESTS = "interval-fraction", "requests:list<tuple<value-reference,u32>>"
+#: By name the parameters after the instance, and the result.
+_COMMON = {
+    "set-debug-logging": ("logging-on:bool,categories:list<string>", "status"),
+    "enter-initialization-mode": ("tolerance:option<f64>,start-time:f64,stop-time:option<f64>", "status"),
+    **dict.fromkeys(("exit-initialization-mode", "enter-event-mode"), ("", "status")),
+    "update-discrete-states": ("", "result<discrete-states-info,status>"),
+    **dict.fromkeys(("terminate", "reset", "enter-configuration-mode", "exit-configuration-mode"), ("", "status")),
+    **{f"get-{name}": (_REFERENCES, f"result<list<{of}>,status>") for name, of in _VALUES.items()},
+    **{f"set-{name}": (f"{_REFERENCES},values:list<{of}>", "status") for name, of in _VALUES.items()},
+    "get-number-of-variable-dependencies": ("vr:value-reference", "result<u64,status>"),
+    "get-variable-dependencies": ("dependent:value-reference", "result<list<variable-dependency>,status>"),
+    "get-fmu-state": ("", "result<fmu-state,status>"),
+    "set-fmu-state": ("state:fmu-state", "status"),
+    "get-directional-derivative": (_SEED, "result<list<f64>,status>"),
+    "get-adjoint-derivative": (_SEED, "result<list<f64>,status>"),
+    "get-interval-decimal": (_REFERENCES, "result<list<tuple<f64,interval-qualifier>>,status>"),
+    "get-interval-fraction": (_REFERENCES, f"result<list<tuple<{_FRACTION},interval-qualifier>>,status>"),
+    "get-shift-decimal": (_REFERENCES, "result<list<f64>,status>"),
+    "get-shift-fraction": (_REFERENCES, f"result<list<{_FRACTION}>,status>"),
+    "set-interval-decimal": (f"{_REFERENCES},intervals:list<f64>", "status"),
+    "set-interval-fraction": (f"{_REFERENCES},intervals:list<{_FRACTION}>", "status"),
+    "set-shift-decimal": (f"{_REFERENCES},shifts:list<f64>", "status"),
+    "set-shift-fraction": (f"{_REFERENCES},shifts:list<{_FRACTION}>", "status"),
+    "evaluate-discrete-states": ("", "status"),
+    "get-output-derivatives": (_REQUESTS, "result<list<f64>,status>"),
+    "enter-step-mode": ("", "status"),
+}  # fmt: skip
+_NAMED = "instance-name:string,instantiation-token:string,resource-path:string,visible:bool,logging-on:bool"
+_LISTS = ("continuous-state-derivatives", "event-indicators", "continuous-states", "nominals-of-continuous-states")
+#: Of each interface its own type, the parameters of a new instance, and its own methods.
+_INTERFACES = {
+    "co-simulation": (
+        {
+            "do-step-result": "record<last-successful-time:f64,event-handling-needed:bool,terminate-simulation:bool,"
+            "early-return:bool>"
+        },
+        f"{_NAMED},event-mode-used:bool,early-return-allowed:bool,required-intermediate-variables:list<value-reference>",
+        {
+            "set-input-derivatives": (f"{_REQUESTS},values:list<f64>", "status"),
+            "do-step": (
+                "current-communication-point:f64,communication-step-size:f64,no-set-fmu-state-prior-to-current-point:bool",
+                "result<do-step-result,status>",
+            ),
+        },
+    ),
+    "model-exchange": (
+        {"completed-step-result": "record<enter-event-mode:bool,terminate-simulation:bool>"},
+        _NAMED,
+        {
+            "enter-continuous-time-mode": ("", "status"),
+            "set-time": ("time:f64", "status"),
+            "set-continuous-states": ("continuous-states:list<f64>", "status"),
+            **{f"get-{name}": ("", "result<list<f64>,status>") for name in _LISTS},
+            **{f"get-number-of-{name}": ("", "result<u64,status>") for name in ("event-indicators", "continuous-states")},
+            "completed-integrator-step": (
+                "no-set-fmu-state-prior-to-current-point:bool", "result<completed-step-result,status>"
+            ),
+        },
+    ),
+}  # fmt: skip
+_PRIMITIVE = {"bool", "string", "f32", "f64", *(f"{sign}{bits}" for sign in "su" for bits in (8, 16, 32, 64))}
+#: Parameters of the core functions that make an instance, each of which returns where it is described.
+_FLAT = {"co-simulation": 12, "model-exchange": 8}
+
+
+def component(module: bytes) -> bytes:
+    """Return the component around the core module of an FMU.
+
+    Raises
+    ------
+    MissingLibraryError
+        If wasmtime is not installed, which turns the frame's text into bytes.
+    """
+    frame = _frame()
+    # the second core module of the frame is an empty one: sections are a number, a length and a content
+    parts, place, number = [frame[:8]], 8, 0
+    while place < len(frame):
+        size, begin = _length(frame, place + 1)
+        section = frame[place : begin + size]
+        if frame[place] == 1:
+            number += 1
+            section = b"\x01" + _leb(len(module)) + module if number == 2 else section
+        parts.append(section)
+        place = begin + size
+    return b"".join(parts)
+
+
+def manifest() -> bytes:
+    """Return the manifest of the layered standard."""
+    names = {"name": STANDARD, "version": "0.1.0", "description": "FMI Layered Standard for WebAssembly"}
+    space = {"xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest"}
+    return written(Element("fmiLayeredStandardManifest", space | {f"fmi-ls:fmi-ls-{k}": v for k, v in names.items()}))
+
+
+def _length(data: bytes, place: int) -> tuple[int, int]:
+    """Read a number of seven bits a byte; return it, and the place behind it."""
+    value = shift = 0
+    while True:
+        byte = data[place]
+        place, value, shift = place + 1, value | (byte & 0x7F) << shift, shift + 7
+        if byte < 0x80:
+            return value, place
+
+
+def _leb(value: int) -> bytes:
+    parts = []
+    while value >= 0x80:
+        parts.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*parts, value])
+
+
+@lru_cache
+def _frame() -> bytes:
+    require("wasmtime")
+    from wasmtime import wat2wasm
+
+    return bytes(wat2wasm("\n".join(["(component", *_outside(), ")"])))
+
+
+def _split(text: str) -> list[str]:
+    """Split a list at the commas that are in no brackets."""
+    parts, depth, begin = [], 0, 0
+    for place, letter in enumerate(text):
+        depth += (letter == "<") - (letter == ">")
+        if letter == "," and not depth:
+            parts.append(text[begin:place])
+            begin = place + 1
+    return [*parts, text[begin:]] if text else []
+
+
+class _Types:
+    """Definitions of types in a scope of the text format, in which every compound type has a name of its own."""
+
+    def __init__(self, lines: list[str], known: dict[str, str] | None = None) -> None:
+        self.lines, self.known = lines, dict(known or {})
+
+    def of(self, text: str) -> str:
+        """Return what a type is called in this scope; define it first where it is not known."""
+        if text in _PRIMITIVE:
+            return text
+        if text not in self.known:
+            definition = self._defined(text)
+            self.known[text] = f"$t{len(self.lines)}"
+            self.lines.append(f"(type {self.known[text]} {definition})")
+        return self.known[text]
+
+    def named(self, text: str) -> str:
+        """Return the name of a type, of a primitive one too."""
+        if text in _PRIMITIVE:
+            self.lines.append(f"(type $t{len(self.lines)} {text})")
+            return f"$t{len(self.lines) - 1}"
+        return self.of(text)
+
+    def _defined(self, text: str) -> str:
+        found = re.fullmatch(r"([a-z]+)<(.*)>", text)
+        assert found, text
+        kind, parts = found[1], _split(found[2])
+        if kind == "enum":
+            return f"(enum {' '.join(map(_quoted, parts))})"
+        if kind == "record":
+            fields = (part.partition(":") for part in parts)
+            return f"(record {' '.join(f'(field {_quoted(name)} {self.of(of)})' for name, _, of in fields)})"
+        if kind == "result":
+            return f"(result {self.of(parts[0])} (error {self.of(parts[1])}))"
+        return f"({kind} {' '.join(map(self.of, parts))})"
+
+    def function(self, parameters: str, result: str) -> str:
+        """Return the parameters and the result of a function."""
+        pairs = [part.partition(":") for part in _split(parameters)]
+        given = " ".join(f"(param {_quoted(name)} {self.of(of)})" for name, _, of in pairs)
+        return f"{given} (result {self.of(result)})" if result else given
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"'
+
+
+def _interface(name: str) -> str:
+    return f'"{_PACKAGE}/{name}@{_VERSION}"'
+
+
+def _methods(interface: str) -> Iterator[tuple[str, str, str, str]]:
+    """Yield of each method of an interface the name of its function in C, its own, its parameters and its result."""
+    _, making, own = _INTERFACES[interface]
+    resource = f"{interface}-instance"
+    yield f"instantiate-{interface}", f"[static]{resource}.instantiate-{interface}", making, f"option<own<{resource}>>"
+    for name, (parameters, result) in (_COMMON | own).items():
+        given = ",".join(filter(None, (f"self:borrow<{resource}>", parameters)))
+        yield name, f"[method]{resource}.{name}", given, result
+
+
+def _outside() -> list[str]:
+    """Return the lines of the component: imports, core modules and their instances, lifted functions, exports."""
+    shared: list[str] = []
+    types = _Types(shared)
+    for name, of in _TYPES.items():
+        shared.append(f"(export {_quoted(name)} (type ${name} (eq {types.named(of)})))")
+        types.known[name] = f"${name}"
+    log = "instance-name:string,status:status,category:string,message:string"
+    lines = [
+        f"(type $shared (instance {' '.join(shared)}))",
+        f"(import {_interface('types')} (instance $types (type $shared)))",
+        *(f"(alias export $types {_quoted(name)} (type ${name}))" for name in _TYPES),
+        f"(type $heard (instance (alias outer 1 $status (type $s)) (export {_quoted('status')} (type $status (eq $s)))",
+        f" (export {_quoted('log-message')} (func {_Types([], {'status': '$status'}).function(log, '')}))))",
+        f"(import {_interface('callbacks')} (instance $callbacks (type $heard)))",
+        f'(core module $memory (memory (export "memory") {PAGES}))',
+        "(core module $fmu)",
+        "(core instance $memory (instantiate $memory))",
+        '(alias core export $memory "memory" (core memory $space))',
+        f"(alias export $callbacks {_quoted('log-message')} (func $log))",
+        "(core func $lowered (canon lower (func $log) (memory $space) string-encoding=utf8))",
+        f"(core instance $host (export {_quoted('log-message')} (func $lowered)))",
+        '(core instance $fmu (instantiate $fmu (with "env" (instance $memory)) (with "callbacks" (instance $host))))',
+        *(
+            f"(alias core export $fmu {_quoted(name)} (core func ${name}))"
+            for name in ("cabi_realloc", "forget", "drop")
+        ),
+    ]
+    known = _Types(lines, {name: f"${name}" for name in _TYPES})
+    for interface in _INTERFACES:
+        lines += _resource(interface)
+        known.known[f"{interface}-instance"] = f"${interface}-instance"
+    how = "(memory $space) (realloc $cabi_realloc) string-encoding=utf8 (post-return $forget)"
+    lines += [
+        '(alias core export $fmu "get-version" (core func $core-version))',
+        f"(func $version (result string) (canon lift (core func $core-version) {how}))",
+        '(component $common (import "version" (func $f (result string)))',
+        ' (export "get-version" (func $f) (func (result string))))',
+        '(instance $common (instantiate $common (with "version" (func $version))))',
+        f"(export {_interface('common')} (instance $common))",
+    ]
+    for interface, (own, _, _) in _INTERFACES.items():
+        for name, of in own.items():
+            known.known[name] = known.of(of)
+        given = []
+        for c_name, name, parameters, result in _methods(interface):
+            core, lifted = f"$core-{interface}-{c_name}", f"${interface}-{c_name}"
+            made = f"$make-{interface}" if name.startswith("[static]") else "$fmu"
+            signature = known.function(parameters, result)
+            lines += [
+                f"(alias core export {made} {_quoted(c_name)} (core func {core}))",
+                f"(func {lifted} {signature} (canon lift (core func {core}) {how}))",
+            ]
+            given.append(f"(with {_quoted(c_name)} (func {lifted}))")
+        given += [
+            f"(with {_quoted(f'type-{name}')} (type {known.of(name)}))"
+            for name in (*_TYPES, *own, f"{interface}-instance")
+        ]
+        lines += [
+            *_inside(interface),
+            f"(instance $of-{interface} (instantiate $shim-{interface} {' '.join(given)}))",
+            f"(export {_interface(interface)} (instance $of-{interface}))",
+        ]
+    return lines
+
+
+def _resource(interface: str) -> list[str]:
+    """Return the lines of an instance's type, and of the core module that makes a handle of what the FMU has made."""
+    resource, making = f"${interface}-instance", f"instantiate-{interface}"
+    numbers = " ".join(["i32"] * _FLAT[interface])
+    passed = " ".join(f"(local.get {n})" for n in range(_FLAT[interface]))
+    area = f"(local.get {_FLAT[interface]})"
+    return [
+        f"(type {resource} (resource (rep i32) (dtor (core func $drop))))",
+        f"(core func $new-{interface} (canon resource.new {resource}))",
+        f"(alias core export $fmu {_quoted(making)} (core func $raw-{interface}))",
+        f'(core instance $parts-{interface} (export "raw" (func $raw-{interface})) (export "new" (func $new-{interface}))',
+        ' (export "memory" (memory $space)))',
+        f'(core module $maker-{interface} (import "" "memory" (memory 1))',
+        f' (import "" "raw" (func $raw (param {numbers}) (result i32))) (import "" "new" (func $new (param i32) (result i32)))',
+        f" (func (export {_quoted(making)}) (param {numbers}) (result i32) (local i32)",
+        f" (local.set {_FLAT[interface]} (call $raw {passed}))",
+        f" (if (i32.load8_u {area}) (then (i32.store offset=4 {area} (call $new (i32.load offset=4 {area}))))) {area}))",
+        f'(core instance $make-{interface} (instantiate $maker-{interface} (with "" (instance $parts-{interface}))))',
+    ]
+
+
+def _inside(interface: str) -> list[str]:
+    """Return the lines of the component that exports an interface: what it imports, under the interface's own names."""
+    own, resource = _INTERFACES[interface][0], f"{interface}-instance"
+    lines: list[str] = []
+    outer, inner = _Types(lines), _Types(lines)
+    for name, of in (_TYPES | own).items():
+        lines.append(f"(import {_quoted(f'type-{name}')} (type $in-{name} (eq {outer.named(of)})))")
+        outer.known[name] = f"$in-{name}"
+    lines.append(f"(import {_quoted(f'type-{resource}')} (type $in-{resource} (sub resource)))")
+    outer.known[resource] = f"$in-{resource}"
+    functions = list(_methods(interface))
+    for c_name, _, parameters, result in functions:
+        signature = outer.function(parameters, result)
+        lines.append(f"(import {_quoted(c_name)} (func $in-{c_name} {signature}))")
+    for name in (*_TYPES, *own, resource):
+        lines.append(f"(export $out-{name} {_quoted(name)} (type $in-{name}))")
+        inner.known[name] = f"$out-{name}"
+    for c_name, name, parameters, result in functions:
+        signature = inner.function(parameters, result)
+        lines.append(f"(export {_quoted(name)} (func $in-{c_name}) (func {signature}))")
+    return [f"(component $shim-{interface}", *lines, ")"]

@@ -1,0 +1,126 @@
+"""Instances of FMUs that are WebAssembly components (FMI-LS-WASM), run by wasmtime, with the methods of FMPy's instances."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+from fmpy.fmi1 import FMICallException
+
+from ..libraries import require
+
+#: The folder of the binaries in the archive; the package and version of the draft's interfaces.
+FOLDER = "wasm32-wasip2"
+_INTERFACE = "fmi:fmi3/{}@3.0.0"
+
+
+def component_of(folder: str | Path, identifier: str) -> Path:
+    """Return where an unpacked FMU has its component."""
+    return Path(folder) / "binaries" / FOLDER / f"{identifier}.wasm"
+
+
+class _Component:
+    """An instance in the component of an unpacked FMU.
+
+    Methods that are not written here are those of the interface under FMPy's names: ``getFloat64`` is ``get-float64``.
+    """
+
+    _interface: ClassVar[str]
+    _more: ClassVar[tuple[Any, ...]]
+
+    def __init__(self, guid: str, unzipDirectory: str, modelIdentifier: str, instanceName: str) -> None:
+        require("wasmtime")
+        from wasmtime import Engine, Store
+        from wasmtime.component import Component, Linker
+
+        engine = Engine()
+        self._named, self._store = (instanceName, guid), Store(engine)
+        #: FMPy's name of the instance; None before and after its life
+        self.component: Any = None
+        self._log: Callable[..., None] = lambda *_: None
+        made = Component.from_file(engine, str(component_of(unzipDirectory, modelIdentifier)))
+        linker = Linker(engine)
+        with linker.root() as root, root.add_instance(_INTERFACE.format("callbacks")) as callbacks:
+            callbacks.add_func("log-message", self._heard)
+        self._of = linker.instantiate(self._store, made)
+        self._at = self._of.get_export_index(self._store, _INTERFACE.format(self._interface))
+        self._functions: dict[str, Any] = {}
+
+    def _heard(self, store: Any, name: str, status: str, category: str, message: str) -> None:
+        self._log(message.encode())
+
+    def call(self, method: str, *values: Any, kind: str = "method") -> Any:
+        """Call a method of the interface; FMICallException where it fails."""
+        if method not in self._functions:
+            name = f"[{kind}]{self._interface}-instance.{method}"
+            index = self._of.get_export_index(self._store, name, self._at)
+            assert index is not None, name
+            self._functions[method] = self._of.get_func(self._store, index)
+        own = (self.component,) if kind == "method" else ()
+        found = self._functions[method](self._store, *own, *values)
+        if isinstance(found, str) and found != "ok" and found != "warning":
+            raise FMICallException(method, ("ok", "warning", "discard", "error", "fatal").index(found))
+        return found
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        method = re.sub(r"(?<!^)([A-Z])", r"-\1", name).lower().replace("u-int", "uint")
+        return lambda *values: self.call(method, *values)
+
+    def instantiate(self, loggingOn: bool = False, logMessage: Callable[..., None] | None = None) -> None:
+        self._log = logMessage or self._log
+        name, token = self._named
+        making = f"instantiate-{self._interface}"
+        self.component = self.call(making, name, token, "", False, loggingOn, *self._more, kind="static")
+        if self.component is None:
+            raise FMICallException(making, 3)
+
+    def enterInitializationMode(self, tolerance: float | None = None, startTime: float = 0.0) -> None:
+        self.call("enter-initialization-mode", tolerance, startTime, None)
+
+    def freeInstance(self) -> None:
+        self.component.drop(self._store)
+        self.component = None
+
+
+class ComponentSlave(_Component):
+    """An instance for co-simulation."""
+
+    _interface, _more = "co-simulation", (False, False, [])
+
+    def doStep(self, time: float, step: float) -> tuple[bool, bool, bool, float]:
+        done = self.call("do-step", time, step, True)
+        names = ("event-handling-needed", "terminate-simulation", "early-return", "last-successful-time")
+        event, terminate, early, last = (getattr(done, name) for name in names)
+        return event, terminate, early, last
+
+
+class ComponentModel(_Component):
+    """An instance for model exchange; states are in arrays of ctypes, as FMPy has them."""
+
+    _interface, _more = "model-exchange", ()
+
+    def updateDiscreteStates(self) -> tuple[Any, ...]:
+        return tuple(vars(self.call("update-discrete-states")).values())
+
+    def setContinuousStates(self, x: Any, count: int) -> None:
+        self.call("set-continuous-states", x[:count])
+
+    def getContinuousStates(self, x: Any, count: int) -> None:
+        self._write("get-continuous-states", x)
+
+    def getContinuousStateDerivatives(self, x: Any, count: int) -> None:
+        self._write("get-continuous-state-derivatives", x)
+
+    def getNominalsOfContinuousStates(self, x: Any, count: int) -> None:
+        self._write("get-nominals-of-continuous-states", x)
+
+    def getEventIndicators(self, z: Any, count: int) -> None:
+        self._write("get-event-indicators", z)
+
+    def _write(self, method: str, array: Any) -> None:
+        for number, value in enumerate(self.call(method)):
+            array[number] = value
