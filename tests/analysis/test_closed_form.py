@@ -133,10 +133,11 @@ def test_curve_of_four_poses(seed: int) -> None:
         assert kept_distance(found.task, complex(pivot), complex(point)) < 1e-10  # type: ignore[arg-type]
 
 
-def test_map_of_four_poses_is_what_each_linkage_is_judged() -> None:
+@pytest.mark.parametrize("seed", [3, 7, 10])
+def test_map_of_four_poses_is_what_each_linkage_is_judged(seed: int) -> None:
     from analysis.synthesis.exact.burmester import Dyad, four_bar
 
-    found = syn.guidance(random_poses(3, 4))
+    found = syn.guidance(random_poses(seed, 4))
     assert isinstance(found, syn.GuidanceMap)
     dyads = [Dyad(pivot=complex(m), point=complex(z)) for m, z in zip(found.pivots, found.points)]
     random = np.random.default_rng(0)
