@@ -174,6 +174,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         "solution": (run, [solution]),
         "values": ([*run, *beside_plain], plain[:2]),
         "clearance": (run, [trace.clearance]),
+        "apart": ([s.x, s.p], [_apart(mechanism, s.x, s.p)]),
         "jump": (run, [trace.jump]),
         "jump_forward": ([*run, dx, du, dp], forward([trace.jump], at, change)),
         "jump_reverse": ([*run, *jump_weights], jump_gradient),
@@ -181,6 +182,15 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         "forward": ([*run, dx, du, dp, *beside], forward(values, at, change)),
         "reverse": ([*run, *weights, *beside], gradient),
     }
+
+
+def _apart(mechanism: Mechanism, x: Any, p: Any) -> Any:
+    """Return the numbers of what is said where the links cannot be joined, at least one."""
+    casadi = symbolic.library()
+    if mechanism.unjoined is None or mechanism.unjoined.reach is None:
+        return casadi.SX(0.0)
+    reach = symbolic.traced(mechanism.modules).of(mechanism.unjoined.reach)
+    return casadi.vertcat(*reach(tuple(casadi.vertsplit(x)), mechanism.constants(*casadi.vertsplit(p)[:-1])))
 
 
 def _following(mechanism: Mechanism, trace: equations.Traced, rates: Any) -> Any:
@@ -329,10 +339,29 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
             f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
             f"#define JAMMING {_text(limits.JAMMING)}",
+            *_unjoined(mechanism),
             "#endif",
             "",
         ]
     )
+
+
+def _unjoined(mechanism: Mechanism) -> list[str]:
+    """Return what C says where the links cannot be joined: the fact, how far apart they are, how near they are to joining."""
+    said = mechanism.unjoined or limits.Unjoined("the links cannot be joined", "", "")
+    numbers = [f"(r)[{n}]" for n in range(said.apart.count("{"))]
+    return [
+        f"#define UNJOINED {_text(said.fact)}",
+        f"#define SAY_APART(text, r) {_said(said.apart, numbers)}",
+        f"#define SAY_NEAR(text, angle) {_said(said.near, ['angle'] if said.near else [])}",
+    ]
+
+
+def _said(form: str, values: Sequence[str]) -> str:
+    """Return the C that writes a text of Python's form."""
+    printed = re.sub(r"\{:(\.\d+\w)\}", r"%\1", form)
+    given = [_text(printed), *values] if values else ['"%s"', _text(form)]
+    return f"snprintf(text, SENTENCE, {', '.join(given)})"
 
 
 def _tables(mechanism: Mechanism) -> str:

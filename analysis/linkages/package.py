@@ -129,6 +129,7 @@ MECHANISM = Mechanism(
     equations=Equations(*(getattr(equations, name) for name in Equations._fields)),
     check_assembly=check_assembly,
     error_scale=equations.error_scale,
+    unjoined=planar.UNJOINED,
     drawing=Drawing(
         (
 {joints}

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from .errors import JammingError, LinkworkError
-from .limits import ASSEMBLY, JAMMING, LIMIT_SINE, NEAR_LIMIT
+from .limits import ASSEMBLY, JAMMING, LIMIT_SINE, NEAR_LIMIT, Unjoined
 from .parameters import Rules
 from .variables import Variable
 
@@ -276,6 +276,8 @@ class Mechanism:
     error_scale : callable
         ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute; a
         straight line of arithmetic like the equations.
+    unjoined : Unjoined or None
+        What is said there, of which the FMU in C says the same; None where the links can always be joined.
     switch : str
         Name of the one constant, zero or greater, on which the equations may branch: on whether it is zero. They are traced
         once for either, so that what is switched off costs nothing. Empty where there is none.
@@ -304,6 +306,7 @@ class Mechanism:
     equations: Equations
     check_assembly: Callable[[Any, Sequence[float]], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
+    unjoined: Unjoined | None = None
     switch: str = ""
     links: tuple[Link, ...] = ()
     drawing: Drawing | None = None

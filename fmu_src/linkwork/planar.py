@@ -14,12 +14,11 @@ Throughout u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90 de
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import asin, atan2, cos, degrees, fabs, sin, sqrt
+from math import atan2, cos, fabs, sin, sqrt
 from typing import Any, NamedTuple
 
-from .errors import AssemblyError
 from .friction import solved
-from .limits import LIMIT_SINE
+from .limits import Unjoined
 
 
 class Vector(NamedTuple):
@@ -589,6 +588,11 @@ def distance(a: Vector, b: Vector) -> tuple[float, float, float, float]:
     return length, cx * (b.vx - a.vx) + cy * (b.vy - a.vy), cx, cy
 
 
+UNJOINED = Unjoined(
+    "the bodies cannot be joined", "they do not reach each other", "the bodies of a dyad are in line to {:.3f} deg"
+)
+
+
 def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: str) -> None:
     """Make sure that the bodies can be joined, clear of the limit of assembly.
 
@@ -600,7 +604,5 @@ def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, wher
     try:
         clearance = places(tuple(x), p).clearance
     except (ValueError, ArithmeticError):
-        raise AssemblyError(f"the bodies cannot be joined at {where}: they do not reach each other") from None
-    if not clearance >= LIMIT_SINE:
-        angle = degrees(asin(max(-1.0, min(1.0, clearance))))
-        raise AssemblyError(f"limit of assembly at {where}: the bodies of a dyad are in line to {angle:.3f} deg")
+        clearance = -1.0
+    UNJOINED.check(clearance, x, p, where)

@@ -76,6 +76,7 @@ LOCAL Equation equations_begin_reverse; /* ..., gp, gx -> gparameters, gstate, g
 LOCAL Equation equations_derivative;    /* x, m, u, p -> x' */
 LOCAL Equation equations_outputs;       /* x, m, u, p -> y */
 LOCAL Equation equations_clearance;     /* x, m, u, p -> clearance */
+LOCAL Equation equations_apart;         /* x, p -> numbers of SAY_APART */
 LOCAL Equation equations_jump;          /* x, m, u, p -> x */
 LOCAL Equation equations_following;     /* x, m, u, p, derivative of the motion -> x' where the motion is that of a jump to u */
 LOCAL Equation equations_jump_forward;  /* x, m, u, p, dx, du, dp -> dx */

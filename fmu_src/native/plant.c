@@ -134,15 +134,17 @@ void plant_reset(Plant *a) {
     for (int v = 0; v < VARIABLES; v++) a->given[v] = variables[v].start;
 }
 
+#define DEGREE 57.29577951308232
+
 static void configuration(const double x[STATES], char text[SENTENCE]) {
     int end = 0;
     text[0] = 0;
     for (int i = 0; i < FREEDOMS && end < SENTENCE; i++) {
         Digits value, degrees;
+        snprintf(degrees, sizeof degrees, "%.4f", x[i] * DEGREE);
         bool angle = strcmp(freedoms[i].unit, "rad") == 0;
         end += snprintf(text + end, (size_t)(SENTENCE - end), "%s%s %s %s%s%s%s", i ? " and " : "", freedoms[i].name,
-                        digits(value, x[i]), freedoms[i].unit, angle ? " (" : "",
-                        angle ? digits(degrees, x[i] * 57.29577951308232) : "", angle ? " deg)" : "");
+                        digits(value, x[i]), freedoms[i].unit, angle ? " (" : "", angle ? degrees : "", angle ? " deg)" : "");
     }
 }
 
@@ -209,12 +211,21 @@ bool plant_jams(const Plant *a, const double x[STATES]) {
 }
 
 Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]) {
-    char where[SENTENCE];
-    double clearance = clearance_of(a, x);
+    char where[SENTENCE], more[SENTENCE] = "";
+    double clearance = clearance_of(a, x), apart[STATES];
     if (clearance >= LIMIT_CLEARANCE) return GOOD;
+    bool jams = plant_jams(a, x), near = clearance >= 0.0;
     configuration(x, where);
-    const char *limit = plant_jams(a, x) ? JAMMING : clearance >= 0.0 ? ASSEMBLY : "the links cannot be joined";
-    snprintf(sentence, SENTENCE, "%s at %s", limit, where);
+    call(equations_apart, (const double *[]){x, a->p}, (double *[]){apart});
+    if (near && !jams)
+        SAY_NEAR(more, atan2(clearance, sqrt(1.0 - clearance * clearance)) * DEGREE);
+    else if (!jams)
+        SAY_APART(more, apart);
+    snprintf(sentence, SENTENCE, "%s at %.180s%s%.180s",
+             jams   ? JAMMING
+             : near ? ASSEMBLY
+                    : UNJOINED,
+             where, more[0] ? ": " : "", more);
     return LIMIT_OF_ASSEMBLY;
 }
 

@@ -27,6 +27,7 @@ from .test_description import ROWS
 #: What has to be installed for each master, and how that is tried.
 NEEDS = {
     "fmpy": ("the package FMPy", "import fmpy"),
+    "wasmtime": ("wasmtime", "import wasmtime.component"),
     "libcosimpy": ("the package libcosimpy", "import libcosimpy"),
     "ecospy": ("the package ecospy and the library libtbb.so.12 (Debian: apt-get install libtbb12)", "import ecospy"),
     "cofmupy": (
@@ -352,7 +353,14 @@ def test_bad_parameter_under_libcosimpy(run: Callable[..., dict[str, Any]], mode
 
 PAGE = Path(__file__).parents[2] / "docs" / "masters.md"
 #: Which section of the page is of which master.
-SECTIONS = {"FMPy": "fmpy", "libcosim": "libcosimpy", "ecos": "ecospy", "CoFMUPy": "cofmupy", "PathSim": "pathsim"}
+SECTIONS = {
+    "FMPy": "fmpy",
+    "WebAssembly runtimes": "wasmtime",
+    "libcosim": "libcosimpy",
+    "ecos": "ecospy",
+    "CoFMUPy": "cofmupy",
+    "PathSim": "pathsim",
+}
 
 
 @pytest.mark.parametrize("section", SECTIONS)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import ctypes
 import json
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from ctypes import byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint32, c_void_p
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from build_fmu import FMUS
+from linkwork.errors import AssemblyError
 from linkwork.five_bar import MECHANISM as FIVE_BAR
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import TABLE_3_1
@@ -88,7 +91,10 @@ def model(library: Library) -> str:
         ),
         # coupler and rocker of 0.3 m stretched out, less 2e-8 m
         ({"crank__length": 0.05, "ground__length": 0.35 - 2e-8}, "limit of assembly at crank angle 0 rad"),
-        ({"crank__length": 9.0}, "the links cannot be joined at crank angle 0 rad (0 deg) and slider position 0 m"),
+        (
+            {"crank__length": 9.0},
+            "the links cannot be joined at crank angle 0 rad (0.0000 deg) and slider position 0 m",
+        ),
         ({"initial__slider_velocity": 1e200}, "the energy at the start is not finite: crank angle 0 rad"),
         ({"drive__speed": math.nan}, "input drive.speed is nan at t = 0 s: it must be a finite number"),
         (
@@ -119,6 +125,19 @@ def test_what_the_initialisation_refuses(five_bar: Library, values: dict[str, fl
     good.start()
     assert c.get("crank.acceleration", "pin.C.fx") == good.get("crank.acceleration", "pin.C.fx")
     assert c.step(0.0, 1e-3) == OK
+
+
+@pytest.mark.parametrize("values", [{"crank_length": 0.5}, {"crank_length": 0.05, "ground_length": 0.35 - 2e-8}])
+def test_links_that_cannot_be_joined_are_told_as_in_python(five_bar: Library, values: dict[str, float]) -> None:
+    """The gap and the span, or the angle from the limit of assembly."""
+    c = five_bar.instance()
+    c.set(**{name.replace("_", "__"): value for name, value in values.items()})
+    c.enter()
+    assert c("ExitInitializationMode") == ERROR
+    with pytest.raises(AssemblyError) as told:
+        Plant(FIVE_BAR, replace(TABLE_3_1, **values), InitialState())
+    assert c.text() == str(told.value)
+    assert re.search(r"apart, coupler and rocker span|collinear to 0\.\d+ deg", c.text())
 
 
 def test_outputs_in_initialisation_mode_follow_what_is_set(library: Library) -> None:
@@ -288,7 +307,7 @@ def test_friction_that_may_jam_the_links_is_refused(five_bar: Library) -> None:
     assert c.enter() == OK
     assert c("ExitInitializationMode") == ERROR
     assert c.status() == 3
-    assert c.text().startswith(f"{JAMMING} at crank angle 0 rad (0 deg) and slider position 0 m")
+    assert c.text().startswith(f"{JAMMING} at crank angle 0 rad (0.0000 deg) and slider position 0 m")
     c = five_bar.instance().start(**TOO_ROUGH)
     before = c.get("slider.guide_force", "assembly.margin_to_limit")
     assert c.step(0.0, 0.3) == DISCARD
@@ -329,7 +348,7 @@ def test_steps_that_cannot_meet_the_tolerance(five_bar: Library) -> None:
     assert c.step(0.0, 1.0) == DISCARD
     assert c.status() == 4
     assert "in the step from t = 0 s: the step size fell to" in c.text()
-    assert ", at crank angle 0 rad (0 deg) and slider position 0 m" in c.text()
+    assert ", at crank angle 0 rad (0.0000 deg) and slider position 0 m" in c.text()
     # accelerations that are not finite from the beginning
     c = five_bar.instance().start(drive__mode=0)
     c.set(drive__torque=1e308, slider__force=1e308)
@@ -377,7 +396,8 @@ def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, 
         assert c.step(0.0, 1e8) == DISCARD
         assert c.status() == 3
         words.add(" ".join(c.text().partition("s: ")[2].split()[:4]))
-    assert words - {""} == {"limit of assembly at", "limit of assembly near", "the links cannot be"}
+    joined = {"the links cannot be", "the rod does not"}
+    assert words - {""} == {"limit of assembly at", "limit of assembly near", *joined}
 
 
 def test_a_mechanism_at_rest_takes_any_step(five_bar: Library) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 from linkwork.five_bar import kinematics as K
-from linkwork.five_bar.parameters import Constants, reach
+from linkwork.five_bar.parameters import Constants
 from linkwork.five_bar.published import TABLE_3_1
 from tests.oracles.differences import derivative
 from tests.strategies import Case, cases, seeded
@@ -138,8 +138,9 @@ def test_transmission_angle_is_that_of_the_triangle(case: Case) -> None:
     th2, u, *_ = case.state
     p = case.parameters.constants()
     angle = K.transmission_angle(K.position(th2, u, p), p)
-    distance = reach(case.parameters, th2, u)
+    distance, low, high = K.apart((th2, u), p)
     assert 0.0 <= angle <= pi
+    assert low <= distance <= high
     # law of cosines at C
     assert distance**2 == pytest.approx(p.l3**2 + p.l4**2 - 2 * p.l3 * p.l4 * cos(angle), rel=1e-11)
 
@@ -151,9 +152,9 @@ def test_margins_and_square_say_how_far_the_limit_of_assembly_is(case: Case) -> 
     p = case.parameters.constants()
     g = K.position(th2, u, p)
     stretched, folded = K.assembly_margin(th2, u, p)
-    distance = reach(case.parameters, th2, u)
-    assert stretched == pytest.approx(p.l3 + p.l4 - distance, abs=1e-14)
-    assert folded == pytest.approx(distance - abs(p.l3 - p.l4), abs=1e-14)
+    distance, low, high = K.apart((th2, u), p)
+    assert stretched == pytest.approx(high - distance, abs=1e-14)
+    assert folded == pytest.approx(distance - low, abs=1e-14)
     assert stretched > 0.0
     assert folded > 0.0
     square = K.assembly_square(th2, u, p)

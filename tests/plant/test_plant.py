@@ -753,7 +753,7 @@ def test_start_out_of_the_rods_reach_says_by_how_much() -> None:
     distance = hypot((6.0 + 10.0) * INCH, 1.5)
     text = str(caught.value)
     assert text.startswith(
-        "the rod does not reach the guide at crank angle 1.04719755 rad (60.0000 deg) and shift 1.5 m: "
+        "the rod does not reach the guide at crank angle 1.04719755 rad (60.0000 deg) and shift position 1.5 m: "
     )
     assert f"the crank pin is {distance:.9g} m from the guide" in text
     assert f"the rod is 1.27 m long, {distance - 1.27:.9g} m too short" in text
@@ -762,7 +762,7 @@ def test_start_out_of_the_rods_reach_says_by_how_much() -> None:
 def test_start_in_a_groove_too_deep_says_by_how_much() -> None:
     deep = replace(OFFSET_CASE[0], groove_amplitude=1.4, groove_ratio=3.0)
     with pytest.raises(
-        AssemblyError, match=r"crank angle 0\.523598776 rad \(30\.0000 deg\) and shift 1\.4 m: .* too short"
+        AssemblyError, match=r"crank angle 0\.523598776 rad \(30\.0000 deg\) and shift position 1\.4 m: .* too short"
     ):
         default("speed-groove", parameters=deep, initial=SliderCrankStart(crank_angle=pi / 6))
     # the shift that is given is not the one that counts

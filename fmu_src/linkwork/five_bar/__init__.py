@@ -62,6 +62,7 @@ MECHANISM = Mechanism(
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
+    unjoined=assembly.UNJOINED,
     links=tuple(
         Link(
             name,

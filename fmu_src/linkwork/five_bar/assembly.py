@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, degrees
+from math import copysign, degrees, sqrt
 
-from ..errors import AssemblyError
-from ..limits import LIMIT_SINE
+from ..limits import Unjoined
 from ..mechanism import crank_scale
 from . import kinematics
-from .parameters import FiveBarParameters, reach
+from .parameters import FiveBarParameters
+
+UNJOINED = Unjoined(
+    "the links cannot be joined",
+    "crank pin and slider pin are {:.9g} m apart, coupler and rocker span {:.9g} m to {:.9g} m",
+    "coupler and rocker are collinear to {:.3f} deg",
+    kinematics.apart,
+)
 
 
 def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> None:
@@ -22,21 +28,8 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, slider_position, p)
-    least = LIMIT_SINE * p.l3 * p.l4
-    if square >= least * least:
-        return
-    distance = reach(parameters, crank_angle, slider_position)
-    low, high = abs(p.l3 - p.l4), p.l3 + p.l4
     where = configuration(crank_angle, slider_position)
-    if square > 0.0:
-        raise AssemblyError(
-            f"limit of assembly at {where}: coupler and rocker are collinear to "
-            f"{degrees(asin(square**0.5 / (p.l3 * p.l4))):.3f} deg"
-        )
-    raise AssemblyError(
-        f"the links cannot be joined at {where}: crank pin and slider pin are {distance:.9g} m apart, "
-        f"coupler and rocker span {low:.9g} m to {high:.9g} m"
-    )
+    UNJOINED.check(copysign(sqrt(abs(square)) / (p.l3 * p.l4), square), (crank_angle, slider_position), p, where)
 
 
 def configuration(crank_angle: float, slider_position: float) -> str:

@@ -10,7 +10,8 @@ as it is inside the FMU, compiled under Numba, and traced with CasADi symbols.
 
 from __future__ import annotations
 
-from math import atan2, cos, sin, sqrt
+from collections.abc import Sequence
+from math import atan2, cos, fabs, sin, sqrt
 from typing import NamedTuple
 
 from .parameters import Constants
@@ -48,6 +49,12 @@ def assembly_square(th2: float, u: float, p: Constants) -> float:
     d2 = dx * dx + dy * dy
     a = 0.5 * (d2 + p.l3 * p.l3 - p.l4 * p.l4)
     return p.l3 * p.l3 * d2 - a * a
+
+
+def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
+    """Return the distance from crank pin to slider pin, and the least and greatest that coupler and rocker span (m)."""
+    dx, dy = p.l1 + x[1] * p.ca - p.l2 * cos(x[0]), x[1] * p.sa - p.l2 * sin(x[0])
+    return sqrt(dx * dx + dy * dy), fabs(p.l3 - p.l4), p.l3 + p.l4
 
 
 def position(th2: float, u: float, p: Constants) -> Position:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, hypot, sin
+from math import cos, sin
 from typing import ClassVar, NamedTuple
 
 from ..parameters import Least, Rules, check_initial, check_parameters
@@ -228,12 +228,4 @@ def without_friction(parameters: FiveBarParameters) -> FiveBarParameters:
         pin_B_friction_radius=0.0,
         pin_C_friction_radius=0.0,
         pin_D_friction_radius=0.0,
-    )
-
-
-def reach(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> float:
-    """Compute the distance from the crank pin B to the slider pin D (m)."""
-    p = parameters.constants()
-    return hypot(
-        p.l1 + slider_position * p.ca - p.l2 * cos(crank_angle), slider_position * p.sa - p.l2 * sin(crank_angle)
     )

@@ -76,6 +76,7 @@ MECHANISM = Mechanism(
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
+    unjoined=assembly.UNJOINED,
     links=(
         Link("crank", "crank.length", "crank.mass", "crank.inertia", ("crank.cog_x", "crank.cog_y"), True),
         Link("rod", "rod.length", "rod.mass", "rod.inertia", ("rod.cog_distance",)),

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, degrees, sqrt
+from math import copysign, degrees, sqrt
 
-from ..errors import AssemblyError
-from ..limits import LIMIT_SINE
+from ..limits import Unjoined
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import SliderCrankParameters
+
+UNJOINED = Unjoined(
+    "the rod does not reach the guide",
+    "the crank pin is {:.9g} m from the guide, the rod is {:.9g} m long, {:.9g} m too short",
+    "the rod is within {:.3f} deg of perpendicular to the guide",
+    kinematics.apart,
+)
 
 
 def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift: float) -> None:
@@ -30,20 +36,8 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, shift, p)
-    least = LIMIT_SINE * p.a2
-    if square >= least * least:
-        return
-    where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift {shift:.9g} m"
-    if square >= 0.0:
-        raise AssemblyError(
-            f"limit of assembly at {where}: the rod is within {degrees(asin(sqrt(square) / p.a2)):.3f} deg of "
-            f"perpendicular to the guide"
-        )
-    distance = sqrt(p.a2 * p.a2 - square)
-    raise AssemblyError(
-        f"the rod does not reach the guide at {where}: the crank pin is {distance:.9g} m from the guide, the rod is "
-        f"{p.a2:.9g} m long, {distance - p.a2:.9g} m too short"
-    )
+    where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m"
+    UNJOINED.check(copysign(sqrt(abs(square)) / p.a2, square), (crank_angle, shift), p, where)
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:

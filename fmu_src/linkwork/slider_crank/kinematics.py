@@ -10,6 +10,7 @@ as it is inside the FMU, compiled under Numba, and on dual numbers and arrays (`
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
@@ -55,6 +56,12 @@ def assembly_square(th: float, s1: float, p: Constants) -> float:
     f = p.a1 * cos(th) + p.a4
     g = p.a1 * sin(th) * p.ca - s1 * p.sa
     return p.a2 * p.a2 - f * f - g * g
+
+
+def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
+    """Return the distance of the crank pin from the guide, the rod's length, and by how much that is too short (m)."""
+    distance = sqrt(p.a2 * p.a2 - assembly_square(x[0], x[1], p))
+    return distance, p.a2, distance - p.a2
 
 
 def position(th: float, s1: float, p: Constants) -> Position:
