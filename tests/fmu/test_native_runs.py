@@ -1125,8 +1125,9 @@ def test_an_input_that_is_not_finite_in_an_update_refuses_the_step(fmi3: Library
     assert c.get("time", "slider.force") == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("begin", [0.0, 3.0])
 @pytest.mark.parametrize("ahead", [0.0, 0.004, 1.0])
-def test_an_update_may_end_the_step(fmi3: Library, ahead: float) -> None:
+def test_an_update_may_end_the_step(fmi3: Library, ahead: float, begin: float) -> None:
     made: list[Instance] = []
     asked: list[float] = []
 
@@ -1139,10 +1140,12 @@ def test_an_update_may_end_the_step(fmi3: Library, ahead: float) -> None:
             ask[0], end[0] = True, time + ahead
 
     made.append(fmi3.instance(early=True, update=update))
-    c = made[0].start()
-    assert c.step(0.0, 0.05) == OK
-    ends = min(asked[0], 0.05)
-    assert c.early == (ends < 0.05)
+    c = made[0]
+    assert c.enter(begin) == OK
+    assert c("ExitInitializationMode") == OK
+    assert c.step(begin, 0.05) == OK
+    ends = min(asked[0], begin + 0.05)
+    assert c.early == (ends < begin + 0.05)
     assert not c.terminate
     assert c.reached.value == pytest.approx(ends, abs=1e-15)
     assert c.get("time") == [c.reached.value]
