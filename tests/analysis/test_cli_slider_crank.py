@@ -396,7 +396,7 @@ class TestPicture:
     ("units", "said"),
     [
         (["--units", "inch"], "the rod is 50 in long, 138.033 in too short"),
-        (["-u", "inch"], "and shift 3.5 in: the crank pin is 188.033 in from the guide"),
+        (["-u", "inch"], "and shift position 3.5 in: the crank pin is 188.033 in from the guide"),
         ([], "the rod is 1.27 m long, 3.50602745 m too short"),
     ],
 )
