@@ -518,6 +518,14 @@ def test_unstable_orbit_of_table_3_1() -> None:
     assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=2e-3)
 
 
+def test_a_deviation_that_is_lost_within_a_turn_has_decayed() -> None:
+    run = confirm(replace(TABLE_3_1, slider_damping=200.0), Drive(speed=2.0))
+    assert abs(run.verdict.largest_multiplier) < 1e-3
+    assert run.outcome is Outcome.DECAYS
+    assert run.agrees
+    assert run.growth < 2e-3
+
+
 def test_bad_long_runs_are_refused() -> None:
     with pytest.raises(InputError, match="20 and more"):
         confirm(chapter_4(1.0), Drive(speed=60.0), turns=5)

@@ -57,6 +57,8 @@ from .grid import Grid, grid, points_to_confirm
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
 #: Lines x = const and y = const of a chart on which boundaries are sought, and samples on each.
 LINES, SAMPLES = (2, 5), 120
+#: Share of the chart's ranges below which what is left of a boundary that cannot be followed is not drawn.
+STUB = 1e-3
 #: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid belong to one motion.
 SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
@@ -417,6 +419,10 @@ class _Survey:
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return
+        lost = [end for end in curve.ends if end.reason not in (Reason.BOX, Reason.CLOSED)]
+        if lost and (np.ptp(curve.points, axis=0) < STUB * np.ptp([self.box.x, self.box.y], axis=1)).all():
+            self.problems.append(f"{what} is not followed: {lost[0].message}")
+            return
         own = np.mean([_belongs(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
         # of two folds that meet in a cusp only one ends the grid's motion; near a jump a coarse grid may have the other motion
         true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
@@ -429,9 +435,7 @@ class _Survey:
                 starts=np.array([orbit.start for orbit in curve.orbits]),
             )
         )
-        for end in curve.ends:
-            if end.reason not in (Reason.BOX, Reason.CLOSED):
-                self.problems.append(f"{what} is followed to {self.place(*end.point)} only: {end.message}")
+        self.problems += [f"{what} is followed to {self.place(*end.point)} only: {end.message}" for end in lost]
 
     def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
         """Return whether a boundary of the same kind and motion nearly passes through a special point."""

@@ -349,7 +349,7 @@ class Confirmation:
     outcome : Outcome
     growth : float
         Factor per turn of the deviation along the leading multiplier's direction, by regression over the turns before it is
-        lost in noise or exceeds a hundredth of the crank.
+        lost in noise or exceeds a hundredth of the crank; a bound of it where that is within a turn.
     deviations : ndarray, shape (n,)
         Distance from the orbit at crank angle 0 of each turn, relative to the first; as far as the run went.
     message : str
@@ -381,6 +381,8 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
+#: Deviation below which there is none.
+TINY = 1e-300
 #: Turns of a run at least, and at most.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
 #: Growth or decay of the deviation over a run from which on it counts.
@@ -419,7 +421,7 @@ def confirm(
     InputError
         If the number of turns or the disturbance is not usable.
     LinkworkError
-        If the deviation grows or dies too fast to be measured.
+        If the run ends within a turn.
     """
     if (turns is not None and turns < 20) or not NOISE < disturbance < LINEAR:
         raise InputError(
@@ -437,7 +439,10 @@ def confirm(
     away = (passed - orbit.start) / scale
     size = np.linalg.norm(away, axis=1)
     outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
-    used = np.abs(away @ measure)[: outside[0] if len(outside) else None]
+    # one turn counts even where the deviation is lost in it: the motion decays or grows by at least as much
+    used = np.maximum(np.abs(away @ measure), TINY)[: max(2, outside[0]) if len(outside) else None]
+    if len(used) < 2:
+        raise LinkworkError(f"the run beside the orbit ends within a turn: {message}")
     growth = _growth(used)
     factor = growth ** len(used)
     if factor > NOTABLE or size.max() > NOTABLE * LINEAR:
@@ -491,6 +496,4 @@ def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[
 
 def _growth(size: NDArray[np.float64]) -> float:
     """Return the factor per turn, by regression of the logarithms."""
-    if len(size) < 2:
-        raise LinkworkError("the deviation leaves the range of linear growth within a turn: take a smaller disturbance")
     return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))
