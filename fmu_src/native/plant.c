@@ -211,15 +211,17 @@ bool plant_jams(const Plant *a, const double x[STATES]) {
 }
 
 Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]) {
-    char where[SENTENCE], more[SENTENCE] = "";
+    char where[SENTENCE], more[SENTENCE];
     double clearance = clearance_of(a, x), apart[STATES];
     if (clearance >= LIMIT_CLEARANCE) return GOOD;
     bool jams = plant_jams(a, x), near = clearance >= 0.0;
     configuration(x, where);
     call(equations_apart, (const double *[]){x, a->p}, (double *[]){apart});
-    if (near && !jams)
+    if (jams)
+        more[0] = 0;
+    else if (near)
         SAY_NEAR(more, atan2(clearance, sqrt(1.0 - clearance * clearance)) * DEGREE);
-    else if (!jams)
+    else
         SAY_APART(more, apart);
     snprintf(sentence, SENTENCE, "%s at %.180s%s%.180s",
              jams   ? JAMMING
