@@ -10,10 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import lru_cache
-from xml.etree.ElementTree import Element
 
 from ..libraries import require
-from .description import written
+from .description import layered_standard, written
 
 #: The layered standard, and its manifest.
 STANDARD = "org.modelica.fmi-ls-wasm"
@@ -112,8 +111,6 @@ _INTERFACES = {
     ),
 }  # fmt: skip
 _PRIMITIVE = {"bool", "string", "f32", "f64", *(f"{sign}{bits}" for sign in "su" for bits in (8, 16, 32, 64))}
-#: Parameters of the core functions that make an instance, each of which returns where it is described.
-_FLAT = {"co-simulation": 12, "model-exchange": 8}
 
 
 def component(module: bytes) -> bytes:
@@ -140,9 +137,8 @@ def component(module: bytes) -> bytes:
 
 def manifest() -> bytes:
     """Return the manifest of the layered standard."""
-    names = {"name": STANDARD, "version": "0.1.0", "description": "FMI Layered Standard for WebAssembly"}
-    space = {"xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest"}
-    return written(Element("fmiLayeredStandardManifest", space | {f"fmi-ls:fmi-ls-{k}": v for k, v in names.items()}))
+    text = "FMI Layered Standard for WebAssembly"
+    return written(layered_standard("fmiLayeredStandardManifest", STANDARD, "0.1.0", text))
 
 
 def _length(data: bytes, place: int) -> tuple[int, int]:
@@ -312,9 +308,11 @@ def _outside() -> list[str]:
 def _resource(interface: str) -> list[str]:
     """Return the lines of an instance's type, and of the core module that makes a handle of what the FMU has made."""
     resource, making = f"${interface}-instance", f"instantiate-{interface}"
-    numbers = " ".join(["i32"] * _FLAT[interface])
-    passed = " ".join(f"(local.get {n})" for n in range(_FLAT[interface]))
-    area = f"(local.get {_FLAT[interface]})"
+    # of a text or a list the core function gets address and count, and it returns where the instance is described
+    count = sum(1 if part.endswith(":bool") else 2 for part in _split(_INTERFACES[interface][1]))
+    numbers = " ".join(["i32"] * count)
+    passed = " ".join(f"(local.get {n})" for n in range(count))
+    area = f"(local.get {count})"
     return [
         f"(type {resource} (resource (rep i32) (dtor (core func $drop))))",
         f"(core func $new-{interface} (canon resource.new {resource}))",
@@ -324,7 +322,7 @@ def _resource(interface: str) -> list[str]:
         f'(core module $maker-{interface} (import "" "memory" (memory 1))',
         f' (import "" "raw" (func $raw (param {numbers}) (result i32))) (import "" "new" (func $new (param i32) (result i32)))',
         f" (func (export {_quoted(making)}) (param {numbers}) (result i32) (local i32)",
-        f" (local.set {_FLAT[interface]} (call $raw {passed}))",
+        f" (local.set {count} (call $raw {passed}))",
         f" (if (i32.load8_u {area}) (then (i32.store offset=4 {area} (call $new (i32.load offset=4 {area}))))) {area}))",
         f'(core instance $make-{interface} (instantiate $maker-{interface} (with "" (instance $parts-{interface}))))',
     ]

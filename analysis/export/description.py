@@ -185,6 +185,13 @@ def _date() -> dict[str, str]:
     return {"generationDateAndTime": datetime.fromtimestamp(int(epoch), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")}
 
 
+def layered_standard(tag: str, name: str, version: str, text: str) -> Element:
+    """Return the root of a layered standard's manifest."""
+    stated = {"name": name, "version": version, "description": text}
+    space = {"xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest"}
+    return Element(tag, space | {f"fmi-ls:fmi-ls-{key}": value for key, value in stated.items()})
+
+
 def written(root: Element) -> bytes:
     """Return the text of an XML file."""
     indent(root, "\t")

@@ -21,13 +21,12 @@ from ..mechanisms import MECHANISMS
 from ..run import ALLOWED, EXPERIMENTS, MANIFEST, STANDARD, Case, held_inputs, standard_cases
 from .bill import BILL, TYPE
 from .compatibility import table
-from .description import written
+from .description import layered_standard, written
 
 #: Communication steps of an experiment, rows of its reference, and digits of its numbers.
 STEPS, ROWS, DIGITS = 100, 10, 12
 #: Tolerances of the reference and of the experiment; the greatest relative difference between them.
 REFERENCE, TOLERANCE, DIFFERENCE = 1e-12, 1e-10, 1e-6
-_LAYERED = "http://fmi-standard.org/fmi-ls-manifest"
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _DESCRIPTION = "Layered Standard providing information on related files included in an FMU."
 #: Of a file of experiments: its place below the folder of the standard, and its type.
@@ -88,15 +87,7 @@ def experiments(mechanism: Mechanism) -> dict[str, bytes]:
 
 def _manifest() -> bytes:
     """Return the manifest of FMI-LS-REF: the experiments, and the bill of materials."""
-    root = Element(
-        "fmiReferences",
-        {
-            "xmlns:fmi-ls": _LAYERED,
-            "fmi-ls:fmi-ls-name": STANDARD,
-            "fmi-ls:fmi-ls-version": "1.0.0-alpha.1",
-            "fmi-ls:fmi-ls-description": _DESCRIPTION,
-        },
-    )
+    root = layered_standard("fmiReferences", STANDARD, "1.0.0-alpha.1", _DESCRIPTION)
     own = (*_EXPERIMENTS, "experiment/smoke-test", "Standard cases with reference results")
     bill = (f"../{BILL.partition('/')[2]}", TYPE, "meta-data", "Bill of materials")
     for source, kind, role, text in (own, bill):

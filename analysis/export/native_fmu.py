@@ -71,7 +71,6 @@ WASM = "wasm32-wasip2"
 EVERYWHERE = PLATFORMS | {WASM: Platform("wasm32-wasi", "wasm", "", WASM)}
 
 _SHELL = ("face.h", "model.h", "plant.h", "step.h", "plant.c", "instance.h", "instance.c", "saved.c")
-_COMPONENT = ("component.c",)
 _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
@@ -164,9 +163,8 @@ def source_files(mechanism: Mechanism, kind: Kind, *, web: bool = False) -> dict
     """
     shell = SOURCES / "native"
     headers = resources.files("fmpy") / "c-code"
-    files = {
-        name: (shell / name).read_text(encoding="utf-8") for name in (f"fmi{kind.fmi}.c", *_SHELL, *_COMPONENT[:web])
-    }
+    own = [f"fmi{kind.fmi}.c", *_SHELL, *(["component.c"] if web else [])]
+    files = {name: (shell / name).read_text(encoding="utf-8") for name in own}
     files |= {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[kind.fmi]}
     if kind.fmi == 2:
         files["fmi2Functions.h"] = _with_prefix(files["fmi2Functions.h"], (headers / "fmi3Functions.h").read_text())

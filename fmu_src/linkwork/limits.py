@@ -39,10 +39,8 @@ class Unjoined(NamedTuple):
     near: str
     reach: Callable[..., tuple[float, ...]] | None = None
 
-    def check(self, sine: float, x: Sequence[float], p: Any, where: str) -> None:
-        """Raise AssemblyError unless the sine of the angle from the limit is great enough; it is below zero beyond it."""
-        if sine >= LIMIT_SINE:
-            return
+    def error(self, sine: float, x: Sequence[float], p: Any, where: str) -> AssemblyError:
+        """Return the error for a configuration, by the sine of the angle from the limit, below zero beyond it."""
         if sine > 0.0:
-            raise AssemblyError(f"{ASSEMBLY} at {where}: {self.near.format(degrees(asin(min(1.0, sine))))}")
-        raise AssemblyError(f"{self.fact} at {where}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")
+            return AssemblyError(f"{ASSEMBLY} at {where}: {self.near.format(degrees(asin(min(1.0, sine))))}")
+        return AssemblyError(f"{self.fact} at {where}: {self.apart.format(*(self.reach(x, p) if self.reach else ()))}")

@@ -18,7 +18,7 @@ from math import atan2, cos, fabs, sin, sqrt
 from typing import Any, NamedTuple
 
 from .friction import solved
-from .limits import Unjoined
+from .limits import LIMIT_SINE, Unjoined
 
 
 class Vector(NamedTuple):
@@ -605,4 +605,5 @@ def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, wher
         clearance = places(tuple(x), p).clearance
     except (ValueError, ArithmeticError):
         clearance = -1.0
-    UNJOINED.check(clearance, x, p, where)
+    if not clearance >= LIMIT_SINE:
+        raise UNJOINED.error(clearance, x, p, where)

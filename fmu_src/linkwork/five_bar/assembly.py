@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import copysign, degrees, sqrt
 
-from ..limits import Unjoined
+from ..limits import LIMIT_SINE, Unjoined
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import FiveBarParameters
@@ -28,8 +28,10 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, slider_position, p)
-    where = configuration(crank_angle, slider_position)
-    UNJOINED.check(copysign(sqrt(abs(square)) / (p.l3 * p.l4), square), (crank_angle, slider_position), p, where)
+    sine = copysign(sqrt(abs(square)) / (p.l3 * p.l4), square)
+    if not sine >= LIMIT_SINE:
+        where = configuration(crank_angle, slider_position)
+        raise UNJOINED.error(sine, (crank_angle, slider_position), p, where)
 
 
 def configuration(crank_angle: float, slider_position: float) -> str:

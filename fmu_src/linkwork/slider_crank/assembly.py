@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import copysign, degrees, sqrt
 
-from ..limits import Unjoined
+from ..limits import LIMIT_SINE, Unjoined
 from ..mechanism import crank_scale
 from . import kinematics
 from .parameters import SliderCrankParameters
@@ -36,8 +36,10 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, shift, p)
-    where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m"
-    UNJOINED.check(copysign(sqrt(abs(square)) / p.a2, square), (crank_angle, shift), p, where)
+    sine = copysign(sqrt(abs(square)) / p.a2, square)
+    if not sine >= LIMIT_SINE:
+        where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift position {shift:.9g} m"
+        raise UNJOINED.error(sine, (crank_angle, shift), p, where)
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
