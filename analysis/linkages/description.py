@@ -15,7 +15,7 @@ from linkwork.errors import LinkworkError, ParameterError
 
 from .. import files
 from ..files import Kinds, Many, Quantity, Table, entry
-from .laws import law
+from .laws import constants, law
 from .sections import SECTIONS
 
 GROUND = "ground"
@@ -180,14 +180,16 @@ class Rack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spring:
-    """A spring with a damper and dry friction: between two points, about a pin or along a slide.
+    """A spring with a damper and dry friction: between two points, about a pin or along a slide, or a shaft of two bodies.
 
     Attributes
     ----------
     between : tuple of str
         Two points, or
     at : str
-        a joint.
+        a joint, or
+    bodies : tuple of str
+        two bodies: it is twisted by the angle of the second from the first, up to half a turn, wherever they are.
     stiffness, damping : float
         In N/m and N.s/m; about a pin in N.m/rad and N.m.s/rad.
     free : float
@@ -197,17 +199,21 @@ class Spring:
     law : str or list of (x, force)
         A further force against the stretch x, as a formula in x and its rate v such as "2e5*x**3 + 4*v", or as a table,
         between whose rows it is straight (SI). Its work counts as dissipated.
+    constants : mapping of str to (float, str)
+        Of the formula, by their names in it: values and units. They are parameters.
     driven : bool
         Whether an input drives it, as of a cylinder or a linear motor: a force that lengthens it, a torque that turns it.
     """
 
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
     at: str = entry(_name, "")
+    bodies: tuple[str, ...] = entry(Many(_name, length=2), ())
     stiffness: Any = entry(files.unchanged, 0)
     damping: Any = entry(files.unchanged, 0)
     free: Any = entry(files.unchanged, 0)
     friction: Any = entry(files.unchanged, 0)
     law: str = entry(law, "")
+    constants: Mapping[str, tuple[float, str]] = entry(constants, factory=dict)
     driven: bool = entry(files.flag, False)
 
 
@@ -222,7 +228,8 @@ class FreedomTable:
     start : float
         At the start (rad, m).
     speed : float
-        Commanded at the start and by default (rad/s, m/s); of a freedom that is not driven its rate at the start.
+        Commanded at the start and by default (rad/s, m/s), also where it is given as 0 with a unit; of a freedom that is not
+        driven its rate at the start.
     driven : bool
         Whether its rate can be commanded; by default the first freedom's.
     """

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from .description import GROUND, Description, Spring, given
+from .laws import with_constants
 from .parameters import Interface
-from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step
+from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step, sliders
 from .writing import function, record, tupled
 
 
@@ -60,15 +61,15 @@ class Motion:
                 rows.append(f"{stretch} = {name}_length{f'{free}_length' if free else ''}")
                 fields += [f"{name}_x", f"{name}_y"]
             else:
-                joint = self.structure.joints[spring.at]
-                first, second = joint.bodies
-                if isinstance(joint, Pin):
+                if turned := self.turned(spring):
+                    first, second = turned
                     angle = f"p.{name}_c, p.{name}_s" if free else "1.0, 0.0"
                     one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
                     rows.append(f"{stretch} = angle_between({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")
                 else:
-                    rows.append(f"{name}_position, {rate} = {self.interface.travel(joint)}")
+                    slide = sliders(self.structure)[spring.at]
+                    rows.append(f"{name}_position, {rate} = {self.interface.travel(slide)}")
                     rows.append(f"{stretch} = {name}_position{f'{free}_position' if free else ''}")
             fields += [stretch, rate]
         doc = "Stretches of the springs, their rates, and the directions of those between points."
@@ -77,6 +78,11 @@ class Motion:
         yield function(
             signature, "Compute the stretches of all springs.", [*rows, f"return Springs({', '.join(fields)})"]
         )
+
+    def turned(self, spring: Spring) -> tuple[str, ...]:
+        """Return the two bodies between which a spring is twisted; none where it is not."""
+        joint = self.structure.joints.get(spring.at)
+        return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
 
     def _kind(self, spring: Spring) -> str:
         return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
@@ -87,18 +93,27 @@ class Motion:
         if given(spring.damping):
             words.append(f"p.{name}_damping * s.{name}_rate")
         if given(spring.friction):
-            about = not spring.between and isinstance(self.structure.joints[spring.at], Pin)
+            about = self.turned(spring)
             words.append(f"p.{name}_friction * tanh(s.{name}_rate / {'FRICTION_RATE' if about else 'FRICTION_SPEED'})")
         if spring.law:
-            words.append(f"{name}_law(s.{name}_stretch, s.{name}_rate)")
+            words.append(f"{name}_law(s.{name}_stretch, s.{name}_rate{', p' if spring.constants else ''})")
         return " + ".join(words)
+
+    def _pull(self, name: str, spring: Spring) -> str:
+        return f"p.{name}_stiffness * s.{name}_stretch" if given(spring.stiffness) else ""
+
+    def tension(self, name: str, spring: Spring) -> str:
+        """Return the whole force of a spring that is not driven, against its stretch."""
+        return " + ".join(filter(None, (self._pull(name, spring), self.resistance(name, spring))))
 
     def laws(self) -> Iterator[str]:
         """Write the functions of the springs' own laws."""
         for name, spring in self.description.springs.items():
             if spring.law:
                 doc = f"Return the force of {name} at a stretch and its rate (N, N.m)."
-                yield function(f"{name}_law(x: float, v: float) -> float", doc, [f"return {spring.law}"])
+                p = ", p: Constants" if spring.constants else ""
+                text = with_constants(spring.law, spring.constants, name)
+                yield function(f"{name}_law(x: float, v: float{p}) -> float", doc, [f"return {text}"])
 
     def acting(self) -> Iterator[str]:
         """Write the function of the forces on all bodies and along all freedoms."""
@@ -111,8 +126,7 @@ class Motion:
                     f"force(p.{body}_mass * p.gx, p.{body}_mass * p.gy, m[{self.bodies.index(body)}].centre)"
                 )
         for name, spring in self.description.springs.items():
-            resists = self.resistance(name, spring)
-            pulls = f"p.{name}_stiffness * s.{name}_stretch" if given(spring.stiffness) else ""
+            resists, pulls = self.resistance(name, spring), self._pull(name, spring)
             if resists:
                 rows.append(f"{name}_resistance = {resists}")
                 lost.append(f"{name}_resistance * s.{name}_rate")
@@ -132,15 +146,15 @@ class Motion:
                         f = f"{sign}{name}_force * s."
                         on[self.owner(own)].append(f"force({f}{name}_x, {f}{name}_y, b.at_{own})")
                 continue
-            joint = self.structure.joints[spring.at]
-            first, second = joint.bodies
+            turned = self.turned(spring)
+            first, second = turned or self.structure.joints[spring.at].bodies
             for body, sign in ((second, "-"), (first, "")):
                 if body == GROUND or body not in on:
                     continue
-                if isinstance(joint, Pin):
+                if turned:
                     on[body].append(f"torque({sign}{name}_force)")
                 else:
-                    line, f = f"b.{joint.name}_line", f"{sign}{name}_force"
+                    line, f = f"b.{spring.at}_line", f"{sign}{name}_force"
                     on[body].append(f"force({f} * {line}.c, {f} * {line}.s, b.{second}_frame.origin)")
         for own in self.description.loads:
             on[self.owner(own)].append(f"force(i.{own}_load_x, i.{own}_load_y, b.at_{own})")

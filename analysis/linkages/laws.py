@@ -1,37 +1,42 @@
-"""Force laws of springs: formulas and tables, as straight lines of arithmetic."""
+"""Force laws of springs: formulas with constants, and tables, as straight lines of arithmetic."""
 
 from __future__ import annotations
 
 import ast
+import re
+from collections.abc import Mapping
 from itertools import pairwise
 from math import isfinite
 from typing import Any
 
 from linkwork.errors import ParameterError
 
-from ..files import Many, Quantity
+from ..files import Many, Quantity, as_table
+from ..units import quantity
 
 #: Functions of `math` that formulas may use.
 FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs")
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
 _ROWS = Many(Many(Quantity("1"), length=2), least=2)
+_WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
+#: Units that a constant of a law may have.
+_UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
 
 
 def law(value: Any, name: str) -> str:
-    """Read a force law, a formula in x and v or a table of (x, force), and return it as an expression in x and v.
+    """Read a force law, a formula or a table of (x, force), and return it as an expression in x, v and the constants.
 
     Raises
     ------
     ParameterError
-        If a formula has anything but arithmetic and functions of `math`, or the rows of a table are not in order.
+        If a formula has anything but names, arithmetic and functions of `math`, or the rows of a table are not in order.
     """
     if isinstance(value, list):
         return _table(_ROWS(value, name), name)
-    wanted = f"be a formula in x and v with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
     try:
         tree = ast.parse(str(value), mode="eval")
     except (SyntaxError, ValueError, RecursionError):
-        raise ParameterError(name, value, wanted) from None
+        raise ParameterError(name, value, _WANTED) from None
     called = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):
         right = (
@@ -41,13 +46,45 @@ def law(value: Any, name: str) -> str:
                 and len(node.args) == 1
                 and not node.keywords
             )
-            or (isinstance(node, ast.Name) and node.id in (FUNCTIONS if node in called else ("x", "v")))
+            or (isinstance(node, ast.Name) and (node.id in FUNCTIONS) == (node in called))
             or (isinstance(node, ast.Constant) and _finite(node.value))
             or isinstance(node, (*_NODES, ast.Load))
         )
         if not right:
-            raise ParameterError(name, value, wanted)
+            raise ParameterError(name, value, _WANTED)
     return ast.unparse(tree)
+
+
+def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
+    """Read the constants of a law, quantities of any usual dimension, and return their values in SI with their units."""
+    return {own: _constant(given, f"{name}.{own}") for own, given in as_table(value, name).items()}
+
+
+def _constant(value: Any, name: str) -> tuple[float, str]:
+    for unit in _UNITS:
+        try:
+            return quantity(value, unit, name), unit
+        except ParameterError:
+            continue
+    raise ParameterError(name, value, f"be a quantity with a unit, as of {', '.join(_UNITS[1:])}")
+
+
+def check_law(formula: str, known: Mapping[str, Any], name: str) -> None:
+    """Raise ParameterError where a law has names that are no constants, or a constant has a name of something else."""
+    names = {node.id for node in ast.walk(ast.parse(formula)) if isinstance(node, ast.Name)}
+    if not names <= {"x", "v", *FUNCTIONS, *known}:
+        raise ParameterError(name, formula, _WANTED)
+    for own in known:
+        if own in ("x", "v", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
+            where = f"{name.rpartition('.')[0]}.constants.{own}"
+            raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
+
+
+def with_constants(formula: str, known: Mapping[str, Any], prefix: str) -> str:
+    """Return a law with its constants as fields of the parameters p."""
+    if not known:
+        return formula
+    return re.sub(rf"\b({'|'.join(known)})\b", rf"p.{prefix}_\1", formula)
 
 
 def _finite(value: object) -> bool:

@@ -9,6 +9,7 @@ from itertools import chain
 from linkwork.errors import ParameterError
 
 from .description import GROUND, Description, LinkageError, given
+from .laws import check_law
 
 
 def check_entries(description: Description) -> None:
@@ -85,6 +86,10 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
         if ends and ends[0] & ends[1]:
             body, pair = min(ends[0] & ends[1]), " and ".join(spring.between)
             yield f"{where}.between", f"has {pair}, both of {body}", "they must be points of two bodies"
+        if spring.bodies and not (set(spring.bodies) <= {*d.bodies, GROUND} and len(set(spring.bodies)) == 2):
+            known = ", ".join((*d.bodies, GROUND))
+            yield f"{where}.bodies", f"are {' and '.join(spring.bodies)}", f"they must be two of {known}"
+        check_law(spring.law, spring.constants, f"linkage.{where}.law")
         acts = map(given, (spring.stiffness, spring.damping, spring.friction))
         if not (any(acts) or spring.law or spring.driven):
             yield where, "does nothing", "it must have a stiffness, damping, friction or law, or be driven"

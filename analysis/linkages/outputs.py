@@ -79,9 +79,12 @@ class Outputs:
                 yield Output(
                     f'output("{name}.length", "m", "Length of {name}", "", *POSITION)', f"s.{name}_stretch{free}"
                 )
-            elif name not in self.motion.along and isinstance(self.structure.joints[spring.at], Pin):
+            elif spring.at and name not in self.motion.along and self.motion.turned(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"
                 yield Output(f'output("{spring.at}.turn", "rad", {quoted(text)}, "", *POSITION)', f"s.{name}_stretch")
+            elif spring.bodies:
+                text = f"Angle by which {name} is twisted"
+                yield Output(f'output("{name}.turn", "rad", {quoted(text)}, "", *POSITION)', f"s.{name}_stretch")
         for dyad in self.structure.dyads:
             if dyad.kind == "RRR":
                 p, q = (side.joint.name for side in dyad.sides)
@@ -91,6 +94,13 @@ class Outputs:
                     '*POSITION, minimum=0.0, maximum=pi, display="deg", role="transmission")',
                     f"transmission(b.at_{p}, b.at_{c}, b.at_{q})",
                 )
+        for name, spring in self.description.springs.items():
+            if not spring.driven:
+                turned = self.motion.turned(spring)
+                what, unit = ("torque", "N.m") if turned else ("force", "N")
+                of = f", on the {turned[0]}" if turned else ""
+                text = f"{what.title()} of {name} against its stretch{of}"
+                yield Output(f'output("{name}.exerted_{what}", "{unit}", {quoted(text)})', self.motion.tension(name, spring))
         yield from self._joint_forces()
         yield from self._energy_outputs(n)
 

@@ -36,7 +36,7 @@ class Parameter(NamedTuple):
 class Drive(NamedTuple):
     """A freedom: its name, unit and place in the interface, its start, and the table of its inputs if it can be driven.
 
-    ``turns_back`` are the turns after which all bodies are in the same places; 0 where there are none.
+    ``commanded`` says whether its rate is commanded unless the mode says otherwise; ``turns_back`` are the turns after which all bodies are in the same places; 0 where there are none.
     """
 
     name: str
@@ -47,6 +47,7 @@ class Drive(NamedTuple):
     start: float
     speed: float
     table: str
+    commanded: bool
     turns_back: int
 
     @property
@@ -150,6 +151,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 Quantity(unit)(table.start, f"{where}.start"),
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
+                bool(inputs) and given(table.speed),
                 _turns_back(description, structure, len(found)) if turns else 0,
             )
         )
@@ -320,7 +322,7 @@ def _loads(
         if spring.driven and spring.between:
             yield Load(f"{name}.force", "N", f"Force that lengthens {name}", f"{name}.length")
         elif spring.driven:
-            about = isinstance(structure.joints[spring.at], Pin)
+            about = bool(spring.bodies) or isinstance(structure.joints[spring.at], Pin)
             yield Load(f"{name}.{'torque' if about else 'force'}", "N.m" if about else "N", f"Drive of {name}", "")
 
 
@@ -358,22 +360,23 @@ def _mass(name: str, body: Body) -> _Mass | None:
 def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
     """Yield the parameters of a spring, those that are given."""
     where = f"linkage.springs.{name}"
-    if bool(spring.between) == bool(spring.at):
+    if (bool(spring.between), bool(spring.at), bool(spring.bodies)).count(True) != 1:
         raise LinkageError(
-            f"{where} is between {spring.between or 'nothing'} and at {spring.at or 'nothing'}: it must have one"
+            f"{where} is between {spring.between or 'nothing'}, at {spring.at or 'nothing'} and of the bodies "
+            f"{spring.bodies or 'none'}: it must have one of these"
         )
     joint = structure.joints.get(spring.at)
     if spring.at and (joint is None or len(joint.bodies) != 2):
         names = ", ".join(n for n, j in structure.joints.items() if len(j.bodies) == 2)
         raise LinkageError(f"{where} is at {spring.at}: it must be at a joint of two bodies, {names}")
-    about = isinstance(joint, Pin)
+    about = isinstance(joint, Pin) or bool(spring.bodies)
     kind, unit = ("angle", "rad") if about else ("length" if spring.between else "position", "m")
     of = (
         f"{name}.length"
         if spring.between
         else drive.coordinate
         if drive
-        else f"{spring.at}.{'turn' if about else 'position'}"
+        else f"{spring.at or name}.{'turn' if about else 'position'}"
     )
     rows = (
         ("stiffness", spring.stiffness, "N.m/rad" if about else "N/m", f"Stiffness of {name}", "", "stiffness"),
@@ -388,6 +391,9 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
             yield Parameter(
                 f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else ""
             )
+    for own, (number, in_unit) in spring.constants.items():
+        text = f"Constant {own.replace('_', ' ')} of the law of {name}"
+        yield Parameter(f"{name}.{own}", in_unit, text, number, "free")
 
 
 def _check_names(found: list[Parameter]) -> None:

@@ -46,7 +46,8 @@ class Variables:
                 found |= {f"{name}_c": f"cos(self.{name}_direction)", f"{name}_s": f"sin(self.{name}_direction)"}
         freed = {drive.joint for drive in self.interface.drives}
         for name, spring in self.description.springs.items():
-            about = spring.at and spring.at not in freed and isinstance(self.structure.joints[spring.at], Pin)
+            pinned = spring.at and spring.at not in freed and isinstance(self.structure.joints[spring.at], Pin)
+            about = spring.bodies or pinned
             if about and given(spring.free):
                 found |= {f"{name}_c": f"cos(self.{name}_free_angle)", f"{name}_s": f"sin(self.{name}_free_angle)"}
         if self.description.gravity:
@@ -86,7 +87,7 @@ class Variables:
         for d in self.interface.drives:
             if d.table:
                 text = f"0: {d.table}.{d.load} acts; 1: the rate is {d.table}.speed"
-                yield f'Variable("{d.table}.mode", "parameter", "", "{text}", "", {int(d.speed != 0.0)}, "Integer", 0, 1)'
+                yield f'Variable("{d.table}.mode", "parameter", "", "{text}", "", {int(d.commanded)}, "Integer", 0, 1)'
         for s in self.starts:
             yield f'Variable("initial.{s.name}", "parameter", "{s.unit}", "At the start", "", {s.value!r}{display(s.unit)})'
         yield "tolerance_parameter()"
@@ -113,7 +114,7 @@ class Variables:
 
     def driven(self) -> str:
         """Return the entries of what the linkage is run at."""
-        driven = [d for d in self.interface.drives if d.table and d.speed != 0.0]
+        driven = [d for d in self.interface.drives if d.commanded]
         return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
 
     def freedoms(self) -> Iterator[str]:
@@ -122,7 +123,7 @@ class Variables:
             mode, period = "None", "0.0"
             if d.table:
                 arguments = f'("{self._argument(d, d.load)}", "{self._argument(d, "speed")}")'
-                mode = f'Mode("{d.table}.mode", ("{d.load}", "speed"), {arguments}, {int(d.speed != 0.0)})'
+                mode = f'Mode("{d.table}.mode", ("{d.load}", "speed"), {arguments}, {int(d.commanded)})'
                 period = f"{2.0 * d.turns_back} * pi" if d.turns_back else "0.0"
             start = f'("{_last(d, d.coordinate)}", "{_last(d, d.rate)}")'
             yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period})'
