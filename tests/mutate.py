@@ -6,7 +6,7 @@
 Cosmic Ray changes one operator or number at a time in a copy of the tree, and the tests run that `tool.mutation.tests` of
 pyproject.toml names for the module or its folder. Printed are the survivors, the mutants whose tests did not end, which count
 as killed, and the share of mutants that a test killed. With ``--sample`` so many mutants of all modules together are drawn,
-always the same ones while the code stays as it is, and the share has its Wilson interval of 95 %. They are tried as they are
+the same ones for the same ``--draw`` while the code stays as it is, and the share has its Wilson interval of 95 %. They are tried as they are
 drawn, so that those up to a Ctrl-C, which ends with the share so far, are a sample too.
 """
 
@@ -87,6 +87,7 @@ def main() -> None:
     parser = ArgumentParser(description="Mutation of modules or folders.")
     parser.add_argument("places", nargs="*", default=SETTINGS["default"])
     parser.add_argument("--sample", type=int)
+    parser.add_argument("--draw", type=int, default=1)
     arguments = parser.parse_args()
     console, sound = Console(emoji=False), set[str]()
     modules = [
@@ -100,7 +101,7 @@ def main() -> None:
         os.environ["PYTHONPATH"] = os.pathsep.join([f"{folder}/fmu_src", folder])
         found = [mutant for module in modules for mutant in mutants(module)]
         if arguments.sample is not None:
-            found = Random(1).sample(found, min(arguments.sample, len(found)))
+            found = Random(arguments.draw).sample(found, min(arguments.sample, len(found)))
         with suppress(KeyboardInterrupt):
             for mutant in found:
                 tests = tests_of(mutant.module_path)

@@ -560,6 +560,7 @@ class TestBadInput:
             ),
             (lambda: syn.Straight(start=3, end=3, rotation=1.0), "it must run forward"),
             (lambda: syn.Straight(start=0, end=3, rotation=0.0), "crank rotation of the straight part is 0.0"),
+            (lambda: syn.Straight(start=0, end=3, rotation=6.3), "crank rotation of the straight part is 6.3"),
             (lambda: syn.Straight(start=0, end=3, rotation=1.0, flatness=0.0), "flatness is 0.0"),
         ],
     )

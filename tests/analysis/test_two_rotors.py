@@ -34,6 +34,7 @@ from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linear import find_equilibrium, linearise, linearise_along, settled_motion
 from analysis.mechanisms import MECHANISMS, register
 from analysis.periodic import Drive, Family, natural_frequency, orbit_of, stability_chart
+from analysis.periodic.motion.orbit import first_guess
 from analysis.run import load_case
 from analysis.studio.tables import tables_of
 from linkwork.errors import InputError
@@ -83,6 +84,15 @@ def test_the_motion_at_commanded_speeds_is_the_closed_form(ratio: Fraction) -> N
         np.sort_complex(orbit.multipliers), np.sort_complex(np.exp(roots * turn.period)), rtol=1e-8
     )
     assert orbit.determinant_by_liouville() == pytest.approx(np.exp(-K.c / K.mass * turn.period), rel=1e-8)
+
+
+def test_the_search_for_a_motion_begins_with_the_other_crank_at_its_ratio() -> None:
+    # on its motor the right rotor turns freely, one and a half times for each turn of the left one
+    motor = InductionMotor(breakdown_torque=0.2, breakdown_slip=0.2, synchronous_speed=61.0)
+    drive = Drive(speed=40.0, crank="left.speed", ratios={"right.speed": Fraction(3, 2)}, motors={"right.torque": motor})
+    flow = drive.flow(MECHANISM)
+    guess = first_guess(flow, drive, None)
+    assert dict(zip((name for name, _ in flow.components), guess))["right.speed_out"] == pytest.approx(60.0)
 
 
 def test_a_run_settles_on_it_and_the_balance_closes() -> None:

@@ -1,0 +1,253 @@
+"""Controllers that travel as Python FMUs: sampled, with everything between two samples held. Nothing of Linkwork is needed.
+
+An instant of sampling takes the inputs as they are then; what follows from them is there at the end of the communication step.
+A step shorter than the sample time therefore delays by itself, a step as long by one sample, as a computer does that needs that
+long for its answer.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, floor, pi, sin
+from typing import Any, ClassVar, NamedTuple
+from xml.etree.ElementTree import Element, SubElement
+
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
+from pythonfmu.variables import Integer, Real
+
+
+class Row(NamedTuple):
+    """A variable: a parameter, an input, an output, or a local one that is a state of the controller."""
+
+    name: str
+    causality: str
+    unit: str
+    start: float
+    text: str
+
+
+#: Exponents of the base units.
+UNITS: dict[str, dict[str, int]] = {
+    "s": {"s": 1},
+    "m": {"m": 1},
+    "m/s": {"m": 1, "s": -1},
+    "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N/m": {"kg": 1, "s": -2},
+    "N.s/m": {"kg": 1, "s": -1},
+    "N/(m.s)": {"kg": 1, "s": -3},
+    "N.m": {"kg": 1, "m": 2, "s": -2},
+    "N.m/A": {"kg": 1, "m": 2, "s": -2, "A": -1},
+    "A": {"A": 1},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "V/A": {"kg": 1, "m": 2, "s": -3, "A": -2},
+    "V.s/A": {"kg": 1, "m": 2, "s": -2, "A": -2},
+}
+
+
+class Controller(Fmi2Slave):
+    """What the controllers share. Each has its ``rows``, and `sample`, which reads and sets attributes of their names."""
+
+    rows: ClassVar[tuple[Row, ...]]
+
+    def __init__(self, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self.description = (type(self).__doc__ or "").strip().partition("\n")[0]
+        self.count = 0
+        self.author = "Linkwork"
+        period = Row("sample_time", "parameter", "s", 1e-3, "Time between two samples")
+        for row in (period, *self.rows):
+            setattr(self, row.name, row.start)
+            fixed = row.causality == "parameter"
+            self.register_variable(
+                Real(
+                    row.name,
+                    causality=Fmi2Causality[row.causality],
+                    variability=Fmi2Variability.fixed if fixed else Fmi2Variability.continuous,
+                    description=row.text,
+                )
+            )
+        text = "Number of the samples taken"
+        local, discrete = Fmi2Causality.local, Fmi2Variability.discrete
+        self.register_variable(Integer("count", causality=local, variability=discrete, description=text))
+
+    def to_xml(self, model_options: dict[str, str] = {}) -> Element:  # noqa: B006 - the signature is pythonfmu's
+        """Return the model description, with the units, which pythonfmu does not know."""
+        root = super().to_xml(model_options)
+        units = {"sample_time": "s", **{row.name: row.unit for row in self.rows if row.unit in UNITS}}
+        definitions = Element("UnitDefinitions")
+        for unit in dict.fromkeys(units.values()):
+            node = SubElement(definitions, "Unit", name=unit)
+            SubElement(node, "BaseUnit", {base: str(power) for base, power in UNITS[unit].items()})
+        root.insert([child.tag for child in root].index("LogCategories"), definitions)
+        for variable in root.iterfind("ModelVariables/ScalarVariable"):
+            if variable.get("name") in units:
+                variable[0].set("unit", units[str(variable.get("name"))])
+        return root
+
+    def exit_initialization_mode(self) -> None:
+        """Take the sample at the start."""
+        if not self.sample_time > 0.0:
+            self.log(f"sample_time is {self.sample_time} s: it must be above 0", Fmi2Status.error)
+            raise ValueError("sample_time")
+        self.count = 0
+        self._up_to(0.5 * self.sample_time)
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Take the samples whose instants are in the step, the one at its end left to the next."""
+        self._up_to(current_time + step_size)
+        return True
+
+    def _up_to(self, end: float) -> None:
+        while self.count * self.sample_time < end - 1e-6 * self.sample_time:
+            self.sample(self.count * self.sample_time)
+            self.count += 1
+
+    def sample(self, t: float) -> None:
+        """Set the outputs and states at an instant of sampling."""
+        raise NotImplementedError
+
+
+def _limited(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+class Pid(Controller):
+    """PID controller of a position by a force, with feed-forward and a limit that does not wind up the integral.
+
+    The derivative is that of the error behind a filter of first order. While the force is at its limit the integral is led back
+    with the tracking time (K. J. Astrom and T. Hagglund, Advanced PID Control, 2006, section 3.5).
+    """
+
+    rows = (
+        Row("gain", "parameter", "N/m", 0.0, "Force by the error"),
+        Row("integral_gain", "parameter", "N/(m.s)", 0.0, "Growth of the force by the error"),
+        Row("derivative_gain", "parameter", "N.s/m", 0.0, "Force by the rate of the error"),
+        Row("filter_time", "parameter", "s", 0.0, "Time constant of the filter before the derivative"),
+        Row("tracking_time", "parameter", "s", 0.1, "Time in which the integral follows the limit"),
+        Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force"),
+        Row("reference", "input", "m", 0.0, "What the position is to be"),
+        Row("measured", "input", "m", 0.0, "The position"),
+        Row("feed_forward", "input", "N", 0.0, "Force that is added"),
+        Row("force", "output", "N", 0.0, "The force"),
+        Row("error", "output", "m", 0.0, "Reference less position, at the last sample"),
+        Row("integral", "local", "N", 0.0, "Share of the integral"),
+        Row("derivative", "local", "N", 0.0, "Share of the derivative"),
+    )
+
+    def sample(self, t: float) -> None:
+        before, self.error = self.error, self.reference - self.measured
+        if self.count > 0:
+            change = self.derivative_gain * (self.error - before)
+            self.derivative = (self.filter_time * self.derivative + change) / (self.filter_time + self.sample_time)
+        wanted = self.gain * self.error + self.integral + self.derivative + self.feed_forward
+        self.force = _limited(wanted, self.limit)
+        back = (self.force - wanted) / self.tracking_time
+        self.integral += self.sample_time * (self.integral_gain * self.error + back)
+
+
+class StateFeedback(Controller):
+    """State feedback of position and velocity, as `linearise` and `lqr` give its gains, with feed-forward and a limit."""
+
+    rows = (
+        Row("position_gain", "parameter", "N/m", 0.0, "Force against the deviation of the position"),
+        Row("velocity_gain", "parameter", "N.s/m", 0.0, "Force against the deviation of the velocity"),
+        Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force"),
+        Row("reference", "input", "m", 0.0, "What the position is to be"),
+        Row("reference_velocity", "input", "m/s", 0.0, "What the velocity is to be"),
+        Row("position", "input", "m", 0.0, "The position"),
+        Row("velocity", "input", "m/s", 0.0, "The velocity"),
+        Row("feed_forward", "input", "N", 0.0, "Force that is added"),
+        Row("force", "output", "N", 0.0, "The force"),
+    )
+
+    def sample(self, t: float) -> None:
+        back = self.position_gain * (self.position - self.reference)
+        back += self.velocity_gain * (self.velocity - self.reference_velocity)
+        self.force = _limited(self.feed_forward - back, self.limit)
+
+
+#: Harmonics of a `MotionReference`.
+HARMONICS = 6
+
+
+def _series(name: str, unit: str, text: str) -> tuple[Row, ...]:
+    rows = [Row(f"{name}_0", "parameter", unit, 0.0, f"{text}, mean")]
+    for n in range(1, HARMONICS + 1):
+        rows.append(Row(f"{name}_cos_{n}", "parameter", unit, 0.0, f"{text}, cosine of {n} times the angle"))
+        rows.append(Row(f"{name}_sin_{n}", "parameter", unit, 0.0, f"{text}, sine of {n} times the angle"))
+    return tuple(rows)
+
+
+class MotionReference(Controller):
+    """A motion over the crank angle, and the force that goes with it: Fourier series of six harmonics."""
+
+    rows = (
+        *_series("motion", "m", "Position"),
+        *_series("load", "N", "Force"),
+        Row("angle", "input", "rad", 0.0, "Crank angle"),
+        Row("speed", "input", "rad/s", 0.0, "Crank speed"),
+        Row("position", "output", "m", 0.0, "Position there"),
+        Row("velocity", "output", "m/s", 0.0, "Its rate at that speed"),
+        Row("force", "output", "N", 0.0, "Force there"),
+    )
+
+    def sample(self, t: float) -> None:
+        self.position, slope = self._at("motion")
+        self.velocity = slope * self.speed
+        self.force, _ = self._at("load")
+
+    def _at(self, name: str) -> tuple[float, float]:
+        value, slope = getattr(self, f"{name}_0"), 0.0
+        for n in range(1, HARMONICS + 1):
+            a, b, angle = getattr(self, f"{name}_cos_{n}"), getattr(self, f"{name}_sin_{n}"), n * self.angle
+            value += a * cos(angle) + b * sin(angle)
+            slope += n * (b * cos(angle) - a * sin(angle))
+        return value, slope
+
+
+class DcServo(Controller):
+    """DC motor with a current loop, limits of voltage and current, and an encoder; its rotor belongs to the load.
+
+    Over a sample the voltage and the speed are held, and the current follows exactly.
+    """
+
+    rows = (
+        Row("resistance", "parameter", "V/A", 1.0, "Of the winding"),
+        Row("inductance", "parameter", "V.s/A", 1e-3, "Of the winding"),
+        Row("torque_constant", "parameter", "N.m/A", 0.1, "Torque by current, and voltage by speed"),
+        Row("voltage_limit", "parameter", "V", 24.0, "Greatest magnitude of the voltage"),
+        Row("current_limit", "parameter", "A", 10.0, "Greatest magnitude of the current that is asked for"),
+        Row("current_gain", "parameter", "V/A", 5.0, "Voltage by the error of the current"),
+        Row("encoder_counts", "parameter", "1", 4096.0, "Counts of the encoder in a turn"),
+        Row("torque_reference", "input", "N.m", 0.0, "What the torque is to be"),
+        Row("angle", "input", "rad", 0.0, "Angle of the shaft"),
+        Row("speed", "input", "rad/s", 0.0, "Speed of the shaft"),
+        Row("torque", "output", "N.m", 0.0, "Torque on the shaft"),
+        Row("current", "output", "A", 0.0, "Current of the winding"),
+        Row("encoder_angle", "output", "rad", 0.0, "Angle that the encoder tells"),
+        Row("voltage", "local", "V", 0.0, "Voltage since the last sample"),
+    )
+
+    def sample(self, t: float) -> None:
+        induced = self.torque_constant * self.speed
+        if self.count > 0:
+            end = (self.voltage - induced) / self.resistance
+            left = exp(-self.sample_time * self.resistance / self.inductance)
+            self.current = end + (self.current - end) * left
+        wanted = _limited(self.torque_reference / self.torque_constant, self.current_limit)
+        voltage = self.resistance * wanted + induced + self.current_gain * (wanted - self.current)
+        self.voltage = _limited(voltage, self.voltage_limit)
+        self.torque = self.torque_constant * self.current
+        count = 2.0 * pi / self.encoder_counts
+        self.encoder_angle = count * floor(self.angle / count)
+
+
+#: By the names that descriptions of systems use.
+CONTROLLERS: dict[str, type[Controller]] = {
+    "pid": Pid,
+    "state-feedback": StateFeedback,
+    "motion-reference": MotionReference,
+    "dc-servo": DcServo,
+}
