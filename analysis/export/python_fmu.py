@@ -67,7 +67,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
         stage = Path(folder) / "stage"
         stage.mkdir()
         staged = _stage(mechanism, sources, stage)
-        with _import_state():
+        with import_state():
             try:
                 described = _describe(staged)
                 raw = FmuBuilder.build_FMU(
@@ -157,7 +157,7 @@ def _describe(staged: _Staged) -> bytes:
 
 
 @contextmanager
-def _import_state() -> Iterator[None]:
+def import_state() -> Iterator[None]:
     """Undo the changes that pythonfmu's builder makes to the import state of this process."""
     path, modules = list(sys.path), set(sys.modules)
     writes_bytecode = sys.dont_write_bytecode

@@ -1,0 +1,269 @@
+"""A system as a file describes it: parts by what they are, connections, a run; from it come the FMUs and their wiring."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pythonfmu.builder import FmuBuilder
+
+from linkwork import __version__
+from linkwork.errors import ParameterError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import fmi_name
+
+from .. import files
+from ..export import NATIVE, build_native
+from ..export.python_fmu import import_state
+from ..files import Quantity, Table, entry, unknown_name
+from ..linkages import load_linkage
+from ..mechanisms import mechanism_of
+from ..numerics.cache import code_folder, put
+from ..run import load_case, published_case
+from ..units import quantity
+from .controllers import CONTROLLERS, UNITS
+from .wiring import End, Part, Wiring, WiringError
+
+HERE = resources.files(__package__)
+#: Described linkages that are partners of mechanisms.
+PARTNERS = ("induction-motor", "flywheel-gear", "line-shaft", "press-load")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartTable:
+    """A part: one of the first five, and what it starts with.
+
+    Attributes
+    ----------
+    case : str
+        A published set, or a case file or linkage: its parameters and its state at the start.
+    partner : str
+        One of `PARTNERS`.
+    controller : str
+        One of `CONTROLLERS`.
+    fmu : str
+        An FMU of any make, of FMI 2.0.
+    values : mapping
+        Parameters and inputs at the start by their FMI names; texts with units, or numbers in SI.
+    """
+
+    case: str = entry(files.text, "")
+    partner: str = entry(files.Choice(PARTNERS), "")
+    controller: str = entry(files.Choice(CONTROLLERS), "")
+    fmu: str = entry(files.text, "")
+    values: Mapping[str, Any] = entry(files.as_table, factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunTable:
+    """Stop time and communication step of a run (s)."""
+
+    stop_time: float = entry(Quantity("s", above=0.0), 1.0)
+    step: float = entry(Quantity("s", above=0.0), 1e-3)
+
+
+def _parts(value: Any, name: str) -> dict[str, PartTable]:
+    return {key: files.read(PartTable, v, f"{name}.{key}") for key, v in files.as_table(value, name).items()}
+
+
+def _connections(value: Any, name: str) -> dict[End, End]:
+    ends = {}
+    for target, source in files.as_table(value, name).items():
+        pair = []
+        for text in (target, files.text(source, f"{name}.{target}")):
+            part, dot, port = text.partition(".")
+            if not (part and dot and port):
+                raise ParameterError(f"{name}.{target}", text, "be a part and its variable, as in motor.rotor.speed")
+            pair.append(End(part, port))
+        ends[pair[0]] = pair[1]
+    return ends
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """A system as a file describes it.
+
+    Attributes
+    ----------
+    title : str
+    parts : mapping of str to PartTable
+    connections : mapping of End to End
+        The output that each input is connected to.
+    run : RunTable
+    folder : path
+        Against which file names are read.
+    """
+
+    title: str = entry(files.text, "")
+    parts: Mapping[str, PartTable] = entry(_parts)
+    connections: Mapping[End, End] = entry(_connections, factory=dict)
+    run: RunTable = entry(Table(RunTable), factory=RunTable)
+    folder: Path = entry(files.unchanged, Path())
+
+    @cached_property
+    def members(self) -> dict[str, Member]:
+        """The parts, with their mechanisms and the values they start with."""
+        return {name: self._member(name, table) for name, table in self.parts.items()}
+
+    def _member(self, name: str, table: PartTable) -> Member:
+        kinds = [k for k in ("case", "partner", "controller", "fmu") if getattr(table, k)]
+        if len(kinds) != 1:
+            raise WiringError(f"parts.{name} has {' and '.join(kinds) or 'nothing'}: it must have one of case, partner, "
+                              "controller and fmu")  # fmt: skip
+        where = f"parts.{name}.values"
+        if table.fmu:
+            values = {key: _number(value, f"{where}.{key}") for key, value in table.values.items()}
+            return Member(name=name, values=values, fmu=self.folder / table.fmu)
+        if table.controller:
+            rows = {row.name: row.unit for row in CONTROLLERS[table.controller].rows} | {"sample_time": "s"}
+            return Member(name=name, values=_read(table.values, rows, where), controller=table.controller)
+        parameters, initial, inputs = self._case(table)
+        mechanism = mechanism_of(parameters)
+        values = {fmi_name(key): float(value) for key, value in asdict(parameters).items()}
+        values |= {f"initial.{key}": float(value) for key, value in asdict(initial).items()}
+        units = {v.name: v.unit or "1" for v in mechanism.variables if v.causality in ("parameter", "input")}
+        return Member(
+            name=name,
+            values=values | inputs | self._modes(name, mechanism, inputs) | _read(table.values, units, where),
+            mechanism=mechanism,
+        )
+
+    def _case(self, table: PartTable) -> tuple[Any, Any, dict[str, float]]:
+        """Return parameters, state at the start, and the constant inputs that the case is driven by."""
+        if table.partner:
+            made = load_linkage(Path(str(HERE / "partners" / f"{table.partner}.toml")))
+            case = published_case(made.name)
+        elif Path(table.case).suffix:
+            case = load_case(self.folder / table.case)
+        else:
+            case = published_case(table.case)
+        mechanism = mechanism_of(case.parameters)
+        given = {c.name: getattr(case.inputs, c.argument, None) for c in mechanism.channels if c.kind == "command"}
+        return case.parameters, case.initial, {k: float(v) for k, v in given.items() if isinstance(v, int | float)}
+
+    def _modes(self, name: str, mechanism: Mechanism, inputs: Mapping[str, float]) -> dict[str, float]:
+        """Return the mode of each freedom: that of the input that is connected, or else that of the case."""
+        found = {}
+        for number, freedom in enumerate(mechanism.freedoms):
+            if freedom.mode is None:
+                continue
+            channels = [c for c in mechanism.channels if c.freedom == number and c.argument in freedom.mode.arguments]
+            wired = [c for c in channels if End(name, c.name) in self.connections]
+            driven = wired or [c for c in channels if c.name in inputs]
+            mode = freedom.mode.arguments.index(driven[0].argument) if driven else freedom.mode.default
+            found[freedom.mode.name] = float(mode)
+        return found
+
+    def wiring(self, folder: str | Path | None = None) -> Wiring:
+        """Return the wiring of the system, its FMUs built in a folder, by default one of the user's cache.
+
+        Raises
+        ------
+        BuildError
+            If an FMU cannot be built.
+        WiringError, UnknownNameError
+            If a connection cannot be right.
+        """
+        place = code_folder("systems") if folder is None else Path(folder)
+        parts = {name: Part.of(name, member.built(place), member.values) for name, member in self.members.items()}
+        return Wiring(
+            title=self.title,
+            parts=parts,
+            connections=self.connections,
+            stop_time=self.run.stop_time,
+            step=self.run.step,
+        )
+
+    def without_rates(self) -> System:
+        """Return the system without the connections of inputs that are rates of commanded speeds."""
+        rates = {
+            End(name, channel.name)
+            for name, member in self.members.items()
+            if member.mechanism is not None
+            for channel in member.mechanism.channels
+            if channel.kind == "rate"
+        }
+        return replace(self, connections={t: s for t, s in self.connections.items() if t not in rates})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """A part as it is described: one of a mechanism, a controller and an FMU, and the values it starts with (SI)."""
+
+    name: str
+    values: Mapping[str, float]
+    mechanism: Mechanism | None = None
+    controller: str = ""
+    fmu: Path | None = None
+
+    def built(self, folder: Path) -> Path:
+        """Return its FMU, built if it is not there."""
+        if self.fmu is not None:
+            return self.fmu
+        if self.mechanism is None:
+            return _controller_fmu(self.controller, folder)
+        key = _tag(*(Path(str(m.__file__)).read_text(encoding="utf-8") for m in self.mechanism.modules), __version__)
+        target = folder / key / NATIVE.file_name(self.mechanism)
+        return target if target.is_file() else build_native(self.mechanism, NATIVE, target.parent)
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(name, value, "be a number in the unit of the variable")
+    return float(value)
+
+
+def _read(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
+    """Read values by FMI name, each of its unit."""
+    for key in values:
+        if key not in units:
+            raise unknown_name(key, units, f"variable {key}, of {where}")
+    return {key: _of_unit(value, units[key], f"{where}.{key}") for key, value in values.items()}
+
+
+def _of_unit(value: Any, unit: str, name: str) -> float:
+    # what controllers have beyond mechanics is given in SI
+    return quantity(value, unit, name) if not {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1})) else _number(value, name)
+
+
+def _tag(*texts: str) -> str:
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:8]
+
+
+_SCRIPT = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\n    __doc__ = {kind}.__doc__\n"
+
+
+def _controller_fmu(name: str, folder: Path) -> Path:
+    """Build the Python FMU of a controller; it carries the module of the controllers under a name with its hash."""
+    text = (HERE / "controllers.py").read_text(encoding="utf-8")
+    kind, tag = CONTROLLERS[name].__name__, _tag(text)
+    target = folder / tag / f"{kind}Controller.fmu"
+    if target.is_file():
+        return target
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as stage, import_state():
+        module = Path(stage) / f"controllers_{tag}.py"
+        module.write_text(text, encoding="utf-8")
+        script = Path(stage) / f"{kind.lower()}_{tag}.py"
+        script.write_text(_SCRIPT.format(module=module.stem, kind=kind), encoding="utf-8")
+        options = {"canGetAndSetFMUstate": "true", "canHandleVariableCommunicationStepSize": "true"}
+        made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[module], **options)
+        put(target, made.read_bytes())
+    return target
+
+
+def load_system(path: str | Path) -> System:
+    """Read a system from a TOML file.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If it cannot be read, or an entry is not right.
+    """
+    return replace(files.read(System, files.read_tables(path), ""), folder=Path(path).parent)

@@ -1,0 +1,314 @@
+"""Running the parts of a system together, in equal communication steps.
+
+Over a step the inputs are what the outputs were at its start. How much better that can be, four couplings tell apart.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Mapping
+from ctypes import byref, c_void_p
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import extract
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.logging import addLoggerProxy
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ..files import unknown_name
+from ..numerics.workers import interruptible
+from ..run import CosimulationError, RunInterrupted, shown, unpacking_folder
+from .wiring import End, Part, Wiring
+
+#: How the inputs go over a step.
+COUPLINGS = {
+    "hold": "held at what the outputs were at its start",
+    "derivatives": "on straight lines with the slopes that the outputs had there, where a part takes such inputs",
+    "rollback": "on straight lines to what the outputs are at its end: the step is taken again from its start",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SystemRun:
+    """A run of a system.
+
+    Attributes
+    ----------
+    time : (N,) float array
+        Communication points (s).
+    values : mapping of str to (N,) float array
+        Every real output, as ``part.output``.
+    powers : mapping of str to (N,) float array
+        Of each power bond, named by its effort: the power that the coupling has brought in over the step that ends there, from
+        what its two parts were given (W); 0 where they agree.
+    status : int
+        0, or 3 where a part refused a step: the data end before it.
+    message : str
+        What it said.
+    notes : tuple of str
+        What is perhaps not meant.
+    coupling : str
+    """
+
+    time: NDArray[np.float64]
+    values: Mapping[str, NDArray[np.float64]]
+    powers: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    status: int = 0
+    message: str = ""
+    notes: tuple[str, ...] = ()
+    coupling: str = "hold"
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        if name not in self.values:
+            raise unknown_name(name, self.values, f"output {name!r}")
+        return self.values[name]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+class _Instance:
+    """An instance of a part, initialised by `start`."""
+
+    def __init__(self, part: Part) -> None:
+        self.part = part
+        self.messages: list[str] = []
+        self.outputs = part.named("output")
+        self._references = [part.ports[name].reference for name in self.outputs]
+        interface = part.description.coSimulation
+        self.takes_slopes = bool(interface.canInterpolateInputs)
+        self.goes_back = bool(interface.canGetAndSetFMUstate)
+        wrapped = str(part.description.generationTool).startswith("PythonFMU")
+        self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
+        try:
+            extract(str(part.fmu), self._folder)
+            self._fmu = FMU2Slave(
+                guid=part.description.guid,
+                unzipDirectory=self._folder,
+                modelIdentifier=interface.modelIdentifier,
+                instanceName=part.name,
+            )
+            self._callbacks = fmi2CallbackFunctions()
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+            addLoggerProxy(byref(self._callbacks))
+            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+        except BaseException:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+
+    def _log(self, *arguments: Any) -> None:
+        self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
+
+    def begin(self) -> None:
+        """Set the start values and enter the initialisation."""
+        self._fmu.setupExperiment(startTime=0.0)
+        for name, value in self.part.values.items():
+            port = self.part.ports[name]
+            set_as = {"Real": (self._fmu.setReal, float), "Boolean": (self._fmu.setBoolean, bool)}
+            setter, kind = set_as.get(port.type, (self._fmu.setInteger, int))
+            setter([port.reference], [kind(value)])
+        self._fmu.enterInitializationMode()
+
+    def begun(self) -> None:
+        self._fmu.exitInitializationMode()
+
+    def read(self) -> NDArray[np.float64]:
+        """Return all real outputs."""
+        return np.array(self._fmu.getReal(self._references))
+
+    def put(self, values: Mapping[str, float], slopes: Mapping[str, float]) -> None:
+        """Set inputs, and their slopes where it takes them."""
+        references = [self.part.ports[name].reference for name in values]
+        if references:
+            self._fmu.setReal(references, list(values.values()))
+            if slopes and self.takes_slopes:
+                self._fmu.setRealInputDerivatives(references, [1] * len(references), [slopes[name] for name in values])
+
+    def step(self, time: float, step: float) -> None:
+        self._fmu.doStep(time, step)
+
+    def saved(self) -> Any:
+        return self._fmu.getFMUState()
+
+    def restore(self, state: Any) -> None:
+        self._fmu.setFMUState(state)
+
+    def forget(self, state: Any) -> None:
+        self._fmu.freeFMUState(c_void_p(getattr(state, "value", state)))
+
+    def close(self) -> None:
+        try:
+            self._fmu.freeInstance()
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class _Together:
+    """All instances of a system, their inputs and outputs at the present communication point."""
+
+    def __init__(self, wiring: Wiring) -> None:
+        self.wiring = wiring
+        self.instances: dict[str, _Instance] = {}
+        try:
+            for name, part in wiring.parts.items():
+                self.instances[name] = _Instance(part)
+            for instance in self.instances.values():
+                instance.begin()
+            # what depends directly on an input settles after as many rounds as there are parts
+            for _ in self.instances:
+                self.outputs = self._read()
+                self._exchange(self.outputs, {})
+            for instance in self.instances.values():
+                instance.begun()
+        except BaseException as error:
+            said = [text for instance in self.instances.values() for text in instance.messages]
+            self.close()
+            if isinstance(error, FMICallException):
+                raise CosimulationError("; ".join(said) or f"{wiring.title}: {error}") from error
+            raise
+        self.rate = {
+            End(name, port.rate_of): End(name, port.name)
+            for name, part in wiring.parts.items()
+            for port in part.ports.values()
+            if port.rate_of and port.causality == "output"
+        }
+        self.outputs = self._read()
+
+    def _read(self) -> dict[End, float]:
+        return {
+            End(name, output): float(value)
+            for name, instance in self.instances.items()
+            for output, value in zip(instance.outputs, instance.read())
+        }
+
+    def _exchange(self, outputs: Mapping[End, float], slopes: Mapping[End, float], *, middle: float = 0.0) -> None:
+        """Set all connected inputs; a part that takes no slopes gets the value after ``middle`` (s)."""
+        for name, instance in self.instances.items():
+            own = {target.port: source for target, source in self.wiring.connections.items() if target.part == name}
+            ahead = 0.0 if instance.takes_slopes else middle
+            values = {port: outputs[source] + ahead * slopes.get(source, 0.0) for port, source in own.items()}
+            instance.put(values, {port: slopes.get(source, 0.0) for port, source in own.items()} if slopes else {})
+
+    def step(self, coupling: str, time: float, step: float) -> None:
+        """Take a step."""
+        before, slopes = self.outputs, {}
+        if coupling == "derivatives":
+            slopes = {end: before[rate] for end, rate in self.rate.items() if rate in before}
+        states = {name: each.saved() for name, each in self.instances.items()} if coupling == "rollback" else {}
+        try:
+            self._exchange(before, slopes)
+            self._go(time, step)
+            if coupling == "rollback":
+                there = self._read()
+                for name, state in states.items():
+                    self.instances[name].restore(state)
+                slopes = {end: (value - before[end]) / step for end, value in there.items()}
+                self._exchange(before, slopes, middle=0.5 * step)
+                self._go(time, step)
+        finally:
+            for name, state in states.items():
+                self.instances[name].forget(state)
+        self.before, self.outputs = before, self._read()
+
+    def _go(self, time: float, step: float) -> None:
+        for instance in self.instances.values():
+            instance.step(time, step)
+
+    def powers(self) -> dict[str, float]:
+        """Return the power that each bond's coupling has brought in, from the outputs at both ends of the last step (W)."""
+        return {
+            str(bond.effort): self.before[bond.effort] * self.outputs[bond.flow]
+            - self.outputs[bond.effort] * self.before[bond.flow]
+            for bond in self.wiring.bonds()
+        }
+
+    def close(self) -> None:
+        for instance in self.instances.values():
+            instance.close()
+
+
+def run_system(
+    wiring: Wiring,
+    *,
+    coupling: str = "hold",
+    step: float | None = None,
+    stop_time: float | None = None,
+    progress: bool = False,
+) -> SystemRun:
+    """Run the FMUs of a system together.
+
+    Parameters
+    ----------
+    wiring : Wiring
+    coupling : str
+        One of `COUPLINGS`.
+    step, stop_time : float, optional
+        Communication step and end (s); by default the wiring's.
+    progress : bool
+
+    Returns
+    -------
+    SystemRun
+        A refused step ends it, with all data before and what the part said.
+
+    Raises
+    ------
+    CosimulationError
+        If a part cannot be loaded or initialised.
+    InputError
+        If the step is not positive and below the stop time, or a part cannot go back to the start of a step.
+    """
+    if coupling not in COUPLINGS:
+        raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
+    step, stop_time = wiring.step if step is None else step, wiring.stop_time if stop_time is None else stop_time
+    if not 0.0 < step <= stop_time:
+        raise InputError(f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s")
+    together = _Together(wiring)
+    rows: list[dict[End, float]] = [together.outputs]
+    powers: list[dict[str, float]] = [dict.fromkeys(map(str, (b.effort for b in wiring.bonds())), 0.0)]
+    status, message, count = 0, "", round(stop_time / step)
+    try:
+        stuck = [name for name, each in together.instances.items() if not each.goes_back]
+        if coupling == "rollback" and stuck:
+            raise InputError(f"{stuck[0]} cannot go back to the start of a step: the coupling must be another than rollback")
+        with interruptible() as interrupted, shown(progress, stop_time, "running the system") as show:
+            for number in range(count):
+                try:
+                    together.step(coupling, number * step, step)
+                except FMICallException as error:
+                    status, message = 3, _said(together, number * step, error)
+                    break
+                rows.append(together.outputs)
+                powers.append(together.powers())
+                show((number + 1) * step)
+                if interrupted:
+                    break
+    finally:
+        together.close()
+    run = SystemRun(
+        time=step * np.arange(len(rows)),
+        values={str(end): np.array([row[end] for row in rows]) for end in rows[0]},
+        powers={name: np.array([row[name] for row in powers]) for name in powers[0]},
+        status=status,
+        message=message,
+        notes=tuple(wiring.notes()),
+        coupling=coupling,
+    )
+    if interrupted:
+        raise RunInterrupted(run)
+    return run
+
+
+def _said(together: _Together, time: float, error: FMICallException) -> str:
+    """Return what the part that refused a step said last."""
+    for name, instance in together.instances.items():
+        if instance.messages:
+            return f"{name} refused the step from t = {time:.9g} s: {instance.messages[-1]}"
+    return f"a part refused the step from t = {time:.9g} s: {error}"

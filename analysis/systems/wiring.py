@@ -1,0 +1,213 @@
+"""What a system consists of once its FMUs are there: parts with ports, connections between them, and whether these can be right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from linkwork.errors import LinkworkError
+
+from ..files import check_fmu, unknown_name
+from ..run import read_description
+
+
+class WiringError(LinkworkError):
+    """A system is wired wrongly: the sentence says which connection, and what would be right."""
+
+
+class Port(NamedTuple):
+    """A variable of an FMU: its type in FMI 2.0, its unit, and the variable that it is the time derivative of, if any."""
+
+    name: str
+    reference: int
+    causality: str
+    type: str
+    unit: str
+    rate_of: str
+
+
+class End(NamedTuple):
+    """A port of a part, by both names."""
+
+    part: str
+    port: str
+
+    def __str__(self) -> str:
+        return f"{self.part}.{self.port}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """An FMU of a system.
+
+    Attributes
+    ----------
+    name : str
+    fmu : path
+        Of FMI 2.0, for co-simulation.
+    ports : mapping of str to Port
+        All its variables.
+    values : mapping of str to float
+        Start values by variable; all others start as the FMU has them.
+    feeds : mapping of str to tuple of str
+        Inputs on which an output depends directly, by its name.
+    description : object
+        FMPy's reading of the model description.
+    """
+
+    name: str
+    fmu: Path
+    ports: Mapping[str, Port]
+    values: Mapping[str, float]
+    feeds: Mapping[str, tuple[str, ...]]
+    description: Any
+
+    @classmethod
+    def of(cls, name: str, fmu: str | Path, values: Mapping[str, float]) -> Part:
+        """Read a part from its FMU.
+
+        Raises
+        ------
+        InputError
+            If the file is no FMU.
+        WiringError
+            If it is not for co-simulation of FMI 2.0, or has no parameter or input of a name in ``values``.
+        """
+        check_fmu(fmu)
+        description = read_description(fmu)
+        if description.coSimulation is None or not description.fmiVersion.startswith("2"):
+            raise WiringError(
+                f"{name}: {Path(fmu).name} is of FMI {description.fmiVersion}: a part must be for co-simulation of FMI 2.0"
+            )
+        ports = {
+            v.name: Port(
+                v.name, v.valueReference, v.causality, v.type, v.unit or "", v.derivative.name if v.derivative else ""
+            )
+            for v in description.modelVariables
+        }
+        settable = [port.name for port in ports.values() if port.causality in ("parameter", "input")]
+        for known in values:
+            if known not in settable:
+                raise unknown_name(known, settable, f"parameter or input {known} of {name}")
+        # a Python FMU says nothing of dependencies, and answers at its next step
+        feeds = {
+            unknown.variable.name: tuple(v.name for v in unknown.dependencies if v.causality == "input")
+            for unknown in description.outputs
+            if unknown.dependencies
+        }
+        return cls(name=name, fmu=Path(fmu), ports=ports, values=values, feeds=feeds, description=description)
+
+    def named(self, causality: str) -> tuple[str, ...]:
+        """Return the names of all real variables of a causality."""
+        return tuple(p.name for p in self.ports.values() if p.causality == causality and p.type == "Real")
+
+
+class Bond(NamedTuple):
+    """Two connections in opposite directions whose product is a power: an effort to ``load``, a flow back to ``source``."""
+
+    effort: End
+    effort_to: End
+    flow: End
+    flow_to: End
+
+
+#: Units whose product is a power, effort first.
+_POWERS = (("N.m", "rad/s"), ("N", "m/s"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wiring:
+    """Parts and what connects them.
+
+    Attributes
+    ----------
+    title : str
+    parts : mapping of str to Part
+    connections : mapping of End to End
+        The output that each input is connected to.
+    stop_time, step : float
+        Of a run, and the usual communication step (s).
+
+    Raises
+    ------
+    WiringError, UnknownNameError
+        If a connection cannot be right.
+    """
+
+    title: str
+    parts: Mapping[str, Part]
+    connections: Mapping[End, End]
+    stop_time: float
+    step: float
+
+    def __post_init__(self) -> None:
+        for target, source in self.connections.items():
+            for end, causality in ((target, "input"), (source, "output")):
+                if end.part not in self.parts:
+                    raise unknown_name(end.part, self.parts, f"part {end.part}, of {source} -> {target}")
+                part = self.parts[end.part]
+                if end.port not in part.ports:
+                    raise unknown_name(end.port, part.named(causality), f"{causality} {end}, of {source} -> {target}")
+                found = part.ports[end.port].causality
+                if found != causality:
+                    raise WiringError(f"{source} -> {target}: {end} is of causality {found}, it must be an {causality}")
+            units = [self.port(end).unit for end in (source, target)]
+            if units[0] != units[1]:
+                said = [unit or "without a unit" for unit in units]
+                raise WiringError(
+                    f"{source} -> {target}: the units do not match, {said[0]} and {said[1]}; they must be the same"
+                )
+
+    def port(self, end: End) -> Port:
+        """Return a port."""
+        return self.parts[end.part].ports[end.port]
+
+    def notes(self) -> list[str]:
+        """Return sentences on what is possible but perhaps not meant: unconnected inputs, algebraic loops."""
+        found = []
+        for name, part in self.parts.items():
+            free = [i for i in part.named("input") if End(name, i) not in self.connections and i not in part.values]
+            if free:
+                found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
+        found += [
+            f"algebraic loop {' -> '.join(map(str, loop))}: each step works with values of the step before"
+            for loop in self.loops()
+        ]
+        return found
+
+    def loops(self) -> Iterator[list[End]]:
+        """Yield the algebraic loops: outputs that depend on themselves within an instant, each once."""
+        after: dict[End, list[End]] = {}
+        for target, source in self.connections.items():
+            for output, inputs in self.parts[target.part].feeds.items():
+                if target.port in inputs:
+                    after.setdefault(source, []).append(End(target.part, output))
+        connected = set(self.connections.values())
+        seen: set[frozenset[End]] = set()
+
+        def walk(path: list[End]) -> Iterator[list[End]]:
+            for end in after.get(path[-1], ()):
+                if end in path:
+                    loop = path[path.index(end) :]
+                    if frozenset(loop) not in seen:
+                        seen.add(frozenset(loop))
+                        yield [*loop, end]
+                elif end in connected:
+                    yield from walk([*path, end])
+
+        for source in dict.fromkeys(self.connections.values()):
+            yield from walk([source])
+
+    def bonds(self) -> list[Bond]:
+        """Return the power bonds: an effort and a flow between the same two parts, in opposite directions, without rivals."""
+        found = [
+            Bond(source, target, flow, flow_to)
+            for target, source in self.connections.items()
+            for flow_to, flow in self.connections.items()
+            if (flow.part, flow_to.part) == (target.part, source.part)
+            and (self.port(source).unit, self.port(flow).unit) in _POWERS
+        ]
+        efforts, flows = [bond.effort_to for bond in found], [bond.flow_to for bond in found]
+        return [b for b in found if efforts.count(b.effort_to) == 1 and flows.count(b.flow_to) == 1]
