@@ -6,7 +6,6 @@ model description comes with the archive.
 
 from __future__ import annotations
 
-import atexit
 import ctypes
 import json
 import sys
@@ -31,6 +30,7 @@ from linkwork.errors import (
 from linkwork.mechanism import Mechanism
 from linkwork.plant import TOLERANCE_RANGE, Plant
 from linkwork.variables import Variable
+from linkwork.wrapper import end_library_in_order, keep_namespace
 
 STATUS_GOOD = 0
 STATUS_NOT_INITIALISED = 5
@@ -58,25 +58,6 @@ INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
     "running",
     "terminated",
 )
-
-#: Libraries of FMUs that `_end_library_in_order` has seen to.
-_libraries: set[Path] = set()
-
-
-def _end_library_in_order(resources: str, model: str) -> None:
-    """Make the wrapper's library release the interpreter when Python ends, not while the process is torn down.
-
-    On Linux the library clears its pointer to the interpreter's state in a destructor that runs after the pointer itself
-    was destroyed: a use after free that now and then aborts a process whose run was good. Cleared before, it is harmless.
-    """
-    library = Path(resources).parent / "binaries" / "linux64" / f"{model}.so"
-    if not sys.platform.startswith("linux") or library in _libraries or not library.is_file():
-        return
-    _libraries.add(library)
-    finalize = getattr(ctypes.CDLL(str(library)), "finalizePythonInterpreter", None)
-    if finalize is not None:
-        atexit.register(finalize)
-
 
 def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
     """Make a method that the wrapper calls safe to raise from.
@@ -115,15 +96,13 @@ class LinkworkSlave(Fmi2Slave):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         cls.variables = cls.mechanism.variables
-        # To find the class the wrapper runs its module's source again, at every instantiation, and then gives up a reference
-        # to the module's namespace that it only borrowed: without one more each time the namespace dies with all its names
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(vars(sys.modules[cls.__module__])))
+        keep_namespace(cls)
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._wrapped = "logger" in kwargs
         if self._wrapped:
-            _end_library_in_order(self.resources, type(self).__name__)
+            end_library_in_order(self.resources, type(self).__name__)
             # put there by the wrapper at each instantiation; everything is imported by now
             if self.resources in sys.path:
                 sys.path.remove(self.resources)

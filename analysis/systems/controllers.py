@@ -1,4 +1,4 @@
-"""Controllers that travel as Python FMUs: sampled, with everything between two samples held. Nothing of Linkwork is needed.
+"""Controllers that travel as Python FMUs: sampled, with everything between two samples held.
 
 An instant of sampling takes the inputs as they are then; what follows from them is there at the end of the communication step.
 A step shorter than the sample time therefore delays by itself, a step as long by one sample, as a computer does that needs that
@@ -14,6 +14,8 @@ from xml.etree.ElementTree import Element, SubElement
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
 from pythonfmu.variables import Integer, Real
+
+from linkwork.wrapper import end_library_in_order, keep_namespace
 
 
 class Row(NamedTuple):
@@ -51,20 +53,26 @@ class Controller(Fmi2Slave):
 
     rows: ClassVar[tuple[Row, ...]]
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        keep_namespace(cls)
+
     def __init__(self, **keywords: Any) -> None:
         super().__init__(**keywords)
+        if "logger" in keywords:
+            end_library_in_order(self.resources, type(self).__name__)
         self.description = (type(self).__doc__ or "").strip().partition("\n")[0]
         self.count = 0
         self.author = "Linkwork"
         period = Row("sample_time", "parameter", "s", 1e-3, "Time between two samples")
         for row in (period, *self.rows):
             setattr(self, row.name, row.start)
-            fixed = row.causality == "parameter"
+            sampled = "continuous" if row.causality == "input" else "discrete"
             self.register_variable(
                 Real(
                     row.name,
                     causality=Fmi2Causality[row.causality],
-                    variability=Fmi2Variability.fixed if fixed else Fmi2Variability.continuous,
+                    variability=Fmi2Variability["fixed" if row.causality == "parameter" else sampled],
                     description=row.text,
                 )
             )

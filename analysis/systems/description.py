@@ -8,12 +8,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib import resources
+from inspect import getsource
 from pathlib import Path
 from typing import Any
 
 from pythonfmu.builder import FmuBuilder
 
-from linkwork import __version__
+from linkwork import __version__, wrapper
 from linkwork.errors import ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
@@ -139,7 +140,7 @@ class System:
         if table.partner:
             made = load_linkage(Path(str(HERE / "partners" / f"{table.partner}.toml")))
             case = published_case(made.name)
-        elif Path(table.case).suffix:
+        elif Path(table.case).suffix in (".toml", ".json"):
             case = load_case(self.folder / table.case)
         else:
             case = published_case(table.case)
@@ -241,19 +242,22 @@ _SCRIPT = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\n   
 
 def _controller_fmu(name: str, folder: Path) -> Path:
     """Build the Python FMU of a controller; it carries the module of the controllers under a name with its hash."""
-    text = (HERE / "controllers.py").read_text(encoding="utf-8")
-    kind, tag = CONTROLLERS[name].__name__, _tag(text)
+    text, shared = (HERE / "controllers.py").read_text(encoding="utf-8"), getsource(wrapper)
+    kind, tag = CONTROLLERS[name].__name__, _tag(text, shared)
     target = folder / tag / f"{kind}Controller.fmu"
     if target.is_file():
         return target
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as stage, import_state():
-        module = Path(stage) / f"controllers_{tag}.py"
-        module.write_text(text, encoding="utf-8")
+        package, module = Path(stage) / f"linkwork_{tag}", Path(stage) / f"controllers_{tag}.py"
+        package.mkdir()
+        (package / "__init__.py").touch()
+        (package / "wrapper.py").write_text(shared, encoding="utf-8")
+        module.write_text(text.replace("from linkwork.", f"from linkwork_{tag}."), encoding="utf-8")
         script = Path(stage) / f"{kind.lower()}_{tag}.py"
         script.write_text(_SCRIPT.format(module=module.stem, kind=kind), encoding="utf-8")
         options = {"canGetAndSetFMUstate": "true", "canHandleVariableCommunicationStepSize": "true"}
-        made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[module], **options)
+        made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[package, module], **options)
         put(target, made.read_bytes())
     return target
 

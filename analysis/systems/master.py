@@ -173,13 +173,21 @@ class _Together:
             if isinstance(error, FMICallException):
                 raise CosimulationError("; ".join(said) or f"{wiring.title}: {error}") from error
             raise
-        self.rate = {
+        rates = {
             End(name, port.rate_of): End(name, port.name)
             for name, part in wiring.parts.items()
             for port in part.ports.values()
             if port.rate_of and port.causality == "output"
         }
-        self.outputs = self._read()
+        #: Of each connected input the output with its rate, or the source itself where none is known; None where there is no
+        #: slope to be given: the rate is an input, too, or the source is held.
+        self.rate = {
+            target: None
+            if wiring.port(source).held or wiring.rate_input(target) in wiring.connections
+            else rates.get(source, source)
+            for target, source in wiring.connections.items()
+        }
+        self.outputs = self.before = self._read()
 
     def _read(self) -> dict[End, float]:
         return {
@@ -191,16 +199,23 @@ class _Together:
     def _exchange(self, outputs: Mapping[End, float], slopes: Mapping[End, float], *, middle: float = 0.0) -> None:
         """Set all connected inputs; a part that takes no slopes gets the value after ``middle`` (s)."""
         for name, instance in self.instances.items():
-            own = {target.port: source for target, source in self.wiring.connections.items() if target.part == name}
+            own = {t: source for t, source in self.wiring.connections.items() if t.part == name}
             ahead = 0.0 if instance.takes_slopes else middle
-            values = {port: outputs[source] + ahead * slopes.get(source, 0.0) for port, source in own.items()}
-            instance.put(values, {port: slopes.get(source, 0.0) for port, source in own.items()} if slopes else {})
+            values = {t.port: outputs[source] + ahead * slopes.get(t, 0.0) for t, source in own.items()}
+            instance.put(values, {t.port: slopes.get(t, 0.0) for t in own} if slopes else {})
+
+    def _slopes(self, step: float) -> dict[End, float]:
+        """Return the slopes of all connected inputs, those without a known rate from the step before."""
+        found = {}
+        for target, rate in self.rate.items():
+            source = self.wiring.connections[target]
+            if rate is not None:
+                found[target] = self.outputs[rate] if rate != source else (self.outputs[source] - self.before[source]) / step
+        return found
 
     def step(self, coupling: str, time: float, step: float) -> None:
         """Take a step."""
-        before, slopes = self.outputs, {}
-        if coupling == "derivatives":
-            slopes = {end: before[rate] for end, rate in self.rate.items() if rate in before}
+        before, slopes = self.outputs, {} if coupling == "hold" else self._slopes(step)
         states = {name: each.saved() for name, each in self.instances.items()} if coupling == "rollback" else {}
         try:
             self._exchange(before, slopes)
@@ -209,12 +224,16 @@ class _Together:
                 there = self._read()
                 for name, state in states.items():
                     self.instances[name].restore(state)
-                slopes = {end: (value - before[end]) / step for end, value in there.items()}
+                for target, source in self.wiring.connections.items():
+                    if self.rate[target] is not None:
+                        slopes[target] = (there[source] - before[source]) / step
                 self._exchange(before, slopes, middle=0.5 * step)
                 self._go(time, step)
         finally:
             for name, state in states.items():
                 self.instances[name].forget(state)
+        # what depends directly on inputs belongs to those that begin here
+        self._exchange(self._read(), {})
         self.before, self.outputs = before, self._read()
 
     def _go(self, time: float, step: float) -> None:

@@ -18,7 +18,10 @@ class WiringError(LinkworkError):
 
 
 class Port(NamedTuple):
-    """A variable of an FMU: its type in FMI 2.0, its unit, and the variable that it is the time derivative of, if any."""
+    """A variable of an FMU: its type in FMI 2.0, its unit, and the variable that it is the time derivative of, if any.
+
+    ``held`` says that it changes at instants only.
+    """
 
     name: str
     reference: int
@@ -26,6 +29,7 @@ class Port(NamedTuple):
     type: str
     unit: str
     rate_of: str
+    held: bool
 
 
 class End(NamedTuple):
@@ -83,7 +87,13 @@ class Part:
             )
         ports = {
             v.name: Port(
-                v.name, v.valueReference, v.causality, v.type, v.unit or "", v.derivative.name if v.derivative else ""
+                v.name,
+                v.valueReference,
+                v.causality,
+                v.type,
+                v.unit or "",
+                v.derivative.name if v.derivative else "",
+                v.variability in ("discrete", "constant", "fixed"),
             )
             for v in description.modelVariables
         }
@@ -111,6 +121,11 @@ class Bond(NamedTuple):
     effort_to: End
     flow: End
     flow_to: End
+
+
+def _table(name: str) -> str:
+    """Return what an input belongs to, such as drive of drive.speed; the name itself where it has no dot."""
+    return name.rpartition(".")[0] or name
 
 
 #: Units whose product is a power, effort first.
@@ -164,11 +179,19 @@ class Wiring:
         """Return a port."""
         return self.parts[end.part].ports[end.port]
 
+    def rate_input(self, end: End) -> End | None:
+        """Return the input that is the rate of change of an input: of the same table, and of its unit by the second."""
+        unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
+        inputs = (End(end.part, name) for name in self.parts[end.part].named("input") if _table(name) == _table(end.port))
+        return next((other for other in inputs if self.port(other).unit == unit), None)
+
     def notes(self) -> list[str]:
         """Return sentences on what is possible but perhaps not meant: unconnected inputs, algebraic loops."""
         found = []
         for name, part in self.parts.items():
-            free = [i for i in part.named("input") if End(name, i) not in self.connections and i not in part.values]
+            inputs = part.named("input")
+            served = {_table(i) for i in inputs if End(name, i) in self.connections or i in part.values}
+            free = [i for i in inputs if _table(i) not in served]
             if free:
                 found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
         found += [

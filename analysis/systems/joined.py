@@ -1,0 +1,192 @@
+"""A system as one model: the equations of all mechanisms joined, integrated by SciPy, the truth that couplings are measured by.
+
+A commanded speed is here the speed that it is connected to, at every instant, and its rate the derivative of that. Controllers
+take their samples at their instants, and what they answer acts at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from linkwork.errors import IntegrationError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
+
+from ..numerics import symbolic
+from ..run import expressions
+from .controllers import CONTROLLERS, Controller
+from .description import Member, System
+from .master import SystemRun
+from .wiring import End, WiringError
+
+
+class _Model:
+    """A mechanism of the system: its symbols, its numbers, its state at the start."""
+
+    def __init__(self, member: Member, mechanism: Mechanism) -> None:
+        self.mechanism, values = mechanism, member.values
+        names = {v.name for v in mechanism.variables}
+        fields = {field_name(name): v for name, v in values.items() if name in names}
+        kept = set(mechanism.parameters.__dataclass_fields__)  # type: ignore[attr-defined]
+        whole = mechanism.first_set.parameters
+        numbers = {k: type(getattr(whole, k))(v) for k, v in fields.items() if k in kept}
+        self.parameters = mechanism.parameters(**numbers)
+        start = {n.removeprefix("initial."): v for n, v in values.items() if n.startswith("initial.")}
+        self.initial = mechanism.initial(**start)
+        self.modes = [float(values[mode.name]) for mode in mechanism.modes]
+        self.p = self.parameters.constants()
+        self.traced = expressions(mechanism, mechanism.switched(self.p))
+        self.start = np.array(mechanism.state(self.initial))
+        self.energy = mechanism.equations.energy(self.start.tolist(), self.p)
+        self.rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
+        self.constants = [float(values.get(channel.name, 0.0)) for channel in mechanism.channels]
+
+    def commanded(self) -> dict[int, str]:
+        """Return the freedoms whose rates are commanded, with the input's name."""
+        chosen = {mode.name: int(value) for mode, value in zip(self.mechanism.modes, self.modes)}
+        commands = (self.mechanism.channels[number] for number in self.mechanism.commands(chosen))
+        return {channel.freedom: channel.name for channel in commands}
+
+
+class Joined:
+    """The system as one set of equations.
+
+    Parameters
+    ----------
+    system : System
+        All parts mechanisms or controllers.
+
+    Raises
+    ------
+    WiringError
+        If a part is an FMU, of which no equations are known, or there is a loop whose values depend on each other otherwise
+        than linearly.
+    """
+
+    def __init__(self, system: System) -> None:
+        casadi = symbolic.library()
+        self.system = system
+        self.models: dict[str, _Model] = {}
+        self.controllers: dict[str, Controller] = {}
+        for name, member in system.members.items():
+            if member.mechanism is not None:
+                self.models[name] = _Model(member, member.mechanism)
+            elif member.controller:
+                self.controllers[name] = CONTROLLERS[member.controller](instance_name=name)
+                for key, value in member.values.items():
+                    setattr(self.controllers[name], key, value)
+            else:
+                raise WiringError(f"{name} is an FMU: there are no equations of it to join")
+        self.given = [s for s in dict.fromkeys(system.connections.values()) if s.part in self.controllers]
+        held = casadi.SX.sym("held", len(self.given))
+        wires: dict[End, Any] = {end: held[n] for n, end in enumerate(self.given)}
+
+        def wire(source: End) -> Any:
+            return wires.setdefault(source, casadi.SX.sym(str(source)))
+
+        states, slopes, outputs = [], [], {}
+        for name, model in self.models.items():
+            m, s = model.mechanism, model.traced.symbols
+            x, n = casadi.SX.sym(name, m.size), len(m.freedoms)
+            sources = {c.name: system.connections.get(End(name, c.name)) for c in m.channels}
+            u = [casadi.SX(value) if sources[c.name] is None else wire(sources[c.name])
+                 for c, value in zip(m.channels, model.constants)]  # fmt: skip
+            inside = casadi.vertsplit(x)
+            for freedom, command in model.commanded().items():
+                number = next(k for k, c in enumerate(m.channels) if c.name == command)
+                rate = next(k for k, c in enumerate(m.channels) if c.freedom == freedom and c.kind == "rate")
+                inside[n + freedom], source = u[number], sources[command]
+                if source is not None and source.part in self.models:
+                    u[rate] = wire(End(source.part, self.models[source.part].rate_of[source.port]))
+            own = casadi.vertcat(*inside)
+            put = [casadi.vertcat(*u) if u else casadi.SX(0, 1), casadi.DM(model.modes), own]
+            numbers = [casadi.DM([*model.p, model.energy])]
+
+            def of(what: Any, s: Any = s, put: Any = put, numbers: Any = numbers) -> Any:
+                return casadi.substitute([what], [s.u, s.modes, s.x, s.p], [*put, *numbers])[0]
+
+            slope = casadi.vertsplit(of(model.traced.derivative))
+            for freedom in model.commanded():
+                slope[n + freedom] = casadi.SX(0)
+            states.append(x)
+            slopes += slope
+            outputs |= {End(name, out): v for out, v in zip(m.output_names, casadi.vertsplit(of(model.traced.outputs)))}
+        open_ends = [end for end in wires if end.part in self.models]
+        found = self._settled(casadi, [wires[end] for end in open_ends], [outputs[end] for end in open_ends])
+        self.names = list(outputs)
+
+        def closed(what: list[Any]) -> Any:
+            return casadi.substitute(casadi.vertcat(*what), casadi.vertcat(*(wires[end] for end in open_ends)), found)
+
+        symbols = [casadi.vertcat(*states), held]
+        self._slope = casadi.Function("slope", symbols, [closed(slopes)], {"cse": True})
+        self._outputs = casadi.Function("outputs", symbols, [closed(list(outputs.values()))], {"cse": True})
+        self.start = np.concatenate([model.start for model in self.models.values()])
+
+    def _settled(self, casadi: Any, symbols: list[Any], values: list[Any]) -> Any:
+        """Return what the wires carry as expressions of the states alone."""
+        if not symbols:
+            return casadi.SX(0, 1)
+        w, found = casadi.vertcat(*symbols), casadi.vertcat(*values)
+        for _ in symbols:
+            found = casadi.substitute(found, w, found) if casadi.depends_on(found, w) else found
+            if not casadi.depends_on(found, w):
+                return found
+        found = casadi.vertcat(*values)
+        matrix = casadi.jacobian(found - w, w)
+        if casadi.depends_on(matrix, w):
+            raise WiringError("an algebraic loop of the system is not linear: it cannot be joined to one model")
+        return -casadi.solve(matrix, casadi.substitute(found - w, w, casadi.SX.zeros(len(symbols))))
+
+    def run(self, stop_time: float, step: float, *, tolerance: float = 1e-12) -> SystemRun:
+        """Integrate by SciPy's DOP853, and return all outputs at multiples of a step.
+
+        Raises
+        ------
+        IntegrationError
+            If it does not reach the end.
+        """
+        times = step * np.arange(round(stop_time / step) + 1)
+        period = min((c.sample_time for c in self.controllers.values()), default=stop_time)  # type: ignore[attr-defined]
+        marks = np.unique(np.concatenate([period * np.arange(round(stop_time / period) + 1), [stop_time]]))
+        x, rows, kept = self.start, [], []
+        for begin, end in zip(marks[:-1], marks[1:]):
+            held = self._sampled(float(begin), x)
+            inside = times[(times >= begin - 1e-9 * step) & (times < end - 1e-9 * step)]
+            found = solve_ivp(
+                lambda t, x, held=held: self._slope(x, held).full().ravel(), (begin, end), x, "DOP853",
+                t_eval=np.clip([*inside, end], begin, end), rtol=tolerance, atol=1e-3 * tolerance,
+            )  # fmt: skip
+            if not found.success:
+                raise IntegrationError(f"the joined system was not integrated past t = {found.t[-1]:.9g} s: {found.message}")
+            kept += list(inside)
+            rows += [self._outputs(state, held).full().ravel() for state in found.y.T[:-1]]
+            x = found.y[:, -1]
+        rows.append(self._outputs(x, self._sampled(float(marks[-1]), x)).full().ravel())
+        values = np.array(rows)
+        return SystemRun(
+            time=np.array([*kept, stop_time]),
+            values={str(name): values[:, k] for k, name in enumerate(self.names)},
+            coupling="joined",
+        )
+
+    def _sampled(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the controllers hold from an instant of sampling on; each sees what the others held until then."""
+
+        def held() -> NDArray[np.float64]:
+            return np.array([getattr(self.controllers[end.part], end.port) for end in self.given])
+
+        due = {name: c for name, c in self.controllers.items() if c.count * c.sample_time <= t + 1e-6 * c.sample_time}
+        told = dict(zip(self.names, self._outputs(x, held()).full().ravel())) | dict(zip(self.given, held()))
+        for target, source in self.system.connections.items():
+            if target.part in due:
+                setattr(due[target.part], target.port, told[source])
+        for controller in due.values():
+            controller.sample(t)
+            controller.count += 1
+        return held()

@@ -1,0 +1,35 @@
+"""What a slave must do because of pythonfmu's wrapper, the library that calls it."""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import sys
+from pathlib import Path
+
+#: Libraries of FMUs that `end_library_in_order` has seen to.
+_libraries: set[Path] = set()
+
+
+def end_library_in_order(resources: str, model: str) -> None:
+    """Make the wrapper's library release the interpreter when Python ends, not while the process is torn down.
+
+    On Linux the library clears its pointer to the interpreter's state in a destructor that runs after the pointer itself
+    was destroyed: a use after free that now and then aborts a process whose run was good. Cleared before, it is harmless.
+    """
+    library = Path(resources).parent / "binaries" / "linux64" / f"{model}.so"
+    if not sys.platform.startswith("linux") or library in _libraries or not library.is_file():
+        return
+    _libraries.add(library)
+    finalize = getattr(ctypes.CDLL(str(library)), "finalizePythonInterpreter", None)
+    if finalize is not None:
+        atexit.register(finalize)
+
+
+def keep_namespace(kind: type) -> None:
+    """Keep the names of a slave's module alive.
+
+    To find the class the wrapper runs its module's source again, at every instantiation, and then gives up a reference to the
+    module's namespace that it only borrowed: without one more each time the namespace dies with all its names.
+    """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(vars(sys.modules[kind.__module__])))
