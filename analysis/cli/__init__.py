@@ -40,6 +40,7 @@ COMMANDS = {
     "stability": ("vibration", "Judge the periodic motion and chart where it is unstable."),
     "studio": ("studio", "Open a page on which a mechanism moves and can be dragged."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
+    "system": ("system", "Wire FMUs to a system: run, check, draw, write SSP."),
     "tune": ("tuning", "Change parameters least so that a range of speeds is clear."),
     "verify": ("verify", "Run the experiments that an FMU carries, and compare."),
 }

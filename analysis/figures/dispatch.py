@@ -42,6 +42,7 @@ MODULES = (
     "slider_crank_picture",
     "tuning",
     "scheme",
+    "systems",
 )
 #: Those that register the picture of a mechanism.
 MECHANISMS = ("linkage", "slider_crank_picture")

@@ -1,0 +1,10 @@
+"""Systems of FMUs: partners of the mechanisms, files of SSP, a master, and how far its couplings can be trusted.
+
+The public names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

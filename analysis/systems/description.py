@@ -271,3 +271,8 @@ def load_system(path: str | Path) -> System:
         If it cannot be read, or an entry is not right.
     """
     return replace(files.read(System, files.read_tables(path), ""), folder=Path(path).parent)
+
+
+def library() -> dict[str, Path]:
+    """Return the systems that come with Linkwork, by name."""
+    return {Path(str(path)).stem: Path(str(path)) for path in sorted((HERE / "library").iterdir(), key=str)}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from ctypes import byref, c_void_p
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +25,7 @@ from linkwork.errors import InputError
 from ..files import unknown_name
 from ..numerics.workers import interruptible
 from ..run import CosimulationError, RunInterrupted, shown, unpacking_folder
-from .wiring import End, Part, Wiring
+from .wiring import Bond, End, Part, Wiring
 
 #: How the inputs go over a step.
 COUPLINGS = {
@@ -46,24 +46,34 @@ class SystemRun:
     values : mapping of str to (N,) float array
         Every real output, as ``part.output``.
     powers : mapping of str to (N,) float array
-        Of each power bond, named by its effort: the power that the coupling has brought in over the step that ends there, from
-        what its two parts were given (W); 0 where they agree.
+        Of each power bond, named by its effort, the power residual: what the coupling has brought in at the end of the step that
+        ends there, since either part knew the other only from its start (W).
+    flows : mapping of str to (N,) float array
+        Power that goes through each bond (W).
     status : int
         0, or 3 where a part refused a step: the data end before it.
     message : str
         What it said.
     notes : tuple of str
         What is perhaps not meant.
-    coupling : str
+    title, coupling : str
+    units : mapping of str to str
+        Of the outputs.
+    connected : tuple of str
+        Outputs that another part has as an input.
     """
 
     time: NDArray[np.float64]
     values: Mapping[str, NDArray[np.float64]]
     powers: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    flows: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     status: int = 0
     message: str = ""
     notes: tuple[str, ...] = ()
+    title: str = ""
     coupling: str = "hold"
+    units: Mapping[str, str] = field(default_factory=dict)
+    connected: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         if name not in self.values:
@@ -72,6 +82,11 @@ class SystemRun:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def brought_in(self) -> float:
+        """Return the work that the coupling brought in, as a share of the work that went through all bonds; 0 without bonds."""
+        through = sum(float(np.abs(flow).sum()) for flow in self.flows.values())
+        return sum(float(np.abs(power).sum()) for power in self.powers.values()) / through if through > 0.0 else 0.0
 
 
 class _Instance:
@@ -237,15 +252,15 @@ class _Together:
         self.before, self.outputs = before, self._read()
 
     def _go(self, time: float, step: float) -> None:
-        for instance in self.instances.values():
+        for self.stepping, instance in self.instances.items():
             instance.step(time, step)
 
-    def powers(self) -> dict[str, float]:
+    def powers(self, bonds: Iterable[Bond]) -> dict[str, float]:
         """Return the power that each bond's coupling has brought in, from the outputs at both ends of the last step (W)."""
         return {
             str(bond.effort): self.before[bond.effort] * self.outputs[bond.flow]
             - self.outputs[bond.effort] * self.before[bond.flow]
-            for bond in self.wiring.bonds()
+            for bond in bonds
         }
 
     def close(self) -> None:
@@ -291,7 +306,8 @@ def run_system(
         raise InputError(f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s")
     together = _Together(wiring)
     rows: list[dict[End, float]] = [together.outputs]
-    powers: list[dict[str, float]] = [dict.fromkeys(map(str, (b.effort for b in wiring.bonds())), 0.0)]
+    bonds = wiring.bonds()
+    powers: list[dict[str, float]] = [{str(bond.effort): 0.0 for bond in bonds}]
     status, message, count = 0, "", round(stop_time / step)
     try:
         stuck = [name for name, each in together.instances.items() if not each.goes_back]
@@ -305,7 +321,7 @@ def run_system(
                     status, message = 3, _said(together, number * step, error)
                     break
                 rows.append(together.outputs)
-                powers.append(together.powers())
+                powers.append(together.powers(bonds))
                 show((number + 1) * step)
                 if interrupted:
                     break
@@ -315,10 +331,14 @@ def run_system(
         time=step * np.arange(len(rows)),
         values={str(end): np.array([row[end] for row in rows]) for end in rows[0]},
         powers={name: np.array([row[name] for row in powers]) for name in powers[0]},
+        flows={str(b.effort): np.array([row[b.effort] * row[b.flow] for row in rows]) for b in bonds},
         status=status,
         message=message,
         notes=tuple(wiring.notes()),
+        title=wiring.title,
         coupling=coupling,
+        units={str(end): wiring.port(end).unit for end in rows[0]},
+        connected=tuple(map(str, dict.fromkeys(wiring.connections.values()))),
     )
     if interrupted:
         raise RunInterrupted(run)
@@ -326,8 +346,6 @@ def run_system(
 
 
 def _said(together: _Together, time: float, error: FMICallException) -> str:
-    """Return what the part that refused a step said last."""
-    for name, instance in together.instances.items():
-        if instance.messages:
-            return f"{name} refused the step from t = {time:.9g} s: {instance.messages[-1]}"
-    return f"a part refused the step from t = {time:.9g} s: {error}"
+    """Return that a part refused a step, and what was said last; FMPy tells the messages of all FMUs to one of them."""
+    said = [text for instance in together.instances.values() for text in instance.messages]
+    return f"{together.stepping} refused the step from t = {time:.9g} s: {said[-1] if said else error}"

@@ -194,10 +194,10 @@ class Wiring:
             free = [i for i in inputs if _table(i) not in served]
             if free:
                 found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
-        found += [
-            f"algebraic loop {' -> '.join(map(str, loop))}: each step works with values of the step before"
-            for loop in self.loops()
-        ]
+        if loops := sorted(self.loops(), key=len):
+            more = f", and {len(loops) - 1} more" if len(loops) > 1 else ""
+            shortest = " -> ".join(map(str, loops[0]))
+            found.append(f"algebraic loop {shortest}{more}: each step works with values of the step before")
         return found
 
     def loops(self) -> Iterator[list[End]]:

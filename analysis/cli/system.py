@@ -1,0 +1,155 @@
+"""`linkwork system`: systems of FMUs, from a description or a file of SSP."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from . import Commands
+from .common import ENDED_EARLY, folder_of, handled, out_option, plot_option, plotted, print_error, quantity, say, show_table
+
+if TYPE_CHECKING:
+    from ..systems import Wiring
+
+
+@click.group("system", cls=Commands)
+def system() -> None:
+    """Systems of FMUs: mechanisms with motors, shafts, loads and controllers.
+
+    A FILE is a description (.toml) or an archive of SSP 1.0 (.ssp).
+
+    \b
+    Examples:
+      linkwork system new motor-crank
+      linkwork system run motor-crank.toml --stop '3 s'
+      linkwork system check motor-crank.toml
+      linkwork system build motor-crank.toml
+      linkwork system run out/motor-crank.ssp --stop '3 s' --coupling derivatives
+    """
+
+
+_FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False))
+
+
+def _wiring(file: str) -> Wiring:
+    from ..systems import load_system, read_ssp
+
+    return read_ssp(file) if Path(file).suffix == ".ssp" else load_system(file).wiring()
+
+
+@system.command()
+@click.argument("name", required=False)
+@click.argument("file", required=False, type=click.Path(dir_okay=False))
+@handled
+def new(name: str | None, file: str | None) -> None:
+    """Write the description of a system to begin with, by its NAME; without a name list them."""
+    from ..files import read_tables, unknown_name, write_text
+    from ..systems import library
+
+    known = library()
+    if name is None:
+        show_table("systems", ("name", "what"), [(n, read_tables(p)["title"]) for n, p in known.items()], words=("name", "what"))
+        return
+    if name not in known:
+        raise unknown_name(name, known, f"system {name!r}")
+    path = write_text(file or f"{name}.toml", known[name].read_text(encoding="utf-8"))
+    say(f"wrote {path}: linkwork system run {path}")
+
+
+@system.command()
+@_FILE
+@out_option(help="Folder for the archive.")
+@handled
+def build(file: str, out: str) -> None:
+    """Build the FMUs of a system and write it as an archive of SSP 1.0."""
+    from ..systems import write_ssp
+
+    say(f"wrote {write_ssp(_wiring(file), folder_of(out) / f'{Path(file).stem}.ssp')}")
+
+
+@system.command()
+@_FILE
+@click.option("--step", help="Communication step, such as '1 ms'.")
+@click.option("--stop", help="End of the run, such as '3 s'.")
+@click.option("--coupling", default="hold", show_default=True, help="How inputs go over a step: hold, derivatives, rollback.")
+@out_option()
+@plot_option
+@handled
+def run(file: str, step: str | None, stop: str | None, coupling: str, out: str, plot: bool) -> None:
+    """Run a system: a table of its connected outputs, all outputs as CSV, a plot."""
+    from ..files import write_csv
+    from ..systems import run_system
+    from ..units import display_of
+
+    found = run_system(
+        _wiring(file),
+        coupling=coupling,
+        step=None if step is None else quantity(step, "s", "--step"),
+        stop_time=None if stop is None else quantity(stop, "s", "--stop"),
+        progress=True,
+    )
+    rows = []
+    for name in found.connected:
+        unit, factor = display_of(found.units[name])
+        values = factor * found[name]
+        rows.append((name, unit, f"{values.min():.6g}", f"{values.max():.6g}", f"{values[-1]:.6g}"))
+    title = f"{found.title}  ({len(found)} communication points to t = {found.time[-1]:g} s, coupling: {coupling})"
+    show_table(title, ("output", "unit", "least", "greatest", "at the end"), rows, words=("output", "unit"))
+    for note in found.notes:
+        print_error(f"note: {note}")
+    if found.powers:
+        say(f"work that the coupling brought in: {100.0 * found.brought_in():.2g} % of what went through the power bonds")
+    folder, stem = folder_of(out), Path(file).stem
+    residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
+    say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
+    for path in plotted(plot, found, folder / f"{stem}.png"):
+        say(f"wrote {path}")
+    if found.status:
+        print_error(found.message)
+        raise SystemExit(ENDED_EARLY)
+
+
+@system.command()
+@_FILE
+@click.option("--stop", help="End of the runs, such as '0.2 s'.")
+@out_option(help="Folder for the plot.")
+@plot_option
+@handled
+def check(file: str, stop: str | None, out: str, plot: bool) -> None:
+    """Check the wiring of a system; of a description measure the error of each coupling over the step, too.
+
+    The truth that errors are relative to is the system as one model, by SciPy at a tolerance of 1e-12.
+    """
+    from ..systems import convergence, load_system
+
+    wiring = _wiring(file)
+    bonds = wiring.bonds()
+    say(f"{wiring.title}: {len(wiring.parts)} parts, {len(wiring.connections)} connections, {len(bonds)} power bonds; all match")
+    for bond in bonds:
+        say(f"power bond {bond.effort} -> {bond.effort_to}, back {bond.flow} -> {bond.flow_to}")
+    for note in wiring.notes():
+        print_error(f"note: {note}")
+    if Path(file).suffix == ".ssp":
+        return
+    found = convergence(load_system(file), stop_time=None if stop is None else quantity(stop, "s", "--stop"))
+    rows = [
+        (f"{1e3 * step:.4g}", *(f"{errors[n]:.2e}" for errors in found.errors.values())) for n, step in enumerate(found.steps)
+    ]
+    rows.append(("order", *(f"{found.order(way):.2f}" for way in found.errors)))
+    show_table("greatest relative error of the connected outputs", ("step [ms]", *found.errors), rows)
+    for when, message in found.messages.items():
+        print_error(f"note: {when}: {message}")
+    for path in plotted(plot, found, folder_of(out) / f"{Path(file).stem}-check.png"):
+        say(f"wrote {path}")
+
+
+@system.command()
+@_FILE
+@out_option(help="Folder for the picture.")
+@handled
+def draw(file: str, out: str) -> None:
+    """Draw the parts of a system and their connections."""
+    for path in plotted(True, _wiring(file), folder_of(out) / f"{Path(file).stem}-diagram.png"):
+        say(f"wrote {path}")

@@ -1,0 +1,101 @@
+"""Pictures of systems: the diagram, a run with its power residuals, the error of couplings over the step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.patches import FancyBboxPatch
+
+from ..systems import Convergence, SystemRun, Wiring, boxes
+from ..units import display_of
+from .dispatch import plot
+from .style import COLOURS, LINE, SMALL, THIN, TINY, Figure, finish, styled, write_title
+
+#: Room that a connection keeps from the parts, and between two connections (mm).
+_CLEAR, _LANE = 8.0, 5.0
+
+
+@plot.register
+def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
+    """Draw the parts of a system with their connected ports, and the connections."""
+    placed = boxes(wiring)
+    lowest = min(box.bottom for box in placed.values())
+    width = max(box.right for box in placed.values()) + 60.0
+    with styled():
+        lanes = len(wiring.connections) * _LANE
+        figure = Figure(figsize=(max(6.0, width / 30.0), max(2.6, (lanes + 40.0 - lowest) / 28.0)))
+        axes = figure.add_subplot()
+        for name, box in placed.items():
+            size = (box.right - box.left, box.top - box.bottom)
+            axes.add_patch(
+                FancyBboxPatch(
+                    (box.left, box.bottom), *size, boxstyle="round,pad=0,rounding_size=2", fc="0.96", ec="0.3", lw=THIN, zorder=3
+                )
+            )
+            axes.text(box.left + 0.5 * size[0], box.top - 5.5, name, ha="center", va="center", weight="bold", zorder=4)
+            for ports, x, align in ((box.inputs, box.left + 2.0, "left"), (box.outputs, box.right - 2.0, "right")):
+                for port in ports:
+                    axes.text(x, box.height_of(port), port, ha=align, va="center", fontsize=TINY, zorder=4)
+        for number, (target, source) in enumerate(wiring.connections.items()):
+            start, end = placed[source.part], placed[target.part]
+            path = _path((start.right, start.height_of(source.port)), (end.left, end.height_of(target.port)), number, lowest)
+            colour = COLOURS[number % len(COLOURS)]
+            axes.plot(*zip(*path[:-1]), color=colour, lw=LINE)
+            for (x, y), (to_x, to_y) in pairwise(path[-2:]):
+                axes.annotate("", (to_x, to_y), (x, y), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": LINE})
+        axes.set_aspect("equal")
+        axes.axis("off")
+        write_title(figure, title or wiring.title)
+        return finish(figure)
+
+
+def _path(
+    start: tuple[float, float], end: tuple[float, float], number: int, lowest: float
+) -> list[tuple[float, float]]:
+    """Return a connection's corners: straight to a part on the right, else below all parts and back."""
+    lane = _CLEAR + _LANE * (number % 9)
+    if end[0] > start[0]:
+        x = end[0] - lane
+        return [start, (x, start[1]), (x, end[1]), end]
+    below = lowest - _CLEAR - _LANE * number
+    return [start, (start[0] + lane, start[1]), (start[0] + lane, below), (end[0] - lane, below), (end[0] - lane, end[1]), end]
+
+
+@plot.register
+def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "") -> Figure:
+    """Draw outputs of a run over time, by default those that are connected, accelerations left out, and the power residuals."""
+    names = names or [name for name in run.connected if not name.endswith("acceleration")]
+    with styled():
+        rows = len(names) + bool(run.powers)
+        figure = Figure(figsize=(7.0, 1.4 + 1.5 * rows))
+        axes = np.atleast_1d(figure.subplots(rows, sharex=True))
+        for place, name in zip(axes, names):
+            unit, factor = display_of(run.units[name])
+            place.plot(run.time, factor * run[name])
+            place.set_ylabel(f"{name}\n[{unit}]", fontsize=SMALL)
+        for name, power in run.powers.items():
+            axes[-1].plot(run.time, power, label=name)
+        if run.powers:
+            axes[-1].set_ylabel("power residual\n[W]", fontsize=SMALL)
+            axes[-1].legend()
+        axes[-1].set_xlabel("time [s]")
+        write_title(figure, title or f"{run.title}, coupling: {run.coupling}")
+        return finish(figure)
+
+
+@plot.register
+def plot_convergence(found: Convergence, *, title: str = "") -> Figure:
+    """Draw the error of each coupling over the communication step, with its order."""
+    with styled():
+        figure = Figure(figsize=(6.0, 4.2))
+        axes = figure.add_subplot()
+        for way, errors in found.errors.items():
+            order = found.order(way)
+            axes.loglog(found.steps, errors, "o-", ms=3.5, label=f"{way}: order {order:.2f}")
+        axes.set(xlabel="communication step [s]", ylabel="greatest relative error of the connected outputs")
+        axes.legend()
+        write_title(figure, title or found.title)
+        return finish(figure)
+
