@@ -12,7 +12,6 @@ import sys
 import zlib
 from collections.abc import Callable
 from functools import wraps
-from pathlib import Path
 from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
@@ -58,6 +57,7 @@ INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
     "running",
     "terminated",
 )
+
 
 def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
     """Make a method that the wrapper calls safe to raise from.

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from click.testing import CliRunner, Result
 from hypothesis import settings
 
+from analysis import cli
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from benchmarks.studio import chromium
 from build_fmu import FMUS
@@ -114,3 +116,14 @@ def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
     made = launched()
     yield made
     made.close()
+
+
+@pytest.fixture
+def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """The command line, called with words in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: object) -> Result:
+        return CliRunner().invoke(cli.main, [str(word) for word in words], catch_exceptions=False)
+
+    return call

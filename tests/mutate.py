@@ -5,9 +5,9 @@
 
 Cosmic Ray changes one operator or number at a time in a copy of the tree, and the tests run that `tool.mutation.tests` of
 pyproject.toml names for the module or its folder. Printed are the survivors, the mutants whose tests did not end, which count
-as killed, and the share of mutants that a test killed. With ``--sample`` so many mutants of all modules together are drawn,
-the same ones for the same ``--draw`` while the code stays as it is, and the share has its Wilson interval of 95 %. They are tried as they are
-drawn, so that those up to a Ctrl-C, which ends with the share so far, are a sample too.
+as killed, and the share of mutants that a test killed. With ``--sample`` so many mutants of all modules together are drawn, the
+same ones for the same ``--draw`` while the code stays as it is, and the share has its Wilson interval of 95 %. They are tried
+as they are drawn, so that those up to a Ctrl-C, which ends with the share so far, are a sample too.
 """
 
 from __future__ import annotations

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING
 import click
 
 from . import Commands
-from .common import ENDED_EARLY, folder_of, handled, out_option, plot_option, plotted, print_error, quantity, say, show_table
+from .common import (
+    ENDED_EARLY,
+    folder_of,
+    handled,
+    out_option,
+    plot_option,
+    plotted,
+    print_error,
+    quantity,
+    say,
+    show_table,
+)
 
 if TYPE_CHECKING:
     from ..systems import Wiring
@@ -50,7 +61,12 @@ def new(name: str | None, file: str | None) -> None:
 
     known = library()
     if name is None:
-        show_table("systems", ("name", "what"), [(n, read_tables(p)["title"]) for n, p in known.items()], words=("name", "what"))
+        show_table(
+            "systems",
+            ("name", "what"),
+            [(n, read_tables(p)["title"]) for n, p in known.items()],
+            words=("name", "what"),
+        )
         return
     if name not in known:
         raise unknown_name(name, known, f"system {name!r}")
@@ -73,7 +89,9 @@ def build(file: str, out: str) -> None:
 @_FILE
 @click.option("--step", help="Communication step, such as '1 ms'.")
 @click.option("--stop", help="End of the run, such as '3 s'.")
-@click.option("--coupling", default="hold", show_default=True, help="How inputs go over a step: hold, derivatives, rollback.")
+@click.option(
+    "--coupling", default="hold", show_default=True, help="How inputs go over a step: hold, derivatives, rollback."
+)
 @out_option()
 @plot_option
 @handled
@@ -100,7 +118,9 @@ def run(file: str, step: str | None, stop: str | None, coupling: str, out: str, 
     for note in found.notes:
         print_error(f"note: {note}")
     if found.powers:
-        say(f"work that the coupling brought in: {100.0 * found.brought_in():.2g} % of what went through the power bonds")
+        say(
+            f"work that the coupling brought in: {100.0 * found.brought_in():.2g} % of what went through the power bonds"
+        )
     folder, stem = folder_of(out), Path(file).stem
     residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
     say(f"wrote {write_csv(folder / f'{stem}.csv', {'time': found.time, **found.values, **residuals})}")
@@ -126,7 +146,9 @@ def check(file: str, stop: str | None, out: str, plot: bool) -> None:
 
     wiring = _wiring(file)
     bonds = wiring.bonds()
-    say(f"{wiring.title}: {len(wiring.parts)} parts, {len(wiring.connections)} connections, {len(bonds)} power bonds; all match")
+    say(
+        f"{wiring.title}: {len(wiring.parts)} parts, {len(wiring.connections)} connections, {len(bonds)} power bonds; all match"
+    )
     for bond in bonds:
         say(f"power bond {bond.effort} -> {bond.effort_to}, back {bond.flow} -> {bond.flow_to}")
     for note in wiring.notes():
@@ -135,7 +157,8 @@ def check(file: str, stop: str | None, out: str, plot: bool) -> None:
         return
     found = convergence(load_system(file), stop_time=None if stop is None else quantity(stop, "s", "--stop"))
     rows = [
-        (f"{1e3 * step:.4g}", *(f"{errors[n]:.2e}" for errors in found.errors.values())) for n, step in enumerate(found.steps)
+        (f"{1e3 * step:.4g}", *(f"{errors[n]:.2e}" for errors in found.errors.values()))
+        for n, step in enumerate(found.steps)
     ]
     rows.append(("order", *(f"{found.order(way):.2f}" for way in found.errors)))
     show_table("greatest relative error of the connected outputs", ("step [ms]", *found.errors), rows)

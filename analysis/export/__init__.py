@@ -6,7 +6,7 @@ from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .interface import Entry, interface, with_starts
 from .native_fmu import PLATFORMS, WASM, build_native, compile_library, source_files, this_platform
-from .python_fmu import build
+from .python_fmu import build, build_controller
 from .rebuild import Compared, rebuild
 from .web import build_web, crank_number
 
@@ -25,6 +25,7 @@ __all__ = [
     "Kind",
     "build",
     "build_all",
+    "build_controller",
     "build_native",
     "build_web",
     "compile_library",

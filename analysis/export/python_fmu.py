@@ -20,9 +20,12 @@ from typing import NamedTuple
 
 from pythonfmu.builder import FmuBuilder
 
+from linkwork import wrapper
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
+from ..numerics.cache import put
+from . import controllers
 from .archive import SOURCES, BuildError, documentation, write
 from .bill import with_bill
 from .description import PYTHON, description, token
@@ -67,7 +70,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
         stage = Path(folder) / "stage"
         stage.mkdir()
         staged = _stage(mechanism, sources, stage)
-        with import_state():
+        with _import_state():
             try:
                 described = _describe(staged)
                 raw = FmuBuilder.build_FMU(
@@ -156,8 +159,41 @@ def _describe(staged: _Staged) -> bytes:
     return description(mechanism, PYTHON)
 
 
+_CONTROLLER = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\n    __doc__ = {kind}.__doc__\n"
+
+
+def build_controller(name: str, dest: Path | str = "build") -> Path:
+    """Build the Python FMU of a controller and return its path, in a folder by the hash of what it carries.
+
+    Parameters
+    ----------
+    name : str
+        One of `controllers.CONTROLLERS`.
+    dest : path
+        An FMU of the same content that is there is kept.
+    """
+    text, shared = (Path(str(module.__file__)).read_text(encoding="utf-8") for module in (controllers, wrapper))
+    kind, tag = controllers.CONTROLLERS[name].__name__, hashlib.sha256(f"{text}\0{shared}".encode()).hexdigest()[:8]
+    target = Path(dest) / tag / f"{kind}Controller.fmu"
+    if target.is_file():
+        return target
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="linkwork-fmu-") as stage, _import_state():
+        package, module = Path(stage) / f"linkwork_{tag}", Path(stage) / f"controllers_{tag}.py"
+        package.mkdir()
+        (package / "__init__.py").touch()
+        (package / "wrapper.py").write_text(shared, encoding="utf-8")
+        module.write_text(text.replace("from linkwork.", f"from linkwork_{tag}."), encoding="utf-8")
+        script = Path(stage) / f"{kind.lower()}_{tag}.py"
+        script.write_text(_CONTROLLER.format(module=module.stem, kind=kind), encoding="utf-8")
+        options = {"canGetAndSetFMUstate": "true", "canHandleVariableCommunicationStepSize": "true"}
+        made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[package, module], **options)
+        put(target, made.read_bytes())
+    return target
+
+
 @contextmanager
-def import_state() -> Iterator[None]:
+def _import_state() -> Iterator[None]:
     """Undo the changes that pythonfmu's builder makes to the import state of this process."""
     path, modules = list(sys.path), set(sys.modules)
     writes_bytecode = sys.dont_write_bytecode

@@ -31,7 +31,13 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
             size = (box.right - box.left, box.top - box.bottom)
             axes.add_patch(
                 FancyBboxPatch(
-                    (box.left, box.bottom), *size, boxstyle="round,pad=0,rounding_size=2", fc="0.96", ec="0.3", lw=THIN, zorder=3
+                    (box.left, box.bottom),
+                    *size,
+                    boxstyle="round,pad=0,rounding_size=2",
+                    fc="0.96",
+                    ec="0.3",
+                    lw=THIN,
+                    zorder=3,
                 )
             )
             axes.text(box.left + 0.5 * size[0], box.top - 5.5, name, ha="center", va="center", weight="bold", zorder=4)
@@ -40,7 +46,9 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
                     axes.text(x, box.height_of(port), port, ha=align, va="center", fontsize=TINY, zorder=4)
         for number, (target, source) in enumerate(wiring.connections.items()):
             start, end = placed[source.part], placed[target.part]
-            path = _path((start.right, start.height_of(source.port)), (end.left, end.height_of(target.port)), number, lowest)
+            path = _path(
+                (start.right, start.height_of(source.port)), (end.left, end.height_of(target.port)), number, lowest
+            )
             colour = COLOURS[number % len(COLOURS)]
             axes.plot(*zip(*path[:-1]), color=colour, lw=LINE)
             for (x, y), (to_x, to_y) in pairwise(path[-2:]):
@@ -60,7 +68,14 @@ def _path(
         x = end[0] - lane
         return [start, (x, start[1]), (x, end[1]), end]
     below = lowest - _CLEAR - _LANE * number
-    return [start, (start[0] + lane, start[1]), (start[0] + lane, below), (end[0] - lane, below), (end[0] - lane, end[1]), end]
+    return [
+        start,
+        (start[0] + lane, start[1]),
+        (start[0] + lane, below),
+        (end[0] - lane, below),
+        (end[0] - lane, end[1]),
+        end,
+    ]
 
 
 @plot.register
@@ -98,4 +113,3 @@ def plot_convergence(found: Convergence, *, title: str = "") -> Figure:
         axes.legend()
         write_title(figure, title or found.title)
         return finish(figure)
-

@@ -100,7 +100,9 @@ class Outputs:
                 what, unit = ("torque", "N.m") if turned else ("force", "N")
                 of = f", on the {turned[0]}" if turned else ""
                 text = f"{what.title()} of {name} against its stretch{of}"
-                yield Output(f'output("{name}.exerted_{what}", "{unit}", {quoted(text)})', self.motion.tension(name, spring))
+                yield Output(
+                    f'output("{name}.exerted_{what}", "{unit}", {quoted(text)})', self.motion.tension(name, spring)
+                )
         yield from self._joint_forces()
         yield from self._energy_outputs(n)
 

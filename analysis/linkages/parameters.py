@@ -36,7 +36,8 @@ class Parameter(NamedTuple):
 class Drive(NamedTuple):
     """A freedom: its name, unit and place in the interface, its start, and the table of its inputs if it can be driven.
 
-    ``commanded`` says whether its rate is commanded unless the mode says otherwise; ``turns_back`` are the turns after which all bodies are in the same places; 0 where there are none.
+    ``commanded`` says whether its rate is commanded unless the mode says otherwise; ``turns_back`` are the turns after which
+    all bodies are in the same places; 0 where there are none.
     """
 
     name: str

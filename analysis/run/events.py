@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 from linkwork.errors import InputError, Interrupted
 from linkwork.mechanism import Mechanism
@@ -14,7 +15,6 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..mechanisms import output_units
 from .signals import StateFunction
-from .trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,9 +78,9 @@ class Event:
 
 
 class RunInterrupted(Interrupted):
-    """A run was interrupted from the keyboard; ``trajectory`` holds what it had computed."""
+    """A run was interrupted from the keyboard; ``trajectory``, or the run of a system, holds what it had computed."""
 
-    def __init__(self, trajectory: Trajectory) -> None:
+    def __init__(self, trajectory: Any) -> None:
         self.trajectory = trajectory
         super().__init__(f"interrupted at t = {trajectory.time[-1]:.6g} s" if len(trajectory) else "interrupted")
 

@@ -33,8 +33,8 @@ class Convergence:
     steps : (N,) float array
         Communication steps (s), falling.
     errors : mapping of str to (N,) float array
-        By coupling the greatest error of all connected outputs, accelerations left out, at the points of the greatest step, each
-        relative to its greatest magnitude; NaN where a part refused a step.
+        By coupling the greatest error of all connected outputs, accelerations left out, at the points of the greatest step,
+        each relative to its greatest magnitude; NaN where a part refused a step.
     powers : mapping of str to (N,) float array
         By coupling the work that it brought in, as a share of the work that went through the power bonds; 0 without bonds.
     messages : mapping of str to str
@@ -48,7 +48,7 @@ class Convergence:
     messages: Mapping[str, str]
 
     def order(self, way: str) -> float:
-        """Return the order of a coupling: the slope of the error over the step, by regression; NaN with less than two errors."""
+        """Return the order of a coupling, the slope of the error over the step by regression; NaN with less than two errors."""
         good = np.isfinite(self.errors[way]) & (self.errors[way] > 0.0)
         if np.count_nonzero(good) < 2:
             return float("nan")
@@ -68,7 +68,8 @@ def convergence(
     ----------
     system : System
     steps : sequence of float, optional
-        Communication steps (s), each a whole fraction of the first; by default seven halvings of four times the system's.
+        Communication steps (s), each a whole fraction of the first; by default halvings of four times the system's, or of a
+        controller's sample time.
     stop_time : float, optional
         By default 50 times the first step, or the system's, if that is less (s).
     ways : sequence of str
@@ -81,15 +82,21 @@ def convergence(
     WiringError
         If a part is an FMU, of which no equations are known.
     """
-    steps = [4.0 * system.run.step * 0.5**n for n in range(7)] if steps is None else list(steps)
+    if steps is None:
+        periods = [m.values.get("sample_time", 1e-3) for m in system.members.values() if m.controller]
+        steps = [min(4.0 * system.run.step, *periods, system.run.stop_time) * 0.5**n for n in range(7)]
     stop_time = min(system.run.stop_time, 50.0 * steps[0]) if stop_time is None else stop_time
     for whole, part in [(stop_time, steps[0]), *((steps[0], step) for step in steps)]:
         if abs(whole / part - round(whole / part)) > 1e-9 * whole / part:
-            raise InputError(f"a step of {part:g} s does not divide {whole:g} s: it must, so that the runs have common points")
+            raise InputError(
+                f"a step of {part:g} s does not divide {whole:g} s: it must, so that the runs have common points"
+            )
     right = Joined(system).run(stop_time, steps[0])
     wirings = {True: system.wiring(), False: system.without_rates().wiring()}
     # accelerations leap where a controller takes a sample
-    continuous = [s for s in dict.fromkeys(system.connections.values()) if not wirings[True].port(s).unit.endswith("/s2")]
+    continuous = [
+        s for s in dict.fromkeys(system.connections.values()) if not wirings[True].port(s).unit.endswith("/s2")
+    ]
     names = [str(source) for source in continuous if str(source) in right.values]
     errors: dict[str, list[float]] = {}
     powers: dict[str, list[float]] = {}

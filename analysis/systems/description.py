@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib import resources
-from inspect import getsource
 from pathlib import Path
 from typing import Any
 
-from pythonfmu.builder import FmuBuilder
-
-from linkwork import __version__, wrapper
+from linkwork import __version__
 from linkwork.errors import ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 
 from .. import files
-from ..export import NATIVE, build_native
-from ..export.python_fmu import import_state
+from ..export import NATIVE, build_controller, build_native
+from ..export.controllers import CONTROLLERS, UNITS
 from ..files import Quantity, Table, entry, unknown_name
 from ..linkages import load_linkage
 from ..mechanisms import mechanism_of
-from ..numerics.cache import code_folder, put
-from ..run import load_case, published_case
+from ..numerics.cache import code_folder
+from ..run import case_from, published_case
 from ..units import quantity
-from .controllers import CONTROLLERS, UNITS
 from .wiring import End, Part, Wiring, WiringError
 
 HERE = resources.files(__package__)
@@ -141,7 +136,9 @@ class System:
             made = load_linkage(Path(str(HERE / "partners" / f"{table.partner}.toml")))
             case = published_case(made.name)
         elif Path(table.case).suffix in (".toml", ".json"):
-            case = load_case(self.folder / table.case)
+            # how long the case would run alone is of no account, and may be missing
+            tables = files.read_tables(self.folder / table.case) | {"run": {"stop_time": self.run.stop_time}}
+            case = case_from(tables, folder=(self.folder / table.case).parent)
         else:
             case = published_case(table.case)
         mechanism = mechanism_of(case.parameters)
@@ -208,7 +205,7 @@ class Member:
         if self.fmu is not None:
             return self.fmu
         if self.mechanism is None:
-            return _controller_fmu(self.controller, folder)
+            return build_controller(self.controller, folder)
         key = _tag(*(Path(str(m.__file__)).read_text(encoding="utf-8") for m in self.mechanism.modules), __version__)
         target = folder / key / NATIVE.file_name(self.mechanism)
         return target if target.is_file() else build_native(self.mechanism, NATIVE, target.parent)
@@ -230,36 +227,13 @@ def _read(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> di
 
 def _of_unit(value: Any, unit: str, name: str) -> float:
     # what controllers have beyond mechanics is given in SI
-    return quantity(value, unit, name) if not {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1})) else _number(value, name)
+    return (
+        quantity(value, unit, name) if not {"A", "N/(m.s)"} & set(UNITS.get(unit, {unit: 1})) else _number(value, name)
+    )
 
 
 def _tag(*texts: str) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:8]
-
-
-_SCRIPT = "from {module} import {kind}\n\n\nclass {kind}Controller({kind}):\n    __doc__ = {kind}.__doc__\n"
-
-
-def _controller_fmu(name: str, folder: Path) -> Path:
-    """Build the Python FMU of a controller; it carries the module of the controllers under a name with its hash."""
-    text, shared = (HERE / "controllers.py").read_text(encoding="utf-8"), getsource(wrapper)
-    kind, tag = CONTROLLERS[name].__name__, _tag(text, shared)
-    target = folder / tag / f"{kind}Controller.fmu"
-    if target.is_file():
-        return target
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as stage, import_state():
-        package, module = Path(stage) / f"linkwork_{tag}", Path(stage) / f"controllers_{tag}.py"
-        package.mkdir()
-        (package / "__init__.py").touch()
-        (package / "wrapper.py").write_text(shared, encoding="utf-8")
-        module.write_text(text.replace("from linkwork.", f"from linkwork_{tag}."), encoding="utf-8")
-        script = Path(stage) / f"{kind.lower()}_{tag}.py"
-        script.write_text(_SCRIPT.format(module=module.stem, kind=kind), encoding="utf-8")
-        options = {"canGetAndSetFMUstate": "true", "canHandleVariableCommunicationStepSize": "true"}
-        made = FmuBuilder.build_FMU(script, dest=Path(stage) / "made", project_files=[package, module], **options)
-        put(target, made.read_bytes())
-    return target
 
 
 def load_system(path: str | Path) -> System:

@@ -6,7 +6,8 @@ take their samples at their instants, and what they answer acts at once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import fields as dataclass_fields
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,9 @@ from linkwork.errors import IntegrationError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
+from ..export.controllers import CONTROLLERS, Controller
 from ..numerics import symbolic
 from ..run import expressions
-from .controllers import CONTROLLERS, Controller
 from .description import Member, System
 from .master import SystemRun
 from .wiring import End, WiringError
@@ -32,7 +33,7 @@ class _Model:
         self.mechanism, values = mechanism, member.values
         names = {v.name for v in mechanism.variables}
         fields = {field_name(name): v for name, v in values.items() if name in names}
-        kept = set(mechanism.parameters.__dataclass_fields__)  # type: ignore[attr-defined]
+        kept = {entry.name for entry in dataclass_fields(mechanism.parameters)}
         whole = mechanism.first_set.parameters
         numbers = {k: type(getattr(whole, k))(v) for k, v in fields.items() if k in kept}
         self.parameters = mechanism.parameters(**numbers)
@@ -86,16 +87,17 @@ class Joined:
         held = casadi.SX.sym("held", len(self.given))
         wires: dict[End, Any] = {end: held[n] for n, end in enumerate(self.given)}
 
-        def wire(source: End) -> Any:
-            return wires.setdefault(source, casadi.SX.sym(str(source)))
+        def wire(source: End | None, otherwise: float = 0.0) -> Any:
+            return casadi.SX(otherwise) if source is None else wires.setdefault(source, casadi.SX.sym(str(source)))
 
-        states, slopes, outputs = [], [], {}
+        states: list[Any] = []
+        slopes: list[Any] = []
+        outputs: dict[End, Any] = {}
         for name, model in self.models.items():
             m, s = model.mechanism, model.traced.symbols
             x, n = casadi.SX.sym(name, m.size), len(m.freedoms)
             sources = {c.name: system.connections.get(End(name, c.name)) for c in m.channels}
-            u = [casadi.SX(value) if sources[c.name] is None else wire(sources[c.name])
-                 for c, value in zip(m.channels, model.constants)]  # fmt: skip
+            u = [wire(sources[c.name], value) for c, value in zip(m.channels, model.constants)]
             inside = casadi.vertsplit(x)
             for freedom, command in model.commanded().items():
                 number = next(k for k, c in enumerate(m.channels) if c.name == command)
@@ -152,10 +154,10 @@ class Joined:
             If it does not reach the end.
         """
         times = step * np.arange(round(stop_time / step) + 1)
-        period = min((c.sample_time for c in self.controllers.values()), default=stop_time)  # type: ignore[attr-defined]
+        period = min((c.sample_time for c in self.controllers.values()), default=stop_time)
         marks = np.unique(np.concatenate([period * np.arange(round(stop_time / period) + 1), [stop_time]]))
         x, rows, kept = self.start, [], []
-        for begin, end in zip(marks[:-1], marks[1:]):
+        for begin, end in pairwise(marks):
             held = self._sampled(float(begin), x)
             inside = times[(times >= begin - 1e-9 * step) & (times < end - 1e-9 * step)]
             found = solve_ivp(
@@ -163,7 +165,9 @@ class Joined:
                 t_eval=np.clip([*inside, end], begin, end), rtol=tolerance, atol=1e-3 * tolerance,
             )  # fmt: skip
             if not found.success:
-                raise IntegrationError(f"the joined system was not integrated past t = {found.t[-1]:.9g} s: {found.message}")
+                raise IntegrationError(
+                    f"the joined system was not integrated past t = {found.t[-1]:.9g} s: {found.message}"
+                )
             kept += list(inside)
             rows += [self._outputs(state, held).full().ravel() for state in found.y.T[:-1]]
             x = found.y[:, -1]

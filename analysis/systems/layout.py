@@ -7,7 +7,7 @@ from typing import NamedTuple
 from .wiring import Wiring
 
 #: Width of a part, room between columns, height of a port and of a heading, all in mm.
-WIDTH, ROOM, PORT, HEAD = 60.0, 70.0, 6.0, 10.0
+WIDTH, ROOM, PORT, HEAD = 105.0, 70.0, 6.0, 10.0
 
 
 class Box(NamedTuple):

@@ -1,7 +1,7 @@
 """Systems as files of SSP 1.0 (System Structure and Parameterization), written and read with pyssp-standard.
 
-What the library does not know is added here: the geometry of the diagram; and it writes units where the schema does not have them.
-It reads no transformations of connections and no signal dictionaries: a file with one is refused.
+What the library does not know is added here: the geometry of the diagram; and its units are put where the schema has them. It
+reads no transformations of connections and no signal dictionaries: a file with one is refused.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from xml.etree import ElementTree
 from linkwork.errors import InputError
 from linkwork.variables import UNITS as MECHANICAL
 
-from ..files import output, unknown_name
+from ..export.controllers import UNITS
+from ..files import output
 from ..libraries import lazy
 from ..numerics.cache import code_folder, put
-from .controllers import UNITS
 from .layout import boxes
 from .wiring import End, Part, Wiring, WiringError
 
@@ -163,10 +163,14 @@ def read_ssp(path: str | Path) -> Wiring:
     with zipfile.ZipFile(path) as archive:
         if "SystemStructure.ssd" not in archive.namelist():
             raise InputError(f"{path} has no SystemStructure.ssd: it must be an archive of SSP")
-        tags = {node.tag.rpartition("}")[2] for node in ElementTree.fromstring(archive.read("SystemStructure.ssd")).iter()}
+        tags = {
+            node.tag.rpartition("}")[2] for node in ElementTree.fromstring(archive.read("SystemStructure.ssd")).iter()
+        }
     for tag in _UNREAD:
         if tag in tags:
-            raise WiringError(f"{path} has a {tag}: systems are read without; give the part the factor, or a part that has it")
+            raise WiringError(
+                f"{path} has a {tag}: systems are read without; give the part the factor, or a part that has it"
+            )
     folder = code_folder("systems") / hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
     folder.mkdir(parents=True, exist_ok=True)
     with ssp.SSP(path, mode="r") as archive, archive.system_structure as structure:
@@ -186,10 +190,14 @@ def read_ssp(path: str | Path) -> Wiring:
         }
         twice = [c for c in system.connections if c.end_element]
         if len(connections) < len(twice):
-            raise WiringError(f"{path}: an input has two connections, or one begins at the system's edge: it must have one")
+            raise WiringError(
+                f"{path}: an input has two connections, or one begins at the system's edge: it must have one"
+            )
         experiment = structure.default_experiment
     stop_time = float(experiment.stop_time) if experiment is not None else 1.0
-    return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=1e-3 * stop_time)
+    return Wiring(
+        title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=1e-3 * stop_time
+    )
 
 
 def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What a system consists of once its FMUs are there: parts with ports, connections between them, and whether these can be right."""
+"""What a system consists of once its FMUs are there: parts with ports, connections, and whether these can be right."""
 
 from __future__ import annotations
 
@@ -182,7 +182,9 @@ class Wiring:
     def rate_input(self, end: End) -> End | None:
         """Return the input that is the rate of change of an input: of the same table, and of its unit by the second."""
         unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
-        inputs = (End(end.part, name) for name in self.parts[end.part].named("input") if _table(name) == _table(end.port))
+        inputs = (
+            End(end.part, name) for name in self.parts[end.part].named("input") if _table(name) == _table(end.port)
+        )
         return next((other for other in inputs if self.port(other).unit == unit), None)
 
     def notes(self) -> list[str]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
-from analysis import cli
 from analysis.mechanisms import MECHANISMS, register
 from analysis.studio import PAGE
 from tests.mechanisms import pendulum, rotor_on_cart, torsion
@@ -23,17 +21,6 @@ if TYPE_CHECKING:
 def fmu(fmus: dict[str, Path]) -> Path:
     """FiveBarSlider.fmu."""
     return fmus["FiveBarSlider"]
-
-
-@pytest.fixture
-def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """The command line, called with words in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: object) -> Result:
-        return CliRunner().invoke(cli.main, [str(word) for word in words], catch_exceptions=False)
-
-    return call
 
 
 @pytest.fixture(scope="module")

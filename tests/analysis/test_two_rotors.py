@@ -89,7 +89,9 @@ def test_the_motion_at_commanded_speeds_is_the_closed_form(ratio: Fraction) -> N
 def test_the_search_for_a_motion_begins_with_the_other_crank_at_its_ratio() -> None:
     # on its motor the right rotor turns freely, one and a half times for each turn of the left one
     motor = InductionMotor(breakdown_torque=0.2, breakdown_slip=0.2, synchronous_speed=61.0)
-    drive = Drive(speed=40.0, crank="left.speed", ratios={"right.speed": Fraction(3, 2)}, motors={"right.torque": motor})
+    drive = Drive(
+        speed=40.0, crank="left.speed", ratios={"right.speed": Fraction(3, 2)}, motors={"right.torque": motor}
+    )
     flow = drive.flow(MECHANISM)
     guess = first_guess(flow, drive, None)
     assert dict(zip((name for name, _ in flow.components), guess))["right.speed_out"] == pytest.approx(60.0)

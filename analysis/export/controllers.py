@@ -48,10 +48,11 @@ UNITS: dict[str, dict[str, int]] = {
 }
 
 
-class Controller(Fmi2Slave):
+class Controller(Fmi2Slave):  # type: ignore[misc]
     """What the controllers share. Each has its ``rows``, and `sample`, which reads and sets attributes of their names."""
 
     rows: ClassVar[tuple[Row, ...]]
+    sample_time: float
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -82,7 +83,7 @@ class Controller(Fmi2Slave):
 
     def to_xml(self, model_options: dict[str, str] = {}) -> Element:  # noqa: B006 - the signature is pythonfmu's
         """Return the model description, with the units, which pythonfmu does not know."""
-        root = super().to_xml(model_options)
+        root: Element = super().to_xml(model_options)
         units = {"sample_time": "s", **{row.name: row.unit for row in self.rows if row.unit in UNITS}}
         definitions = Element("UnitDefinitions")
         for unit in dict.fromkeys(units.values()):
@@ -143,6 +144,10 @@ class Pid(Controller):
         Row("integral", "local", "N", 0.0, "Share of the integral"),
         Row("derivative", "local", "N", 0.0, "Share of the derivative"),
     )
+
+    error: float
+    derivative: float
+    integral: float
 
     def sample(self, t: float) -> None:
         before, self.error = self.error, self.reference - self.measured
@@ -237,6 +242,9 @@ class DcServo(Controller):
         Row("encoder_angle", "output", "rad", 0.0, "Angle that the encoder tells"),
         Row("voltage", "local", "V", 0.0, "Voltage since the last sample"),
     )
+
+    voltage: float
+    current: float
 
     def sample(self, t: float) -> None:
         induced = self.torque_constant * self.speed

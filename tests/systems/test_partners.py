@@ -1,0 +1,176 @@
+"""Partners and controllers, each against an answer in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from math import exp, pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis import Inputs, simulate
+from analysis.export.controllers import CONTROLLERS, Controller
+from analysis.linkages import load_linkage
+from analysis.systems.description import HERE, PARTNERS
+from linkwork.errors import ParameterError
+
+
+def partner(name: str, initial: dict[str, float] | None = None, **changes: float) -> tuple[Any, Any]:
+    """Parameters and state at the start of a partner, some of them changed."""
+    mechanism = load_linkage(Path(str(HERE / "partners" / f"{name}.toml")))
+    start = mechanism.first_set
+    return type(start.parameters)(**{**_fields(start.parameters), **changes}), type(start.initial)(**(initial or {}))
+
+
+def _fields(record: Any) -> dict[str, Any]:
+    return {entry.name: getattr(record, entry.name) for entry in fields(record)}
+
+
+def controller(name: str, **values: float) -> Controller:
+    made = CONTROLLERS[name](instance_name=name)
+    for key, value in values.items():
+        assert hasattr(made, key)
+        setattr(made, key, value)
+    return made
+
+
+@pytest.mark.parametrize("speed", [20.0, 90.0, 112.0])
+def test_the_motor_has_the_torque_of_kloss_at_a_steady_speed(speed: float) -> None:
+    parameters, initial = partner("induction-motor", {"rotor_speed": speed, "flange_speed": speed})
+    field = 1076.0 * pi / 30.0
+    run = simulate(parameters, Inputs(field_speed=field, flange_speed=speed), initial=initial, stop_time=2.0, step=0.01)
+    slip, least = 1.0 - speed / field, 322.8 / 1076.0
+    kloss = 2.0 * 0.06 / (slip / least + least / slip)
+    assert run["shaft.exerted_torque"][-1] == pytest.approx(kloss, rel=2e-5)
+    # the load gets it, and the shaft is twisted by it
+    assert run["shaft.turn"][-1] == pytest.approx(kloss / 50.0, rel=2e-5)
+
+
+def test_the_rotor_swings_on_its_shaft_at_the_frequency_of_both() -> None:
+    still = {"airGap_breakdown_torque": 0.0, "shaft_damping": 0.0}
+    parameters, initial = partner("induction-motor", {"rotor_angle": 1e-3}, **still)
+    frequency = sqrt(50.0 / 2e-4)
+    times = np.linspace(0.0, 2.0 * pi / frequency, 41)
+    run = simulate(
+        parameters, Inputs(field_speed=0.0, flange_speed=0.0), initial=initial, samples=times, stop_time=times[-1]
+    )
+    np.testing.assert_allclose(run["rotor.angle"], 1e-3 * np.cos(frequency * times), atol=1e-9)
+    np.testing.assert_allclose(run["shaft.exerted_torque"], 50.0 * run["rotor.angle"], atol=1e-12)
+
+
+def test_the_flywheel_is_accelerated_through_the_gear() -> None:
+    parameters, _ = partner("flywheel-gear", shaft_stiffness=0.0, shaft_damping=0.0, bearings_damping=0.0)
+    run = simulate(parameters, Inputs(speed=0.0, pinion_torque=2.0), stop_time=1.0, step=0.01)
+    # on the pinion: its own inertia, and the wheel's by the square of the ratio
+    np.testing.assert_allclose(run["pinion.speed"], 2.0 / (5e-4 + 0.5 * 0.2**2) * run.time, rtol=1e-9, atol=1e-12)
+
+
+def test_the_line_shaft_gives_each_load_what_its_side_is_twisted_by() -> None:
+    parameters, initial = partner("line-shaft", {"leftFlange_angle": 0.01, "rightFlange_angle": -0.03})
+    held = Inputs(leftFlange_speed=0.0, rightFlange_speed=0.0)
+    run = simulate(parameters, held, initial=initial, stop_time=5.0, step=0.01)
+    assert run["disc.angle"][-1] == pytest.approx(-0.01, abs=1e-9)
+    assert run["left.exerted_torque"][-1] == pytest.approx(50.0 * -0.02, abs=1e-6)
+    assert run["right.exerted_torque"][-1] == pytest.approx(50.0 * 0.02, abs=1e-6)
+
+
+def test_the_press_load_resists_as_its_springs_do_and_sticks_where_friction_holds_it() -> None:
+    parameters, initial = partner("press-load", {"ram_position": 0.05, "holder_position": 0.05})
+    run = simulate(parameters, Inputs(speed=0.1), initial=initial, stop_time=4.0, step=1e-3)
+    # pushed slowly to 0.45 m: the sheet from 0.3 m on, the spring, the friction of the guide
+    force, place = run["contact.exerted_force"][-1], run["holder.position"][-1]
+    assert force == pytest.approx(-(20e3 * (place - 0.3) + 300.0 * place + 15.0), rel=2e-3)
+    assert run["ram.position"][-1] - place == pytest.approx(-force / 200e3, rel=2e-2)
+    # let go, the holder sticks: less than 15 N pull it; smooth friction lets it creep by less than 2 mm in a second
+    stuck, there = partner("press-load", {"ram_position": 0.0, "holder_position": 0.04})
+    rest = simulate(stuck, Inputs(speed=0.0), initial=there, stop_time=1.0, step=1e-3)
+    assert abs(rest["holder.position"][-1] - 0.04) < 2e-3
+
+
+def test_a_current_rises_in_the_winding_as_it_must() -> None:
+    servo = controller("dc-servo", torque_reference=100.0, current_limit=10.0, sample_time=1e-4)
+    servo.exit_initialization_mode()
+    found = []
+    for n in range(200):
+        servo.do_step(n * 1e-4, 1e-4)
+        found.append(servo.current)
+    # at first the limit of the voltage is what holds: 24 V at 1 ohm and 1 mH, held rotor
+    np.testing.assert_allclose(found[:5], [24.0 * (1.0 - exp(-0.1 * n)) for n in range(5)], rtol=1e-12)
+    # in the end the current that the limit allows, and its torque
+    assert found[-1] == pytest.approx(10.0, rel=1e-9) and max(found) < 11.5
+    assert servo.torque == pytest.approx(0.1 * 10.0, rel=1e-9)
+
+
+def test_the_encoder_counts() -> None:
+    servo = controller("dc-servo", angle=1.0, encoder_counts=100.0)
+    servo.exit_initialization_mode()
+    assert servo.encoder_angle == pytest.approx(15 * 2.0 * pi / 100.0)
+
+
+def test_a_pid_controller_has_its_three_shares() -> None:
+    pid = controller("pid", gain=3.0, integral_gain=5.0, derivative_gain=0.5, sample_time=0.1, limit=100.0)
+    pid.exit_initialization_mode()
+    for n in range(1, 11):
+        pid.reference = 0.1 * n  # a ramp of 1 m/s
+        pid.do_step(0.1 * n, 0.1)
+    # the sum of the errors before the last sample, 0 to 0.9, by the sample time
+    assert pid.force == pytest.approx(3.0 * 1.0 + 5.0 * 0.1 * 4.5 + 0.5 * 1.0)
+
+
+def test_an_integral_does_not_wind_up_at_the_limit() -> None:
+    limited = controller("pid", integral_gain=100.0, limit=1.0, tracking_time=0.05, reference=1.0, sample_time=0.01)
+    limited.exit_initialization_mode()
+    limited.do_step(0.01, 10.0)
+    assert limited.force == 1.0 and limited.integral < 7.0
+    limited.reference = -0.5
+    limited.do_step(10.01, 0.3)
+    assert limited.force < 1.0
+
+
+def test_state_feedback_and_its_limit() -> None:
+    feedback = controller(
+        "state-feedback", position_gain=10.0, velocity_gain=2.0, position=0.3, velocity=-0.5, reference=0.1
+    )
+    feedback.feed_forward = 4.0
+    feedback.exit_initialization_mode()
+    assert feedback.force == pytest.approx(4.0 - 10.0 * 0.2 + 2.0 * 0.5)
+    feedback.limit = 1.0
+    feedback.do_step(1e-3, 1e-3)
+    assert feedback.force == 1.0
+
+
+def test_a_motion_reference_is_its_series_and_the_rate_its_derivative() -> None:
+    series = controller(
+        "motion-reference", motion_0=0.5, motion_cos_1=0.2, motion_sin_3=-0.1, load_sin_2=7.0, speed=4.0
+    )
+    step, places = 1e-6, []
+    for angle in (0.7 - step, 0.7 + step, 0.7):
+        series.angle = angle
+        series.sample(0.0)
+        places.append(series.position)
+    assert series.position == pytest.approx(0.5 + 0.2 * np.cos(0.7) - 0.1 * np.sin(2.1))
+    assert series.velocity == pytest.approx(4.0 * (places[1] - places[0]) / (2.0 * step), rel=1e-8)
+    assert series.force == pytest.approx(7.0 * np.sin(1.4))
+
+
+@pytest.mark.parametrize("name", PARTNERS)
+def test_the_balance_of_energy_of_a_partner_closes(name: str) -> None:
+    run = simulate(
+        name if load_linkage(Path(str(HERE / "partners" / f"{name}.toml"))) else "", stop_time=0.2, step=1e-3
+    )
+    assert np.abs(run["energy.residual"]).max() < 1e-6
+
+
+def test_constants_of_a_law_are_read_with_their_units_and_must_have_names_of_their_own(tmp_path: Path) -> None:
+    text = (Path(str(HERE / "partners" / "induction-motor.toml"))).read_text(encoding="utf-8")
+    for old, new, message in (
+        ("breakdown_torque = ", "torque_of_breakdown = ", "law"),
+        ('"0.06 N*m"', '"0.06 apples"', "breakdown_torque"),
+        ("breakdown_speed", "sin", "law"),
+        (", breakdown_speed = ", ", Slip = ", "law"),
+    ):
+        (tmp_path / "wrong.toml").write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(ParameterError, match=message):
+            load_linkage(tmp_path / "wrong.toml")

@@ -1,0 +1,207 @@
+"""What is wired wrongly gets one sentence; what is possible but perhaps not meant a note; files of SSP come back as they were."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyssp_standard
+import pytest
+import xmlschema
+from click.testing import Result
+
+from analysis import figures
+from analysis.systems import End, System, WiringError, library, load_system, read_ssp, run_system, write_ssp
+from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+
+from .conftest import system_of, wiring_of
+
+SCHEMAS = Path(str(pyssp_standard.__file__)).parent / "resources"
+
+
+def wired(name: str, **connections: str) -> System:
+    """A system of the library with connections changed: ``linkage__drive__torque="motor.shaft.turn"``."""
+    system = system_of(name)
+    ends = {}
+    for target, source in connections.items():
+        part, _, port = target.replace("__", ".").partition(".")
+        ends[End(part, port)] = End(*source.split(".", 1))
+    return replace(system, connections=system.connections | ends)
+
+
+@pytest.mark.parametrize(
+    ("connections", "error", "message"),
+    [
+        ({"linkage__drive__torque": "motor.rotor.speed"}, WiringError, "rad/s and N.m; they must be the same"),
+        (
+            {"linkage__drive__torque": "motor.rotor.inertia"},
+            WiringError,
+            "is of causality parameter, it must be an output",
+        ),
+        ({"linkage__crank__speed": "motor.rotor.speed"}, WiringError, "is of causality output, it must be an input"),
+        ({"linkage__drive__torq": "motor.shaft.exerted_torque"}, UnknownNameError, r"did you mean drive\.torque"),
+        ({"linkage__drive__torque": "engine.shaft.exerted_torque"}, UnknownNameError, "motor"),
+    ],
+)
+def test_a_wrong_connection_is_refused(connections: dict[str, str], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        wired("motor-crank", **connections).wiring()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "message"),
+    [
+        ('partner = "induction-motor"', 'partner = "diesel"', LinkworkError, "induction-motor"),
+        ('partner = "induction-motor"', "", WiringError, "it must have one of case, partner, controller and fmu"),
+        ('"3 N*s/m"', '"3 N"', ParameterError, "slider.damping"),
+        ("slider.damping", "slider.dumping", UnknownNameError, "slider.damping"),
+        ('"linkage.drive.torque"', '"linkage"', ParameterError, "a part and its variable"),
+        ('step = "1 ms"', 'step = "0 ms"', ParameterError, "greater than zero"),
+        ('partner = "induction-motor"', 'fmu = "nothing.fmu"', LinkworkError, "nothing.fmu"),
+    ],
+)
+def test_a_wrong_description_is_refused(
+    tmp_path: Path, old: str, new: str, error: type[Exception], message: str
+) -> None:
+    text = library()["motor-crank"].read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "wrong.toml").write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(error, match=message):
+        load_system(tmp_path / "wrong.toml").wiring()
+
+
+def test_notes_name_what_is_not_connected_and_loops() -> None:
+    notes = wiring_of("motor-crank").notes()
+    assert any("not connected" in note and "slider.force" in note for note in notes)
+    # the torque of a shaft does not depend on the acceleration of its flange, but the FMU cannot tell
+    assert sum("algebraic loop" in note for note in notes) == 1
+    assert not any("loop" in note for note in system_of("motor-crank").without_rates().wiring().notes())
+    # an output of a crank at commanded speed that sets that speed's own rate
+    own = wired("slider-tracking", linkage__drive__acceleration="linkage.crank.acceleration").wiring()
+    assert any(
+        "algebraic loop linkage.crank.acceleration -> linkage.crank.acceleration" in note for note in own.notes()
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("motor-crank", 1), ("press", 3), ("two-linkages", 3), ("slider-tracking", 0)]
+)
+def test_efforts_and_flows_between_two_parts_are_power_bonds(name: str, count: int) -> None:
+    wiring = wiring_of(name)
+    bonds = wiring.bonds()
+    assert len(bonds) == count
+    for bond in bonds:
+        assert bond.effort.part == bond.flow_to.part and bond.flow.part == bond.effort_to.part
+        assert (wiring.port(bond.effort).unit, wiring.port(bond.flow).unit) in (("N.m", "rad/s"), ("N", "m/s"))
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_an_archive_comes_back_as_it_was_and_keeps_to_the_schemas(name: str, tmp_path: Path) -> None:
+    wiring = wiring_of(name)
+    path = write_ssp(wiring, tmp_path / f"{name}.ssp")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "there")
+    xmlschema.XMLSchema10(SCHEMAS / "SystemStructureDescription.xsd").validate(
+        tmp_path / "there" / "SystemStructure.ssd"
+    )
+    values = xmlschema.XMLSchema10(SCHEMAS / "SystemStructureParameterValues.xsd")
+    for part in wiring.parts:
+        values.validate(tmp_path / "there" / "resources" / f"{part}.ssv")
+    again = read_ssp(path)
+    assert again.connections == wiring.connections and again.stop_time == wiring.stop_time
+    assert {n: dict(p.values) for n, p in again.parts.items()} == {n: dict(p.values) for n, p in wiring.parts.items()}
+    one, other = (run_system(each, stop_time=20.0 * wiring.step, step=wiring.step) for each in (wiring, again))
+    assert all(np.array_equal(one[output], other[output]) for output in one.values)
+
+
+def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
+    path = write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp")
+    with zipfile.ZipFile(path) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    text = entries["SystemStructure.ssd"].decode()
+    start = text.index("<ssd:Connection ")
+    end = text.index("/>", start)
+    changed = f'{text[:end]}><ssc:LinearTransformation factor="-1"/></ssd:Connection>{text[end + 2 :]}'
+    twice = text.replace("</ssd:Connections>", f"{text[start:end]}/></ssd:Connections>")
+    for wrong, message in (
+        (changed, "LinearTransformation"),
+        (twice, "two connections"),
+        ("", "no SystemStructure.ssd"),
+    ):
+        with zipfile.ZipFile(tmp_path / "wrong.ssp", "w") as archive:
+            for name, content in entries.items():
+                if name != "SystemStructure.ssd":
+                    archive.writestr(name, content)
+                elif wrong:
+                    archive.writestr(name, wrong)
+        with pytest.raises(LinkworkError, match=message):
+            read_ssp(tmp_path / "wrong.ssp")
+    (tmp_path / "text.ssp").write_text("no archive")
+    with pytest.raises(InputError, match=r"is no \.ssp"):
+        read_ssp(tmp_path / "text.ssp")
+
+
+def test_start_values_of_the_whole_system_through_a_mapping(tmp_path: Path) -> None:
+    path = write_ssp(wiring_of("motor-crank"), tmp_path / "made.ssp")
+    with zipfile.ZipFile(path) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    binding = (
+        '<ssd:ParameterBindings><ssd:ParameterBinding source="resources/all.ssv"><ssd:ParameterMapping '
+        'source="resources/all.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings>'
+    )
+    text = (
+        entries["SystemStructure.ssd"]
+        .decode()
+        .replace('<ssd:System name="system">', f'<ssd:System name="system">{binding}')
+    )
+    entries["SystemStructure.ssd"] = text.replace('<ssd:ParameterBinding source="resources/linkage.ssv"/>', "").encode()
+    common = 'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0"'
+    entries["resources/all.ssv"] = (
+        f'<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" {common} name="all">'
+        '<ssv:Parameters><ssv:Parameter name="damper"><ssv:Real value="7"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>'
+    ).encode()
+    entries["resources/all.ssm"] = (
+        f'<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" {common}>'
+        '<ssm:MappingEntry source="damper" target="linkage.slider.damping"/></ssm:ParameterMapping>'
+    ).encode()
+    with zipfile.ZipFile(tmp_path / "mapped.ssp", "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    assert dict(read_ssp(tmp_path / "mapped.ssp").parts["linkage"].values) == {"slider.damping": 7.0}
+
+
+def test_the_commands(linkwork: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert "motor-crank" in linkwork("system", "new").output
+    assert linkwork("system", "new", "motor-crank").exit_code == 0
+    for words in (
+        ("build", "motor-crank.toml"),
+        ("draw", "motor-crank.toml"),
+        ("run", "out/motor-crank.ssp", "--stop", "0.05 s", "--step", "1 ms", "--coupling", "rollback"),
+        ("check", "motor-crank.toml", "--stop", "0.04 s"),
+        ("check", "out/motor-crank.ssp"),
+    ):
+        done = linkwork("system", *words)
+        assert done.exit_code == 0, done.output
+    assert {
+        "motor-crank.ssp",
+        "motor-crank-diagram.png",
+        "motor-crank.csv",
+        "motor-crank.png",
+        "motor-crank-check.png",
+    } <= set(os.listdir("out"))
+    assert linkwork("system", "new", "motor-cranc").exit_code == 1
+    assert linkwork("system", "run", "motor-crank.toml", "--stop", "0.05 s", "--coupling", "hole").exit_code == 1
+
+
+def test_the_diagram_has_each_connection_and_no_part_on_another() -> None:
+    for name in library():
+        figure = figures.plot(wiring_of(name))
+        texts = [text.get_text() for text in figure.axes[0].texts]
+        assert set(wiring_of(name).parts) <= set(texts)
+        boxes = [patch.get_window_extent() for patch in figure.axes[0].patches if patch.get_zorder() == 3]
+        assert not any(a.overlaps(b) for n, a in enumerate(boxes) for b in boxes[:n])
