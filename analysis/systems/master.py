@@ -254,15 +254,17 @@ class _Together:
                 self.instances[name].forget(state)
         self.given = {target: self._at_end(target, before, slopes, step) for target in self.wiring.connections}
         self.reached = self._read()
-        # what depends directly on inputs belongs to those that begin here
-        self._exchange(self.reached, {})
-        self.before, self.outputs = before, self._read()
+        self.before, self.outputs = before, self.reached
+        if coupling != "hold":
+            # what depends directly on inputs belongs to those that begin here; masters that hold inputs do not look again
+            self._exchange(self.reached, {})
+            self.outputs = self._read()
 
     def _at_end(self, target: End, before: Mapping[End, float], slopes: Mapping[End, float], step: float) -> float:
         """Return what an input came to at the end of a step."""
         value = before[self.wiring.connections[target]]
         rate = self.wiring.rate_input(target)
-        if rate in self.wiring.connections:
+        if rate is not None and rate in self.wiring.connections:
             slope = before[self.wiring.connections[rate]] + 0.5 * step * slopes.get(rate, 0.0)
         else:
             slope = slopes.get(target, 0.0) * (1.0 if self.instances[target.part].takes_slopes else 0.5)

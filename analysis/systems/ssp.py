@@ -132,8 +132,7 @@ def _complete(path: Path, wiring: Wiring) -> None:
 
 def _values(path: Path, part: Part) -> Path:
     """Write the start values of a part."""
-    with lazy("pyssp_standard.ssv").SSV(path, mode="w", name=part.name) as values:
-        values.name = part.name
+    with lazy("pyssp_standard.ssv").SSV(path, mode="w") as values:
         for name, value in part.values.items():
             port = part.ports[name]
             whole = port.type in ("Integer", "Enumeration")

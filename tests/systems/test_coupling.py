@@ -40,7 +40,7 @@ def test_a_sampled_controller_is_late_by_a_step_in_every_coupling(name: str) -> 
 
 
 def test_the_joined_model_is_the_motor_and_shaft_of_a_hand_written_run() -> None:
-    """A stiff shaft and a light rotor: the five-bar under the torque of Kloss's formula, with the rotor's inertia on its crank."""
+    """A stiff shaft and a light rotor: a five-bar under the torque of Kloss's formula, the rotor's inertia on its crank."""
     system = system_of("motor-crank")
     rigid = {"rotor.inertia": 1e-6, "shaft.stiffness": 1e5, "shaft.damping": 0.5, "airGap.breakdown_torque": 1.0}
     parts = {**system.parts, "motor": replace(system.parts["motor"], values=rigid)}
@@ -54,7 +54,7 @@ def test_the_joined_model_is_the_motor_and_shaft_of_a_hand_written_run() -> None
 
 
 def oscillators(tmp_path: Path, stiffness: float, folder: str) -> System:
-    """Two masses of 1 kg joined by a spring, of Schmoll and others' benchmark of couplings: v = +100 and -100 m/s at the start."""
+    """Two masses of 1 kg joined by a spring, of a published benchmark of couplings: v = +100 and -100 m/s at the start."""
     ground = {"A": (0, 0)}
     one = linkage(f"{folder}-one", ground=ground).body("cart", points={"P": (0, 0)}, mass="1 kg")
     one.slide("G", body="cart", through="A").freedom("cart", "G", driven=False, speed="100 m/s").mechanism()
@@ -144,9 +144,11 @@ def test_a_refused_step_ends_the_run_and_keeps_what_was_there(coupling: str) -> 
         "controller": replace(system.parts["controller"], values=strong),
     }
     run = run_system(replace(system, parts=parts).wiring(), coupling=coupling)
-    assert run.status == 3 and "linkage refused the step from t = " in run.message
+    assert run.status == 3
+    assert "linkage refused the step from t = " in run.message
     assert "limit of assembly" in run.message
-    assert 1 < len(run) < 2001 and np.isfinite(run["linkage.slider.position"]).all()
+    assert 1 < len(run) < 2001
+    assert np.isfinite(run["linkage.slider.position"]).all()
 
 
 def test_wrong_arguments_are_refused() -> None:
@@ -172,7 +174,8 @@ def test_sommerfelds_capture_in_the_system() -> None:
 def test_the_press_slows_down_as_it_works_and_is_brought_back_to_speed() -> None:
     run = run_system(wiring_of("press"), coupling="derivatives")
     pressed = run["load.contact.exerted_force"] < -500.0
-    assert pressed.any() and not pressed[-1]
+    assert pressed.any()
+    assert not pressed[-1]
     speed = run["flywheel.pinion.speed"] / 5.0
     assert speed[pressed].min() < speed[run.time > 0.5].max()
     assert run["press.slider.position"] == pytest.approx(run["load.ram.position"], abs=1e-5)

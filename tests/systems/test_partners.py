@@ -99,7 +99,8 @@ def test_a_current_rises_in_the_winding_as_it_must() -> None:
     # at first the limit of the voltage is what holds: 24 V at 1 ohm and 1 mH, held rotor
     np.testing.assert_allclose(found[:5], [24.0 * (1.0 - exp(-0.1 * n)) for n in range(5)], rtol=1e-12)
     # in the end the current that the limit allows, and its torque
-    assert found[-1] == pytest.approx(10.0, rel=1e-9) and max(found) < 11.5
+    assert found[-1] == pytest.approx(10.0, rel=1e-9)
+    assert max(found) < 11.5
     assert servo.torque == pytest.approx(0.1 * 10.0, rel=1e-9)
 
 
@@ -123,7 +124,8 @@ def test_an_integral_does_not_wind_up_at_the_limit() -> None:
     limited = controller("pid", integral_gain=100.0, limit=1.0, tracking_time=0.05, reference=1.0, sample_time=0.01)
     limited.exit_initialization_mode()
     limited.do_step(0.01, 10.0)
-    assert limited.force == 1.0 and limited.integral < 7.0
+    assert limited.force == 1.0
+    assert limited.integral < 7.0
     limited.reference = -0.5
     limited.do_step(10.01, 0.3)
     assert limited.force < 1.0

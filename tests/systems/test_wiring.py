@@ -1,4 +1,4 @@
-"""What is wired wrongly gets one sentence; what is possible but perhaps not meant a note; files of SSP come back as they were."""
+"""What is wired wrongly gets one sentence, what is perhaps not meant a note; files of SSP come back as they were."""
 
 from __future__ import annotations
 
@@ -95,7 +95,8 @@ def test_efforts_and_flows_between_two_parts_are_power_bonds(name: str, count: i
     bonds = wiring.bonds()
     assert len(bonds) == count
     for bond in bonds:
-        assert bond.effort.part == bond.flow_to.part and bond.flow.part == bond.effort_to.part
+        assert bond.effort.part == bond.flow_to.part
+        assert bond.flow.part == bond.effort_to.part
         assert (wiring.port(bond.effort).unit, wiring.port(bond.flow).unit) in (("N.m", "rad/s"), ("N", "m/s"))
 
 
@@ -112,7 +113,8 @@ def test_an_archive_comes_back_as_it_was_and_keeps_to_the_schemas(name: str, tmp
     for part in wiring.parts:
         values.validate(tmp_path / "there" / "resources" / f"{part}.ssv")
     again = read_ssp(path)
-    assert again.connections == wiring.connections and again.stop_time == wiring.stop_time
+    assert again.connections == wiring.connections
+    assert again.stop_time == wiring.stop_time
     assert {n: dict(p.values) for n, p in again.parts.items()} == {n: dict(p.values) for n, p in wiring.parts.items()}
     one, other = (run_system(each, stop_time=20.0 * wiring.step, step=wiring.step) for each in (wiring, again))
     assert all(np.array_equal(one[output], other[output]) for output in one.values)
