@@ -246,6 +246,12 @@ def wrapping_outputs() -> frozenset[str]:
     return frozenset(v.name for mechanism in MECHANISMS.values() for v in mechanism.variables if v.wraps)
 
 
+def input_units(mechanism: Mechanism) -> dict[str, str]:
+    """Return the units of the inputs of a mechanism by their arguments, those of rates left out."""
+    units = {v.name: v.unit for v in mechanism.variables}
+    return {c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"}
+
+
 def variable_units() -> dict[str, str]:
     """Return the unit of every real variable of every mechanism, by its FMI name."""
     # every `Drive` that is made asks for them

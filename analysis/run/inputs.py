@@ -5,12 +5,12 @@ One object serves `simulate` and `cosimulate`, and every mechanism: which channe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import chain
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from .. import files
-from ..mechanisms import MECHANISMS, InitialState, variable_units
-from ..units import Units, si
+from ..mechanisms import MECHANISMS, InitialState, input_units
+from ..units import si
 from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, StateFunction, TorsionBar
 
 #: Types that count as numbers.
@@ -59,15 +59,19 @@ class Inputs:
     >>> drive = Inputs(speed="420 rpm", force=(1.0, ramp(0.0, 2.0, 0.0, 0.5)))
     """
 
-    __slots__ = ("_given",)
+    __slots__ = ("_given", "_told")
     _given: dict[str, Any]
+    #: Units of the inputs that were given as text.
+    _told: dict[str, str]
 
     def __init__(self, **channels: Any) -> None:
         known, flags = _arguments()
-        try:
-            channels = {name: si(value, _units(name), name) for name, value in channels.items()}
-        except ParameterError as error:
-            raise InputError(str(error).removeprefix("parameter ")) from None
+        told: dict[str, str] = {}
+        for name, value in channels.items():
+            channels[name], unit = _in_si(name, value)
+            signals = [p.unit for p in _parts(value) if isinstance(p, (Piecewise, Harmonics)) and p.unit]
+            if channels[name] is not value or signals:
+                told[name] = signals[0] if signals else unit
         for name, value in channels.items():
             if name not in known:
                 raise files.unknown_name(name, known, f"input {name!r}")
@@ -76,10 +80,10 @@ class Inputs:
             if name not in flags:
                 _check_channel(name, value)
         given = {name: value for name, value in channels.items() if value is not None and value is not False}
-        for arguments in {mode.arguments for mechanism in MECHANISMS.values() for mode in mechanism.modes}:
-            both = [name for name in given if name in arguments]
-            if len(both) > 1:
-                raise InputError(f"both {' and '.join(both)} are given: the freedom can be driven by one of them only")
+        theirs = [m for m in MECHANISMS.values() if set(given) <= {*_argument_names(m)}]
+        rivals = [_rivals(mechanism, given) for mechanism in theirs]
+        if rivals and all(rivals):
+            _refuse(rivals[0])
         for name in (
             channel.argument for m in MECHANISMS.values() for channel in m.channels if channel.kind == "command"
         ):
@@ -88,6 +92,7 @@ class Inputs:
                     unit = "rad/s2" if name == "speed" else "m/s2"
                     raise InputError(f"a {name} given as a Function needs its rate, the acceleration ({unit})")
         object.__setattr__(self, "_given", given)
+        object.__setattr__(self, "_told", told)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"inputs do not change: Inputs.replace({name}=...) makes new ones")
@@ -98,7 +103,7 @@ class Inputs:
         raise AttributeError(str(files.unknown_name(name, _arguments()[0], f"input {name!r}")))
 
     def __reduce__(self) -> Any:
-        return _of, (self._given,)
+        return _of, (self._given, self._told)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Inputs) and self._given == other._given
@@ -150,10 +155,11 @@ class Inputs:
         return all(isinstance(part, NUMBER) for name in self._given for part in self.parts(name))
 
 
-def _of(given: dict[str, Any]) -> Inputs:
+def _of(given: dict[str, Any], told: dict[str, str]) -> Inputs:
     """Restore pickled inputs unchecked, because the reading process may not know their mechanism."""
     inputs = object.__new__(Inputs)
     object.__setattr__(inputs, "_given", given)
+    object.__setattr__(inputs, "_told", told)
     return inputs
 
 
@@ -165,10 +171,32 @@ def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(channels | modes), tuple(name for name in modes if name not in channels)
 
 
-def _units(name: str) -> Units:
-    """Return the unit of a channel; a flag or an unknown name has none."""
-    channels = (c for m in MECHANISMS.values() for c in m.channels if c.argument == name)
-    return next((variable_units()[channel.name] for channel in channels), {})
+def _rivals(mechanism: Mechanism, given: Iterable[str]) -> list[str]:
+    """Return given inputs that would drive one freedom of a mechanism in two ways."""
+    found = ([name for name in given if name in mode.arguments] for mode in mechanism.modes)
+    return next((names for names in found if len(names) > 1), [])
+
+
+def _refuse(rivals: Sequence[str]) -> NoReturn:
+    raise InputError(f"both {' and '.join(rivals)} are given: the freedom can be driven by one of them only")
+
+
+def _all_units(name: str) -> tuple[str, ...]:
+    """Return the units that an input has in any mechanism."""
+    return tuple(dict.fromkeys(u[name] for m in MECHANISMS.values() if name in (u := input_units(m))))
+
+
+def _in_si(name: str, value: Any) -> tuple[Any, str]:
+    """Return an input in SI, and its unit: of those that the mechanisms have for it the first that a text fits."""
+    wrong: ParameterError | None = None
+    for unit in _all_units(name):
+        try:
+            return si(value, unit, name), unit
+        except ParameterError as error:
+            wrong = wrong or error
+    if wrong is not None:
+        raise InputError(str(wrong).removeprefix("parameter ")) from None
+    return value, ""  # a flag, or an unknown name
 
 
 def _parts(value: Any) -> tuple[Any, ...]:
@@ -186,8 +214,8 @@ def _check_channel(name: str, value: Any) -> None:
             raise InputError(
                 f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function"
             )
-        if isinstance(part, (Piecewise, Harmonics)) and part.unit not in ("", _units(name)):
-            raise InputError(f"{name} is a signal in {part.unit}: it must be in {_units(name)}")
+        if isinstance(part, (Piecewise, Harmonics)) and part.unit not in ("", *(units := _all_units(name))):
+            raise InputError(f"{name} is a signal in {part.unit}: it must be in {' or '.join(units)}")
         if isinstance(part, NUMBER) and not np.isfinite(part):
             raise InputError(f"{name} is {part}: it must be a finite number")
     for kind in (TorsionBar, InductionMotor, Function):
@@ -256,6 +284,11 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
     for name in inputs:
         if name not in (known := _argument_names(mechanism)):
             raise InputError(f"a {mechanism.name} has no input {name!r}: its inputs are {', '.join(known)}")
+    if rivals := _rivals(mechanism, inputs):
+        _refuse(rivals)
+    for name, unit in inputs._told.items():
+        if unit != (right := input_units(mechanism).get(name, unit)):
+            raise InputError(f"{name} of a {mechanism.name} is given in {unit}: it must be in {right}")
     if initial is None:
         initial = _at_rest(mechanism)
     elif isinstance(initial, Mapping):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, ParameterError
 
-from ..mechanisms import MECHANISMS, variable_units
+from ..mechanisms import MECHANISMS, input_units
 from ..units import Amount, in_si, si
 
 #: A function of time, all coordinates and all their rates, floats.
@@ -22,8 +22,7 @@ def _in_si(values: Any, what: str) -> tuple[Any, str]:
     """Return the values of a signal in SI, and the unit of the inputs that they fit if they were texts."""
     if not any(isinstance(value, str) for value in (values if isinstance(values, (list, tuple)) else (values,))):
         return values, ""
-    known = variable_units()
-    units = dict.fromkeys(known[c.name] for m in MECHANISMS.values() for c in m.channels if c.kind != "rate")
+    units = dict.fromkeys(unit for mechanism in MECHANISMS.values() for unit in input_units(mechanism).values())
     for unit in units:
         try:
             return si(values, unit, what), unit

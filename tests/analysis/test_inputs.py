@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from analysis import simulate
+from analysis.linkages import linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
 from analysis.run.inputs import align, encode
@@ -309,3 +311,17 @@ def test_inputs_that_a_master_can_hold_without_loss() -> None:
     assert Inputs(speed=3.0, force=1.0).held_exactly
     assert not Inputs(speed=ramp(0.0, 1.0, 0.0, 1.0)).held_exactly
     assert not Inputs(torque=TorsionBar(torque=1.0)).held_exactly
+
+
+def test_another_mechanism_does_not_change_what_an_input_may_be() -> None:
+    """A linkage whose driven slide has a force or a speed in m/s, beside the five-bar with a force and a speed in rad/s."""
+    cart = linkage("lone-cart", ground={"A": (0, 0)}).body("cart", points={"P": (0, 0)}, mass="1 kg")
+    cart.slide("G", body="cart", through="A").freedom("cart", "G", driven=True, speed="0.1 m/s").mechanism()
+    assert Inputs(speed="60 rpm", force=1.0).speed == pytest.approx(2.0 * pi)
+    assert Inputs(speed="100 mm/s").speed == pytest.approx(0.1)
+    with pytest.raises(InputError, match="rad/s"):
+        simulate("lone-cart", Inputs(speed="60 rpm"), stop_time=0.1)
+    with pytest.raises(InputError, match="both speed and force"):
+        simulate("lone-cart", Inputs(speed=0.1, force=1.0), stop_time=0.1)
+    run = simulate("lone-cart", Inputs(speed="100 mm/s"), stop_time=0.1)
+    assert run["cart.position"][-1] == pytest.approx(0.01)
