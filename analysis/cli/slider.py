@@ -206,6 +206,11 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
         write_csv(folder / "force.csv", end),
         save_parameters(folder / "five-bar-parameters.toml", drive.parameters, head=head),
         write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv"), head=head),
+        write_tables(
+            folder / "system.toml",
+            chosen.system(drive, "five-bar.toml"),
+            head="a controller lets the slider follow its motion: linkwork system run system.toml",
+        ),
     ]
     written += plotted(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:

@@ -44,10 +44,19 @@ def system() -> None:
 _FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False))
 
 
-def _wiring(file: str) -> Wiring:
+_FMI = click.option(
+    "--fmi",
+    type=click.Choice(["2", "3"]),
+    default="2",
+    show_default=True,
+    help="Version of FMI of the mechanisms' FMUs; of a file of SSP it is what they are.",
+)
+
+
+def _wiring(file: str, fmi: str = "2") -> Wiring:
     from ..systems import load_system, read_ssp
 
-    return read_ssp(file) if Path(file).suffix == ".ssp" else load_system(file).wiring()
+    return read_ssp(file) if Path(file).suffix == ".ssp" else load_system(file).wiring(fmi=int(fmi))
 
 
 @system.command()
@@ -76,13 +85,14 @@ def new(name: str | None, file: str | None) -> None:
 
 @system.command()
 @_FILE
+@_FMI
 @out_option(help="Folder for the archive.")
 @handled
-def build(file: str, out: str) -> None:
-    """Build the FMUs of a system and write it as an archive of SSP 1.0."""
+def build(file: str, fmi: str, out: str) -> None:
+    """Build the FMUs of a system and write it as an archive of SSP 1.0, with FMI 3.0 of SSP 2.0."""
     from ..systems import write_ssp
 
-    say(f"wrote {write_ssp(_wiring(file), folder_of(out) / f'{Path(file).stem}.ssp')}")
+    say(f"wrote {write_ssp(_wiring(file, fmi), folder_of(out) / f'{Path(file).stem}.ssp')}")
 
 
 @system.command()
@@ -90,20 +100,39 @@ def build(file: str, out: str) -> None:
 @click.option("--step", help="Communication step, such as '1 ms'.")
 @click.option("--stop", help="End of the run, such as '3 s'.")
 @click.option(
-    "--coupling", default="hold", show_default=True, help="How inputs go over a step: hold, derivatives, rollback."
+    "--coupling",
+    default="hold",
+    show_default=True,
+    help="How inputs go over a step: hold, derivatives, updates, rollback.",
 )
+@click.option(
+    "--share",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    help="Choose the steps so that the coupling brings in about this share of the power, such as 1e-3.",
+)
+@_FMI
 @out_option()
 @plot_option
 @handled
-def run(file: str, step: str | None, stop: str | None, coupling: str, out: str, plot: bool) -> None:
+def run(
+    file: str,
+    step: str | None,
+    stop: str | None,
+    coupling: str,
+    share: float | None,
+    fmi: str,
+    out: str,
+    plot: bool,
+) -> None:
     """Run a system: a table of its connected outputs, all outputs as CSV, a plot."""
     from ..files import write_csv
     from ..systems import run_system
     from ..units import display_of
 
     found = run_system(
-        _wiring(file),
+        _wiring(file, fmi),
         coupling=coupling,
+        share=share,
         step=None if step is None else quantity(step, "s", "--step"),
         stop_time=None if stop is None else quantity(stop, "s", "--stop"),
         progress=True,
@@ -118,8 +147,11 @@ def run(file: str, step: str | None, stop: str | None, coupling: str, out: str, 
     for note in found.notes:
         print_error(f"note: {note}")
     if found.powers:
+        advice = found.step_for(1e-3)
+        then = f"; 0.1 % takes steps of about {1e3 * advice:.2g} ms" if advice is not None and share is None else ""
         say(
-            f"work that the coupling brought in: {100.0 * found.brought_in():.2g} % of what went through the power bonds"
+            f"work that the coupling brought in: {100.0 * found.brought_in():.2g} % of what went through the power "
+            f"bonds{then}"
         )
     folder, stem = folder_of(out), Path(file).stem
     residuals = {f"power residual of {name}": power for name, power in found.powers.items()}
@@ -134,10 +166,11 @@ def run(file: str, step: str | None, stop: str | None, coupling: str, out: str, 
 @system.command()
 @_FILE
 @click.option("--stop", help="End of the runs, such as '0.2 s'.")
+@click.option("--decades", type=click.IntRange(1, 4), default=2, show_default=True, help="Decades of steps.")
 @out_option(help="Folder for the plot.")
 @plot_option
 @handled
-def check(file: str, stop: str | None, out: str, plot: bool) -> None:
+def check(file: str, stop: str | None, decades: int, out: str, plot: bool) -> None:
     """Check the wiring of a system; of a description measure the error of each coupling over the step, too.
 
     The truth that errors are relative to is the system as one model, by SciPy at a tolerance of 1e-12.
@@ -147,7 +180,8 @@ def check(file: str, stop: str | None, out: str, plot: bool) -> None:
     wiring = _wiring(file)
     bonds = wiring.bonds()
     say(
-        f"{wiring.title}: {len(wiring.parts)} parts, {len(wiring.connections)} connections, {len(bonds)} power bonds; all match"
+        f"{wiring.title}: {len(wiring.parts)} parts, {len(wiring.connections)} connections, {len(bonds)} power "
+        f"bond{'' if len(bonds) == 1 else 's'}; all match"
     )
     for bond in bonds:
         say(f"power bond {bond.effort} -> {bond.effort_to}, back {bond.flow} -> {bond.flow_to}")
@@ -155,13 +189,25 @@ def check(file: str, stop: str | None, out: str, plot: bool) -> None:
         print_error(f"note: {note}")
     if Path(file).suffix == ".ssp":
         return
-    found = convergence(load_system(file), stop_time=None if stop is None else quantity(stop, "s", "--stop"))
+    found = convergence(
+        load_system(file),
+        decades=decades,
+        stop_time=None if stop is None else quantity(stop, "s", "--stop"),
+        progress=True,
+    )
     rows = [
         (f"{1e3 * step:.4g}", *(f"{errors[n]:.2e}" for errors in found.errors.values()))
         for n, step in enumerate(found.steps)
     ]
     rows.append(("order", *(f"{found.order(way):.2f}" for way in found.errors)))
     show_table("greatest relative error of the connected outputs", ("step [ms]", *found.errors), rows)
+    if bonds:
+        rows = [
+            (f"{1e3 * step:.4g}", *(f"{100.0 * powers[n]:.2g}" for powers in found.powers.values()))
+            for n, step in enumerate(found.steps)
+        ]
+        show_table("work that the coupling brought in, of what went through the power bonds [%]",
+                   ("step [ms]", *found.powers), rows)  # fmt: skip
     for when, message in found.messages.items():
         print_error(f"note: {when}: {message}")
     for path in plotted(plot, found, folder_of(out) / f"{Path(file).stem}-check.png"):

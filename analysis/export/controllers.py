@@ -95,6 +95,22 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
                 variable[0].set("unit", units[str(variable.get("name"))])
         return root
 
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Return values; until the first sample is taken, outputs are those of the present inputs."""
+        if self.count == 0:
+            self.preview()
+        values: list[float] = super().get_real(vrs)
+        return values
+
+    def preview(self) -> None:
+        """Set the outputs that a sample at the start would give, and leave the states."""
+        if not self.sample_time > 0.0:
+            return
+        states = {row.name: getattr(self, row.name) for row in self.rows if row.causality == "local"}
+        self.sample(0.0)
+        for name, value in states.items():
+            setattr(self, name, value)
+
     def exit_initialization_mode(self) -> None:
         """Take the sample at the start."""
         if not self.sample_time > 0.0:

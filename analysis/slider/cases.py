@@ -30,7 +30,8 @@ from ..files import (
     text,
     unchanged,
 )
-from ..linear import design_pid, linearise_along
+from ..linear import Design, design_pid, linearise_along
+from ..numerics.fourier import FourierSeries
 from ..run import parameters_to
 from ..synthesis import (
     ANGLES,
@@ -277,13 +278,11 @@ class SliderCase:
         }
         if wanted.coulomb_friction is not None:
             other["slider_coulomb_friction"] = wanted.coulomb_friction
-        bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
-        design = design_pid(linearise_along(model, drive).mean(), bandwidth=bandwidth) if bandwidth > 0.0 else None
         controller = TrackingController(
             model,
             drive.slider,
             wanted.period,
-            design=design,
+            design=self._design(drive, wanted),
             feedforward=wanted.feedforward,
             load=drive.load if wanted.load_known else (0.0, 0.0),
             limit=wanted.limit,
@@ -295,6 +294,60 @@ class SliderCase:
             plant=replace(model, **other),
             load=drive.load,
         )
+
+    def _design(self, drive: SliderDrive, wanted: TrackingWanted) -> Design | None:
+        """Return the feedback of the run under control, None without."""
+        bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
+        return (
+            design_pid(linearise_along(drive.parameters, drive).mean(), bandwidth=bandwidth)
+            if bandwidth > 0.0
+            else None
+        )
+
+    def system(self, drive: SliderDrive, case: str) -> dict[str, Any]:
+        """Return the tables of a system in which a controller lets the slider of a case file follow its motion."""
+        from ..export.controllers import HARMONICS
+
+        wanted = self.tracking or TrackingWanted()
+        design = self._design(drive, wanted)
+        reference: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
+        # at equal angles over a turn from 0, the angle that the crank starts at
+        for name, unit, samples in (("motion", "m", drive.states[:, 1]), ("load", "N", drive.force)):
+            series = FourierSeries.from_samples(samples, HARMONICS)
+            reference[f"{name}_0"] = with_unit(series.cos[0], unit)
+            for n in range(1, HARMONICS + 1):
+                reference[f"{name}_cos_{n}"] = with_unit(series.cos[n], unit)
+                reference[f"{name}_sin_{n}"] = with_unit(series.sin[n], unit)
+        controller: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
+        if design is not None:
+            gain, derivative_gain = design.gains.tolist()
+            controller["gain"], controller["derivative_gain"] = (
+                with_unit(gain, "N/m"),
+                with_unit(derivative_gain, "N.s/m"),
+            )
+            controller["integral_gain"] = design.integral_gain
+        if isfinite(wanted.limit):
+            controller["limit"] = with_unit(wanted.limit, "N")
+        return {
+            "title": f"{self.synthesis.title}: controller and five-bar slider",
+            "parts": {
+                "linkage": {"case": case},
+                "reference": {"controller": "motion-reference", "values": reference},
+                "controller": {"controller": "pid", "values": controller},
+            },
+            "connections": {
+                "reference.angle": "linkage.crank.angle",
+                "reference.speed": "linkage.crank.speed",
+                "controller.reference": "reference.position",
+                "controller.measured": "linkage.slider.position",
+                "controller.feed_forward": "reference.force",
+                "linkage.slider.force": "controller.force",
+            },
+            "run": {
+                "stop_time": with_unit(wanted.revolutions * drive.period, "s"),
+                "step": with_unit(wanted.period, "s"),
+            },
+        }
 
 
 def _fixed_bounds(linkage: Linkage) -> dict[str, tuple[float, float]]:

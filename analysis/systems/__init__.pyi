@@ -1,5 +1,6 @@
 from .convergence import WAYS as WAYS
 from .convergence import Convergence as Convergence
+from .convergence import Way as Way
 from .convergence import convergence as convergence
 from .description import PARTNERS as PARTNERS
 from .description import System as System
@@ -8,6 +9,9 @@ from .description import load_system as load_system
 from .joined import Joined as Joined
 from .layout import Box as Box
 from .layout import boxes as boxes
+from .many import SystemRuns as SystemRuns
+from .many import SystemRunsEnded as SystemRunsEnded
+from .many import run_many as run_many
 from .master import COUPLINGS as COUPLINGS
 from .master import SystemRun as SystemRun
 from .master import run_system as run_system

@@ -4,23 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..files import unknown_name
+from ..run import shown
 from .description import System
 from .joined import Joined
 from .master import SystemRun, run_system
 
-#: The couplings that are compared: of the master, and whether rates of commanded speeds are connected.
+
+class Way(NamedTuple):
+    """A way of coupling: of the master, whether rates of commanded speeds are connected, the version of FMI."""
+
+    coupling: str
+    rates: bool = True
+    fmi: int = 2
+
+
+#: The ways that are compared.
 WAYS = {
-    "hold": ("hold", False),
-    "acceleration": ("hold", True),
-    "derivatives": ("derivatives", True),
-    "rollback": ("rollback", True),
+    "hold": Way("hold", rates=False),
+    "acceleration": Way("hold"),
+    "derivatives": Way("derivatives"),
+    "updates": Way("updates", fmi=3),
+    "rollback": Way("rollback"),
 }
+#: Steps of a decade, as shares of its first: each divides that.
+_DECADE = (1.0, 0.5, 0.2)
+#: Errors below this are those of the parts' own integration, not of the coupling.
+_FLOOR = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +53,8 @@ class Convergence:
         By coupling the greatest error of all connected outputs, accelerations left out, at the points of the greatest step,
         each relative to its greatest magnitude; NaN where a part refused a step.
     powers : mapping of str to (N,) float array
-        By coupling the work that it brought in, as a share of the work that went through the power bonds; 0 without bonds.
+        By coupling the work that it brought in, as a share of the work that went through the power bonds; 0 without bonds, NaN
+        where a part refused a step.
     messages : mapping of str to str
         What a part said that refused a step, by coupling and step.
     """
@@ -48,8 +66,11 @@ class Convergence:
     messages: Mapping[str, str]
 
     def order(self, way: str) -> float:
-        """Return the order of a coupling, the slope of the error over the step by regression; NaN with less than two errors."""
-        good = np.isfinite(self.errors[way]) & (self.errors[way] > 0.0)
+        """Return the order of a coupling, the slope of the error over the step by regression; NaN with less than two errors.
+
+        Errors above a tenth, where the step is too long for the system, and those of the parts' own integration do not count.
+        """
+        good = np.isfinite(self.errors[way]) & (self.errors[way] > _FLOOR) & (self.errors[way] < 0.1)
         if np.count_nonzero(good) < 2:
             return float("nan")
         return float(np.polyfit(np.log(self.steps[good]), np.log(self.errors[way][good]), 1)[0])
@@ -59,8 +80,10 @@ def convergence(
     system: System,
     steps: Sequence[float] | None = None,
     *,
+    decades: int = 2,
     stop_time: float | None = None,
     ways: Sequence[str] = tuple(WAYS),
+    progress: bool = False,
 ) -> Convergence:
     """Run a system in several couplings at several steps, and compare with its equations joined.
 
@@ -68,23 +91,32 @@ def convergence(
     ----------
     system : System
     steps : sequence of float, optional
-        Communication steps (s), each a whole fraction of the first; by default halvings of four times the system's, or of a
-        controller's sample time.
+        Communication steps (s), each a whole fraction of the first; by default three a decade from the system's own, or a
+        controller's sample time, on.
+    decades : int
+        Number of them.
     stop_time : float, optional
         By default 50 times the first step, or the system's, if that is less (s).
     ways : sequence of str
         Of `WAYS`.
+    progress : bool
 
     Raises
     ------
     InputError
         If a step does not divide the first, or that the stop time.
+    UnknownNameError
+        If a way is not one of `WAYS`.
     WiringError
         If a part is an FMU, of which no equations are known.
     """
+    for way in ways:
+        if way not in WAYS:
+            raise unknown_name(way, WAYS, f"coupling {way!r}")
     if steps is None:
         periods = [m.values.get("sample_time", 1e-3) for m in system.members.values() if m.controller]
-        steps = [min(4.0 * system.run.step, *periods, system.run.stop_time) * 0.5**n for n in range(7)]
+        first = min(system.run.step, *periods, system.run.stop_time)
+        steps = [first * share * 0.1**n for n in range(decades) for share in _DECADE] + [first * 0.1**decades]
     stop_time = min(system.run.stop_time, 50.0 * steps[0]) if stop_time is None else stop_time
     for whole, part in [(stop_time, steps[0]), *((steps[0], step) for step in steps)]:
         if abs(whole / part - round(whole / part)) > 1e-9 * whole / part:
@@ -92,28 +124,31 @@ def convergence(
                 f"a step of {part:g} s does not divide {whole:g} s: it must, so that the runs have common points"
             )
     right = Joined(system).run(stop_time, steps[0])
-    wirings = {True: system.wiring(), False: system.without_rates().wiring()}
+    wirings = {way: (system if WAYS[way].rates else system.without_rates()).wiring(fmi=WAYS[way].fmi) for way in ways}
     # accelerations leap where a controller takes a sample
-    continuous = [
-        s for s in dict.fromkeys(system.connections.values()) if not wirings[True].port(s).unit.endswith("/s2")
-    ]
-    names = [str(source) for source in continuous if str(source) in right.values]
-    errors: dict[str, list[float]] = {}
-    powers: dict[str, list[float]] = {}
+    ports = next(iter(wirings.values()))
+    sources = dict.fromkeys(system.connections.values())
+    names = [str(s) for s in sources if not ports.port(s).unit.endswith("/s2") and str(s) in right.values]
+    errors = {way: np.full(len(steps), np.nan) for way in ways}
+    powers = {way: np.full(len(steps), np.nan) for way in ways}
     messages = {}
-    for way in ways:
-        coupling, rates = WAYS[way]
-        for step in steps:
-            run = run_system(wirings[rates], coupling=coupling, step=step, stop_time=stop_time)
-            if run.status:
-                messages[f"{way}, {step:g} s"] = run.message
-            errors.setdefault(way, []).append(_error(run, right, names) if run.status == 0 else float("nan"))
-            powers.setdefault(way, []).append(run.brought_in())
+    whole = len(ways) * sum(1.0 / step for step in steps)
+    with shown(progress, whole, "couplings and steps") as show:
+        done = 0.0
+        for way in ways:
+            for number, step in enumerate(steps):
+                run = run_system(wirings[way], coupling=WAYS[way].coupling, step=step, stop_time=stop_time)
+                done += 1.0 / step
+                show(done)
+                if run.status:
+                    messages[f"{way}, {step:g} s"] = run.message
+                    continue
+                errors[way][number], powers[way][number] = _error(run, right, names), run.brought_in()
     return Convergence(
         title=system.title,
         steps=np.array(steps),
-        errors={way: np.array(found) for way, found in errors.items()},
-        powers={way: np.array(found) for way, found in powers.items()},
+        errors=errors,
+        powers=powers,
         messages=messages,
     )
 

@@ -16,7 +16,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 
 from .. import files
-from ..export import NATIVE, build_controller, build_native
+from ..export import NATIVE, NATIVE_FMI3, build_controller, build_native
 from ..export.controllers import CONTROLLERS, UNITS
 from ..files import Quantity, Table, entry, unknown_name
 from ..linkages import load_linkage
@@ -158,8 +158,14 @@ class System:
             found[freedom.mode.name] = float(mode)
         return found
 
-    def wiring(self, folder: str | Path | None = None) -> Wiring:
+    def wiring(self, folder: str | Path | None = None, *, fmi: int = 2) -> Wiring:
         """Return the wiring of the system, its FMUs built in a folder, by default one of the user's cache.
+
+        Parameters
+        ----------
+        folder : path, optional
+        fmi : int
+            Version of FMI of the mechanisms and partners, 2 or 3; controllers are of FMI 2.0.
 
         Raises
         ------
@@ -169,7 +175,7 @@ class System:
             If a connection cannot be right.
         """
         place = code_folder("systems") if folder is None else Path(folder)
-        parts = {name: Part.of(name, member.built(place), member.values) for name, member in self.members.items()}
+        parts = {name: Part.of(name, member.built(place, fmi), member.values) for name, member in self.members.items()}
         return Wiring(
             title=self.title,
             parts=parts,
@@ -200,15 +206,18 @@ class Member:
     controller: str = ""
     fmu: Path | None = None
 
-    def built(self, folder: Path) -> Path:
+    def built(self, folder: Path, fmi: int = 2) -> Path:
         """Return its FMU, built if it is not there."""
+        kinds = {2: NATIVE, 3: NATIVE_FMI3}
+        if fmi not in kinds:
+            raise ParameterError("fmi", fmi, "be 2 or 3")
         if self.fmu is not None:
             return self.fmu
         if self.mechanism is None:
             return build_controller(self.controller, folder)
         key = _tag(*(Path(str(m.__file__)).read_text(encoding="utf-8") for m in self.mechanism.modules), __version__)
-        target = folder / key / NATIVE.file_name(self.mechanism)
-        return target if target.is_file() else build_native(self.mechanism, NATIVE, target.parent)
+        target = folder / key / kinds[fmi].file_name(self.mechanism)
+        return target if target.is_file() else build_native(self.mechanism, kinds[fmi], target.parent)
 
 
 def _number(value: Any, name: str) -> float:

@@ -6,6 +6,7 @@ take their samples at their instants, and what they answer acts at once.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields as dataclass_fields
 from itertools import pairwise
 from typing import Any
@@ -181,16 +182,25 @@ class Joined:
 
     def _sampled(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what the controllers hold from an instant of sampling on; each sees what the others held until then."""
-
-        def held() -> NDArray[np.float64]:
-            return np.array([getattr(self.controllers[end.part], end.port) for end in self.given])
-
         due = {name: c for name, c in self.controllers.items() if c.count * c.sample_time <= t + 1e-6 * c.sample_time}
-        told = dict(zip(self.names, self._outputs(x, held()).full().ravel())) | dict(zip(self.given, held()))
-        for target, source in self.system.connections.items():
-            if target.part in due:
-                setattr(due[target.part], target.port, told[source])
+        # at the start what one controller is told by another settles after as many rounds as there are
+        for _ in due if t == 0.0 else ():
+            self._tell(due, x)
+            for controller in due.values():
+                controller.preview()
+        self._tell(due, x)
         for controller in due.values():
             controller.sample(t)
             controller.count += 1
-        return held()
+        return self._held()
+
+    def _held(self) -> NDArray[np.float64]:
+        return np.array([getattr(self.controllers[end.part], end.port) for end in self.given])
+
+    def _tell(self, controllers: Mapping[str, Controller], x: NDArray[np.float64]) -> None:
+        """Set the inputs of controllers to what is connected to them."""
+        held = self._held()
+        told = dict(zip(self.names, self._outputs(x, held).full().ravel())) | dict(zip(self.given, held))
+        for target, source in self.system.connections.items():
+            if target.part in controllers:
+                setattr(controllers[target.part], target.port, told[source])

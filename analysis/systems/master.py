@@ -1,37 +1,39 @@
-"""Running the parts of a system together, in equal communication steps.
+"""Running the parts of a system together, in equal communication steps or in steps that the power bonds ask for.
 
-Over a step the inputs are what the outputs were at its start. How much better that can be, four couplings tell apart.
+Over a step the inputs are what the outputs were at its start, or straight lines: `COUPLINGS`. Where two parts exchange power,
+what the coupling brings in over a step is known at its end (S. Sadjina, L. T. Kyllingstad, S. Skjong and E. Pedersen, Energy
+conservation and power bonds in co-simulations, Engineering with Computers 33, 2017): it says how far a run can be trusted and
+which step would do, and it can choose the steps.
 """
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Iterable, Mapping
-from ctypes import byref, c_void_p
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from fmpy import extract
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
 from ..files import unknown_name
 from ..numerics.workers import interruptible
-from ..run import CosimulationError, RunInterrupted, shown, unpacking_folder
-from .wiring import Bond, End, Part, Wiring
+from ..run import CosimulationError, RunInterrupted, shown
+from .instances import Floats, instance_of
+from .wiring import Bond, End, Wiring
 
 #: How the inputs go over a step.
 COUPLINGS = {
     "hold": "held at what the outputs were at its start",
-    "derivatives": "on straight lines with the slopes that the outputs had there, where a part takes such inputs",
+    "derivatives": "on straight lines with the slopes that the outputs had there; FMI 3.0: held at what they are in the middle",
+    "updates": "on the same lines, which a part of FMI 3.0 is told again at each step of its own integrator",
     "rollback": "on straight lines to what the outputs are at its end: the step is taken again from its start",
 }
+#: Gains of the controller of the communication step, proportional and integral; the least and greatest growth of a step, and of
+#: all steps, as shares of the first one (Sadjina et al., section 5).
+_GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +65,9 @@ class SystemRun:
     """
 
     time: NDArray[Any]
-    values: Mapping[str, NDArray[np.float64]]
-    powers: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    flows: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    values: Mapping[str, Floats]
+    powers: Mapping[str, Floats] = field(default_factory=dict)
+    flows: Mapping[str, Floats] = field(default_factory=dict)
     status: int = 0
     message: str = ""
     notes: tuple[str, ...] = ()
@@ -74,7 +76,7 @@ class SystemRun:
     units: Mapping[str, str] = field(default_factory=dict)
     connected: tuple[str, ...] = ()
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> Floats:
         if name not in self.values:
             raise unknown_name(name, self.values, f"output {name!r}")
         return self.values[name]
@@ -87,102 +89,55 @@ class SystemRun:
 
         Over a step a residual grows from 0, so that its mean is half of what it is at the end.
         """
-        through = sum(float(np.abs(flow).sum()) for flow in self.flows.values())
-        brought = 0.5 * sum(float(np.abs(power).sum()) for power in self.powers.values())
+        steps = np.diff(self.time)
+        through = sum(float(steps @ np.abs(flow[1:])) for flow in self.flows.values())
+        brought = 0.5 * sum(float(steps @ np.abs(power[1:])) for power in self.powers.values())
         return brought / through if through > 0.0 else 0.0
 
+    def step_for(self, share: float) -> float | None:
+        """Return the communication step with which the coupling would bring in a share of the work (s).
 
-class _Instance:
-    """An instance of a part, initialised by `start`."""
-
-    def __init__(self, part: Part) -> None:
-        self.part = part
-        self.messages: list[str] = []
-        self.outputs = part.named("output")
-        self._references = [part.ports[name].reference for name in self.outputs]
-        interface = part.description.coSimulation
-        self.takes_slopes = bool(interface.canInterpolateInputs)
-        self.goes_back = bool(interface.canGetAndSetFMUstate)
-        wrapped = str(part.description.generationTool).startswith("PythonFMU")
-        self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
-        try:
-            extract(str(part.fmu), self._folder)
-            self._fmu = FMU2Slave(
-                guid=part.description.guid,
-                unzipDirectory=self._folder,
-                modelIdentifier=interface.modelIdentifier,
-                instanceName=part.name,
-            )
-            self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-            addLoggerProxy(byref(self._callbacks))
-            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
-        except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
-            raise
-
-    def _log(self, *arguments: Any) -> None:
-        self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
-
-    def begin(self) -> None:
-        """Set the start values and enter the initialisation."""
-        self._fmu.setupExperiment(startTime=0.0)
-        for name, value in self.part.values.items():
-            port = self.part.ports[name]
-            set_as = {"Real": (self._fmu.setReal, float), "Boolean": (self._fmu.setBoolean, bool)}
-            setter, kind = set_as.get(port.type, (self._fmu.setInteger, int))
-            setter([port.reference], [kind(value)])
-        self._fmu.enterInitializationMode()
-
-    def begun(self) -> None:
-        self._fmu.exitInitializationMode()
-
-    def read(self) -> NDArray[np.float64]:
-        """Return all real outputs."""
-        return np.array(self._fmu.getReal(self._references))
-
-    def put(self, values: Mapping[str, float], slopes: Mapping[str, float]) -> None:
-        """Set inputs, and their slopes where it takes them."""
-        references = [self.part.ports[name].reference for name in values]
-        if references:
-            self._fmu.setReal(references, list(values.values()))
-            if slopes and self.takes_slopes:
-                self._fmu.setRealInputDerivatives(references, [1] * len(references), [slopes[name] for name in values])
-
-    def step(self, time: float, step: float) -> None:
-        self._fmu.doStep(time, step)
-
-    def saved(self) -> Any:
-        return self._fmu.getFMUState()
-
-    def restore(self, state: Any) -> None:
-        self._fmu.setFMUState(state)
-
-    def forget(self, state: Any) -> None:
-        self._fmu.freeFMUState(c_void_p(getattr(state, "value", state)))
-
-    def close(self) -> None:
-        try:
-            self._fmu.freeInstance()
-        finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        It holds for equal steps small enough that a residual goes with the step, or with its square where inputs are lines.
+        None without power bonds, and for couplings whose error the residuals do not tell.
+        """
+        brought = self.brought_in()
+        orders = {"hold": 1.0, "derivatives": 2.0}
+        if self.coupling not in orders or brought == 0.0:
+            return None
+        return float(self.time[-1] / (len(self) - 1) * (share / brought) ** (1.0 / orders[self.coupling]))
 
 
 class _Together:
     """All instances of a system, their inputs and outputs at the present communication point."""
 
-    def __init__(self, wiring: Wiring) -> None:
+    def __init__(self, wiring: Wiring, bonds: Sequence[Bond]) -> None:
         self.wiring = wiring
-        self.instances: dict[str, _Instance] = {}
+        self.instances: dict[str, Any] = {}
         try:
             for name, part in wiring.parts.items():
-                self.instances[name] = _Instance(part)
+                self.instances[name] = instance_of(part)
+            self.ends = [End(name, output) for name, each in self.instances.items() for output in each.outputs]
+            index = {end: number for number, end in enumerate(self.ends)}
+            self.targets = t = {target: number for number, target in enumerate(wiring.connections)}
+            #: Of each connected input its output, and the names and numbers of each part's connected inputs.
+            self.sources = np.array([index[source] for source in wiring.connections.values()], dtype=int)
+            self.own = {
+                name: ([t.port for t in self.targets if t.part == name],
+                       np.array([n for t, n in self.targets.items() if t.part == name], dtype=int))
+                for name in self.instances
+            }  # fmt: skip
+            #: Parts whose outputs change at instants only.
+            self.sampled = {
+                name
+                for name, part in wiring.parts.items()
+                if all(part.ports[output].held for output in part.named("output"))
+            }
             for instance in self.instances.values():
                 instance.begin()
             # what depends directly on an input settles after as many rounds as there are parts
             for _ in self.instances:
                 self.outputs = self._read()
-                self._exchange(self.outputs, {})
+                self._exchange(self.outputs)
             for instance in self.instances.values():
                 instance.begun()
         except BaseException as error:
@@ -192,100 +147,139 @@ class _Together:
                 raise CosimulationError("; ".join(said) or f"{wiring.title}: {error}") from error
             raise
         rates = {
-            End(name, port.rate_of): End(name, port.name)
+            End(name, port.rate_of): index[End(name, port.name)]
             for name, part in wiring.parts.items()
             for port in part.ports.values()
             if port.rate_of and port.causality == "output"
         }
-        #: Of each connected input the output with its rate, or the source itself where none is known; None where there is no
-        #: slope to be given: the rate is an input, too, or the source is held.
-        self.rate = {
-            target: None
-            if wiring.port(source).held or wiring.rate_input(target) in wiring.connections
-            else rates.get(source, source)
-            for target, source in wiring.connections.items()
-        }
+        #: Of each connected input the output with its rate, or the source itself where none is known.
+        self.rates = np.array([rates.get(s, index[s]) for s in wiring.connections.values()], dtype=int)
+        #: Connected inputs with a slope: none where the rate is an input, too, or the source is held.
+        self.moving = np.array(
+            [
+                not (wiring.port(source).held or wiring.rate_input(target) in wiring.connections)
+                for target, source in wiring.connections.items()
+            ],
+            dtype=bool,
+        )
+        #: Of each connected input the connected one with its rate, itself where there is none; what it moves with over a step.
+        self.partner = np.array(
+            [self.targets.get(wiring.rate_input(t) or t, number) for t, number in self.targets.items()], dtype=int
+        )
+        #: Numbers of each power bond's outputs and inputs: effort, flow, and what they are connected to.
+        numbers = [(index[b.effort], index[b.flow], t[b.effort_to], t[b.flow_to]) for b in bonds]
+        self.bonds = np.array(numbers, dtype=int).reshape(-1, 4).T
         self.outputs = self.before = self._read()
+        self.last = 1.0
 
-    def _read(self) -> dict[End, float]:
-        return {
-            End(name, output): float(value)
-            for name, instance in self.instances.items()
-            for output, value in zip(instance.outputs, instance.read())
-        }
+    def _read(self) -> Floats:
+        return np.concatenate([instance.read() for instance in self.instances.values()])
 
-    def _exchange(self, outputs: Mapping[End, float], slopes: Mapping[End, float], *, middle: float = 0.0) -> None:
-        """Set all connected inputs; a part that takes no slopes gets the value after ``middle`` (s)."""
-        for name, instance in self.instances.items():
-            own = {t: source for t, source in self.wiring.connections.items() if t.part == name}
-            ahead = 0.0 if instance.takes_slopes else middle
-            values = {t.port: outputs[source] + ahead * slopes.get(t, 0.0) for t, source in own.items()}
-            instance.put(values, {t.port: slopes.get(t, 0.0) for t in own} if slopes else {})
+    def _exchange(
+        self, outputs: Floats, slopes: Floats | None = None, *, middle: float = 0.0, updated: bool = False
+    ) -> None:
+        """Set all connected inputs; a part that takes no slopes gets the values after ``middle`` (s)."""
+        values = outputs[self.sources]
+        for name, (ports, numbers) in self.own.items():
+            own = None if slopes is None else slopes[numbers]
+            # what is sampled is sampled at the start of a step
+            later = middle if name not in self.sampled else 0.0
+            self.instances[name].put(ports, values[numbers], own, middle=later, updated=updated)
 
-    def _slopes(self, step: float) -> dict[End, float]:
+    def _slopes(self) -> Floats:
         """Return the slopes of all connected inputs, those without a known rate from the step before."""
-        found = {}
-        for target, rate in self.rate.items():
-            source = self.wiring.connections[target]
-            if rate is not None:
-                found[target] = (
-                    self.outputs[rate] if rate != source else (self.outputs[source] - self.before[source]) / step
-                )
-        return found
+        found = self.outputs[self.rates]
+        unknown = self.rates == self.sources
+        found[unknown] = (self.outputs - self.before)[self.sources[unknown]] / self.last
+        return np.where(self.moving, found, 0.0)
 
     def step(self, coupling: str, time: float, step: float) -> None:
         """Take a step."""
-        before, slopes = self.outputs, {} if coupling == "hold" else self._slopes(step)
+        before, slopes = self.outputs, None if coupling == "hold" else self._slopes()
         states = {name: each.saved() for name, each in self.instances.items()} if coupling == "rollback" else {}
         try:
-            self._exchange(before, slopes)
+            self._exchange(before, slopes, middle=0.5 * step, updated=coupling == "updates")
             self._go(time, step)
             if coupling == "rollback":
                 there = self._read()
                 for name, state in states.items():
                     self.instances[name].restore(state)
-                for target, source in self.wiring.connections.items():
-                    if self.rate[target] is not None:
-                        slopes[target] = (there[source] - before[source]) / step
+                slopes = np.where(self.moving, (there - before)[self.sources] / step, 0.0)
                 self._exchange(before, slopes, middle=0.5 * step)
                 self._go(time, step)
         finally:
             for name, state in states.items():
                 self.instances[name].forget(state)
-        self.given = {target: self._at_end(target, before, slopes, step) for target in self.wiring.connections}
+        self._note_given(before, slopes, step)
         self.reached = self._read()
-        self.before, self.outputs = before, self.reached
+        self.before, self.outputs, self.last = before, self.reached, step
         if coupling != "hold":
             # what depends directly on inputs belongs to those that begin here; masters that hold inputs do not look again
-            self._exchange(self.reached, {})
+            self._exchange(self.reached)
             self.outputs = self._read()
 
-    def _at_end(self, target: End, before: Mapping[End, float], slopes: Mapping[End, float], step: float) -> float:
-        """Return what an input came to at the end of a step."""
-        value = before[self.wiring.connections[target]]
-        rate = self.wiring.rate_input(target)
-        if rate is not None and rate in self.wiring.connections:
-            slope = before[self.wiring.connections[rate]] + 0.5 * step * slopes.get(rate, 0.0)
-        else:
-            slope = slopes.get(target, 0.0) * (1.0 if self.instances[target.part].takes_slopes else 0.5)
-        return value + step * slope
+    def _note_given(self, before: Floats, slopes: Floats | None, step: float) -> None:
+        """Keep what the inputs came to at the end of a step; an input with a connected rate goes with that."""
+        values = before[self.sources]
+        self.given = values.copy()
+        for name, (_, numbers) in self.own.items():
+            self.given[numbers] = self.instances[name].at_end(step)
+        paired = self.partner != np.arange(len(values))
+        rates = values if slopes is None else values + 0.5 * step * slopes
+        self.given[paired] = (values + step * rates[self.partner])[paired]
 
     def _go(self, time: float, step: float) -> None:
         for name, instance in self.instances.items():
             self.stepping = name
             instance.step(time, step)
 
-    def powers(self, bonds: Iterable[Bond]) -> dict[str, float]:
-        """Return the power residual of each bond at the end of the last step (W)."""
-        return {
-            str(bond.effort): self.given[bond.effort_to] * self.reached[bond.flow]
-            - self.reached[bond.effort] * self.given[bond.flow_to]
-            for bond in bonds
-        }
+    def powers(self) -> tuple[Floats, Floats]:
+        """Return the power residual of each bond at the end of the last step, and the power that goes through it then (W)."""
+        effort, flow, effort_to, flow_to = self.bonds
+        through = self.reached[effort] * self.reached[flow]
+        return self.given[effort_to] * self.reached[flow] - self.reached[effort] * self.given[flow_to], through
 
     def close(self) -> None:
         for instance in self.instances.values():
             instance.close()
+
+
+class _Stepper:
+    """Length of the next communication step: always the same, or such that the coupling brings in about a share of the work."""
+
+    def __init__(self, step: float, stop_time: float, share: float | None) -> None:
+        self.step, self.stop_time, self.share = step, stop_time, share
+        self.first, self.number, self.before, self.scale = step, 0, 0.0, 0.0
+
+    def next(self, time: float) -> tuple[float, float]:
+        """Return the length of the step from a time, and the time at its end."""
+        if self.share is None:
+            end = (self.number + 1) * self.step
+        else:
+            # the last two steps share what is left
+            left = self.stop_time - time
+            end = self.stop_time if left <= 1.0001 * self.step else time + min(self.step, max(0.5 * left, 1e-9 * left))
+        self.number += 1
+        return end - time, end
+
+    @property
+    def count(self) -> int:
+        """Number of equal steps."""
+        return round(self.stop_time / self.first)
+
+    def learn(self, powers: Floats, flows: Floats) -> None:
+        """Take note of the power residuals and the powers after a step: PI control of the share that is brought in."""
+        if self.share is None:
+            return
+        self.scale = max(self.scale, float(np.sqrt(np.mean(flows**2))))
+        error = 0.5 * float(np.sqrt(np.mean(powers**2))) / (self.share * self.scale) if self.scale > 0.0 else 0.0
+        proportional, integral = _GAINS
+        if error > 0.0:
+            before = self.before or error
+            growth = error ** -(proportional + integral) * before**proportional
+            low, high = (bound * self.first for bound in _STEPS)
+            self.step = float(np.clip(self.step * np.clip(growth, *_GROWTH), low, min(high, self.stop_time)))
+        self.before = error
 
 
 def run_system(
@@ -294,6 +288,7 @@ def run_system(
     coupling: str = "hold",
     step: float | None = None,
     stop_time: float | None = None,
+    share: float | None = None,
     progress: bool = False,
 ) -> SystemRun:
     """Run the FMUs of a system together.
@@ -305,6 +300,9 @@ def run_system(
         One of `COUPLINGS`.
     step, stop_time : float, optional
         Communication step and end (s); by default the wiring's.
+    share : float, optional
+        With it the steps, of which ``step`` is the first, become as long as the coupling brings in about this share of the
+        greatest power through the bonds, such as 1e-3.
     progress : bool
 
     Returns
@@ -317,7 +315,8 @@ def run_system(
     CosimulationError
         If a part cannot be loaded or initialised.
     InputError
-        If the step is not positive and below the stop time, or a part cannot go back to the start of a step.
+        If the step is not positive and below the stop time, a part cannot go back to the start of a step, or ``share`` is given
+        where there is no power bond.
     """
     if coupling not in COUPLINGS:
         raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
@@ -326,11 +325,18 @@ def run_system(
         raise InputError(
             f"the communication step is {step} s: it must be above 0 and at most the stop time, {stop_time} s"
         )
-    together = _Together(wiring)
-    rows: list[dict[End, float]] = [together.outputs]
     bonds = wiring.bonds()
-    powers: list[dict[str, float]] = [{str(bond.effort): 0.0 for bond in bonds}]
-    status, message, count = 0, "", round(stop_time / step)
+    if share is not None and not (share > 0.0 and bonds):
+        raise InputError(
+            f"steps for a share of {share:g}: the share must be above 0, and the system must have a power bond, "
+            f"of which it has {len(bonds)}"
+        )
+    together = _Together(wiring, bonds)
+    stepper = _Stepper(step, stop_time, share)
+    times, rows = [0.0], [together.outputs]
+    effort, flow = together.bonds[:2]
+    powers, flows = [np.zeros(len(bonds))], [together.outputs[effort] * together.outputs[flow]]
+    status, message = 0, ""
     try:
         stuck = [name for name, each in together.instances.items() if not each.goes_back]
         if coupling == "rollback" and stuck:
@@ -338,30 +344,36 @@ def run_system(
                 f"{stuck[0]} cannot go back to the start of a step: the coupling must be another than rollback"
             )
         with interruptible() as interrupted, shown(progress, stop_time, "running the system") as show:
-            for number in range(count):
+            while times[-1] < stop_time * (1.0 - 1e-12) and not interrupted:
+                if share is None and stepper.number == stepper.count:
+                    break
+                length, end = stepper.next(times[-1])
                 try:
-                    together.step(coupling, number * step, step)
+                    together.step(coupling, times[-1], length)
                 except FMICallException as error:
-                    status, message = 3, _said(together, number * step, error)
+                    status, message = 3, _said(together, times[-1], error)
                     break
+                times.append(end)
                 rows.append(together.outputs)
-                powers.append(together.powers(bonds))
-                show((number + 1) * step)
-                if interrupted:
-                    break
+                residual, through = together.powers()
+                powers.append(residual)
+                flows.append(through)
+                stepper.learn(residual, through)
+                show(end)
     finally:
         together.close()
+    table, residuals, passing = np.array(rows), np.array(powers), np.array(flows)
     run = SystemRun(
-        time=step * np.arange(len(rows)),
-        values={str(end): np.array([row[end] for row in rows]) for end in rows[0]},
-        powers={name: np.array([row[name] for row in powers]) for name in powers[0]},
-        flows={str(b.effort): np.array([row[b.effort] * row[b.flow] for row in rows]) for b in bonds},
+        time=np.array(times),
+        values={str(end): table[:, number] for number, end in enumerate(together.ends)},
+        powers={str(bond.effort): residuals[:, number] for number, bond in enumerate(bonds)},
+        flows={str(bond.effort): passing[:, number] for number, bond in enumerate(bonds)},
         status=status,
         message=message,
         notes=tuple(wiring.notes()),
         title=wiring.title,
         coupling=coupling,
-        units={str(end): wiring.port(end).unit for end in rows[0]},
+        units={str(end): wiring.port(end).unit for end in together.ends},
         connected=tuple(map(str, dict.fromkeys(wiring.connections.values()))),
     )
     if interrupted:

@@ -1,4 +1,6 @@
-"""Systems as files of SSP 1.0 (System Structure and Parameterization), written and read with pyssp-standard.
+"""Systems as files of SSP (System Structure and Parameterization), written and read with pyssp-standard.
+
+An archive is of SSP 1.0, which knows FMI 2.0; with a part of FMI 3.0 it is of SSP 2.0.
 
 What the library does not know is added here: the geometry of the diagram; and its units are put where the schema has them. It
 reads no transformations of connections and no signal dictionaries: a file with one is refused.
@@ -23,7 +25,7 @@ from ..files import output
 from ..libraries import lazy
 from ..numerics.cache import code_folder, put
 from .layout import boxes
-from .wiring import End, Part, Wiring, WiringError
+from .wiring import REAL, End, Part, Port, Wiring, WiringError
 
 ssp = lazy("pyssp_standard.ssp")
 ssd = lazy("pyssp_standard.ssd")
@@ -31,6 +33,8 @@ common = lazy("pyssp_standard.common_content_ssc")
 unit = lazy("pyssp_standard.unit")
 etree = lazy("lxml.etree")
 _NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+#: Type of the annotation of the experiment with the communication step, for which the standard has no place.
+_STEP = "linkwork.communication-step"
 #: What the library would read past in silence.
 _UNREAD = ("LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "SignalDictionaries")
 
@@ -54,7 +58,8 @@ def write_ssp(wiring: Wiring, path: str | Path) -> Path:
                     archive.add_resource(stored)
                 archive.add_resource(_values(Path(folder) / f"{name}.ssv", part))
             with archive.system_structure as structure:
-                structure.name, structure.version = wiring.title or "system", "1.0"
+                newer = any(part.description.fmiVersion.startswith("3") for part in wiring.parts.values())
+                structure.name, structure.version = wiring.title or "system", "2.0" if newer else "1.0"
                 structure.system = ssd.System(None, "system")
                 structure.system.elements = [
                     _component(part, sources[name], _ports(wiring, name)) for name, part in wiring.parts.items()
@@ -118,6 +123,10 @@ def _complete(path: Path, wiring: Wiring) -> None:
     found = {node.tag: node for node in root}
     if f"{_NAMESPACE}Units" in found:
         found[f"{_NAMESPACE}DefaultExperiment"].addprevious(found[f"{_NAMESPACE}Units"])
+    common = f"{{{root.nsmap['ssc']}}}"
+    annotations = etree.SubElement(found[f"{_NAMESPACE}DefaultExperiment"], f"{_NAMESPACE}Annotations")
+    note = etree.SubElement(annotations, f"{common}Annotation", type=_STEP)
+    etree.SubElement(note, "step", unit="s").text = repr(wiring.step)
     for element in root.iter(f"{_NAMESPACE}Component"):
         box = placed[element.get("name")]
         for connector in element.iter(f"{_NAMESPACE}Connector"):
@@ -131,22 +140,30 @@ def _complete(path: Path, wiring: Wiring) -> None:
 
 
 def _values(path: Path, part: Part) -> Path:
-    """Write the start values of a part."""
+    """Write the start values of a part; those of an enumeration by the names of its items."""
+    ports = [part.ports[name] for name in part.values]
     with lazy("pyssp_standard.ssv").SSV(path, mode="w") as values:
-        for name, value in part.values.items():
-            port = part.ports[name]
-            whole = port.type in ("Integer", "Enumeration")
-            values.add_parameter(
-                name, port.type, value=int(value) if whole else value, unit=(port.unit or None) if not whole else None
-            )
-        for name in dict.fromkeys(part.ports[n].unit for n in part.values if part.ports[n].type == "Real"):
-            if name:
-                values.units.add_unit(unit.Unit(name, unit.BaseUnit(_base(name))))
+        for port in ports:
+            value = part.values[port.name]
+            if port.type in REAL:
+                values.add_parameter(port.name, "Real", value=float(value), unit=port.unit or None)
+            elif port.type == "Boolean":
+                values.add_parameter(port.name, "Boolean", value=str(bool(value)).lower())
+            elif port.items:
+                name = dict(port.items).get(int(value), str(int(value)))
+                values.add_parameter(port.name, "Enumeration", value=name, name=port.enumeration)
+            else:
+                values.add_parameter(port.name, "Integer", value=int(value))
+        for name in dict.fromkeys(port.unit for port in ports if port.type in REAL and port.unit):
+            values.units.add_unit(unit.Unit(name, unit.BaseUnit(_base(name))))
+        for name, items in {port.enumeration: port.items for port in ports if port.items}.items():
+            rows = [common.Item(text, number) for number, text in items]
+            values.enumerations.add_enumeration(common.Enumeration(name, rows))
     return path
 
 
 def read_ssp(path: str | Path) -> Wiring:
-    """Read a system from an ``.ssp``: FMUs of FMI 2.0 on one level, connections, start values of ``.ssv``, through ``.ssm``.
+    """Read a system from an ``.ssp``: FMUs on one level, connections, start values of ``.ssv``, through ``.ssm``.
 
     Raises
     ------
@@ -162,9 +179,8 @@ def read_ssp(path: str | Path) -> Wiring:
     with zipfile.ZipFile(path) as archive:
         if "SystemStructure.ssd" not in archive.namelist():
             raise InputError(f"{path} has no SystemStructure.ssd: it must be an archive of SSP")
-        tags = {
-            node.tag.rpartition("}")[2] for node in ElementTree.fromstring(archive.read("SystemStructure.ssd")).iter()
-        }
+        nodes = list(ElementTree.fromstring(archive.read("SystemStructure.ssd")).iter())
+    tags = {node.tag.rpartition("}")[2] for node in nodes}
     for tag in _UNREAD:
         if tag in tags:
             raise WiringError(
@@ -180,7 +196,11 @@ def read_ssp(path: str | Path) -> Wiring:
             fmu = folder / Path(element.source).name
             put(fmu, (archive.unpacked_path / element.source).read_bytes())
             bindings = [*(element.parameter_bindings or ()), *(system.parameter_bindings or ())]
-            values = _bound(archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ()))
+            texts = _bound(archive.unpacked_path, bindings, element.name, own=len(element.parameter_bindings or ()))
+            part = Part.of(element.name, fmu, {})
+            values = {
+                key: _as_number(text, part.ports.get(key), f"{element.name}.{key}") for key, text in texts.items()
+            }
             parts[element.name] = Part.of(element.name, fmu, values)
         connections = {
             End(c.end_element, c.end_connector): End(c.start_element, c.start_connector)
@@ -194,14 +214,14 @@ def read_ssp(path: str | Path) -> Wiring:
             )
         experiment = structure.default_experiment
     stop_time = float(experiment.stop_time) if experiment is not None else 1.0
-    return Wiring(
-        title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=1e-3 * stop_time
-    )
+    steps = [str(node[0].text) for node in nodes if node.get("type") == _STEP and len(node)]
+    step = _as_number(steps[0], None, f"{path}: the communication step") if steps else 1e-3 * stop_time
+    return Wiring(title=structure.name, parts=parts, connections=connections, stop_time=stop_time, step=step)
 
 
-def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, float]:
-    """Return the start values of a part: those of its own bindings, and those of the system's with its name before them."""
-    found: dict[str, float] = {}
+def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
+    """Return the texts of a part's start values, of its own bindings and of the system's, where its name stands before them."""
+    found: dict[str, str] = {}
     for number, binding in enumerate(bindings):
         inline, prefix = binding.ssv is not None, binding.prefix or ""
         values = binding.ssv if inline else lazy("pyssp_standard.ssv").SSV(folder / binding.source, mode="r")
@@ -213,7 +233,7 @@ def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[s
                     continue
                 text = parameter["type_value"].parameter["value"]
                 key = whole if number < own else whole.removeprefix(f"{name}.")
-                found.setdefault(key, _as_number(text, f"{name}.{key}"))
+                found.setdefault(key, text)
     return found
 
 
@@ -231,9 +251,12 @@ def _mapping(folder: Path, binding: Any) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _as_number(text: str, name: str) -> float:
-    if text in ("true", "false"):
-        return float(text == "true")
+def _as_number(text: str, port: Port | None, name: str) -> float:
+    """Return a start value as a number: of a Boolean 0 or 1, of an item of an enumeration its value."""
+    names = {item: float(value) for value, item in port.items} if port is not None else {}
+    names |= {"true": 1.0, "false": 0.0}
+    if text in names:
+        return names[text]
     try:
         return float(text)
     except ValueError:

@@ -17,10 +17,15 @@ class WiringError(LinkworkError):
     """A system is wired wrongly: the sentence says which connection, and what would be right."""
 
 
-class Port(NamedTuple):
-    """A variable of an FMU: its type in FMI 2.0, its unit, and the variable that it is the time derivative of, if any.
+#: The types of real variables, in FMI 2.0 and 3.0.
+REAL = ("Real", "Float64")
 
-    ``held`` says that it changes at instants only.
+
+class Port(NamedTuple):
+    """A variable of an FMU: its type, its unit, and the variable that it is the time derivative of, if any.
+
+    ``held`` says that it changes at instants only; ``enumeration`` names its type where it is an enumeration, and ``items`` are
+    the names of that by value.
     """
 
     name: str
@@ -30,6 +35,8 @@ class Port(NamedTuple):
     unit: str
     rate_of: str
     held: bool
+    enumeration: str = ""
+    items: tuple[tuple[int, str], ...] = ()
 
 
 class End(NamedTuple):
@@ -50,7 +57,7 @@ class Part:
     ----------
     name : str
     fmu : path
-        Of FMI 2.0, for co-simulation.
+        For co-simulation, of FMI 2.0 or 3.0.
     ports : mapping of str to Port
         All its variables.
     values : mapping of str to float
@@ -77,13 +84,14 @@ class Part:
         InputError
             If the file is no FMU.
         WiringError
-            If it is not for co-simulation of FMI 2.0, or has no parameter or input of a name in ``values``.
+            If it is not for co-simulation of FMI 2.0 or 3.0, or has no parameter or input of a name in ``values``.
         """
         check_fmu(fmu)
         description = read_description(fmu)
-        if description.coSimulation is None or not description.fmiVersion.startswith("2"):
+        if description.coSimulation is None or not description.fmiVersion.startswith(("2", "3")):
             raise WiringError(
-                f"{name}: {Path(fmu).name} is of FMI {description.fmiVersion}: a part must be for co-simulation of FMI 2.0"
+                f"{name}: {Path(fmu).name} is of FMI {description.fmiVersion}, with{'' if description.coSimulation else 'out'} "
+                "co-simulation: a part must be for co-simulation of FMI 2.0 or 3.0"
             )
         ports = {
             v.name: Port(
@@ -94,8 +102,10 @@ class Part:
                 v.unit or "",
                 v.derivative.name if v.derivative else "",
                 v.variability in ("discrete", "constant", "fixed"),
+                *((v.declaredType.name, _items(v)) if v.type == "Enumeration" else ()),
             )
             for v in description.modelVariables
+            if not v.dimensions
         }
         settable = [port.name for port in ports.values() if port.causality in ("parameter", "input")]
         for known in values:
@@ -111,7 +121,12 @@ class Part:
 
     def named(self, causality: str) -> tuple[str, ...]:
         """Return the names of all real variables of a causality."""
-        return tuple(p.name for p in self.ports.values() if p.causality == causality and p.type == "Real")
+        return tuple(p.name for p in self.ports.values() if p.causality == causality and p.type in REAL)
+
+
+def _items(variable: Any) -> tuple[tuple[int, str], ...]:
+    """Return values and names of an enumeration."""
+    return tuple((int(item.value), str(item.name)) for item in variable.declaredType.items)
 
 
 class Bond(NamedTuple):

@@ -15,7 +15,10 @@ import xmlschema
 from click.testing import Result
 
 from analysis import figures
+from analysis.export import build
+from analysis.mechanisms import FIVE_BAR
 from analysis.systems import End, System, WiringError, library, load_system, read_ssp, run_system, write_ssp
+from analysis.systems.description import PartTable, RunTable
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 from .conftest import system_of, wiring_of
@@ -114,10 +117,38 @@ def test_an_archive_comes_back_as_it_was_and_keeps_to_the_schemas(name: str, tmp
         values.validate(tmp_path / "there" / "resources" / f"{part}.ssv")
     again = read_ssp(path)
     assert again.connections == wiring.connections
-    assert again.stop_time == wiring.stop_time
+    assert (again.stop_time, again.step) == (wiring.stop_time, wiring.step)
     assert {n: dict(p.values) for n, p in again.parts.items()} == {n: dict(p.values) for n, p in wiring.parts.items()}
     one, other = (run_system(each, stop_time=20.0 * wiring.step, step=wiring.step) for each in (wiring, again))
     assert all(np.array_equal(one[output], other[output]) for output in one.values)
+
+
+def test_fmi_3_goes_into_an_archive_of_ssp_2(tmp_path: Path) -> None:
+    wiring = system_of("motor-crank").wiring(fmi=3)
+    assert {part.description.fmiVersion for part in wiring.parts.values()} == {"3.0"}
+    path = write_ssp(wiring, tmp_path / "made.ssp")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "there")
+    schema = xmlschema.XMLSchema10(SCHEMAS / "ssp2" / "SystemStructureDescription.xsd")
+    schema.validate(tmp_path / "there" / "SystemStructure.ssd")
+    again = read_ssp(path)
+    assert {n: dict(p.values) for n, p in again.parts.items()} == {n: dict(p.values) for n, p in wiring.parts.items()}
+    one, other = (run_system(each, stop_time=0.02) for each in (again, wiring_of("motor-crank")))
+    for name in map(str, wiring.connections.values()):
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-7, atol=1e-9)
+
+
+def test_enumerations_are_written_by_the_names_of_their_items(tmp_path: Path) -> None:
+    build(FIVE_BAR, tmp_path)
+    part = PartTable(fmu="FiveBarSlider.fmu", values={"drive.mode": 1, "drive.speed": 40.0})
+    wiring = System(parts={"linkage": part}, run=RunTable(stop_time=0.01), folder=tmp_path).wiring()
+    path = write_ssp(wiring, tmp_path / "made.ssp")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "there")
+    values = tmp_path / "there" / "resources" / "linkage.ssv"
+    xmlschema.XMLSchema10(SCHEMAS / "SystemStructureParameterValues.xsd").validate(values)
+    assert '<ssv:Enumeration value="speed"' in values.read_text(encoding="utf-8")
+    assert dict(read_ssp(path).parts["linkage"].values) == {"drive.mode": 1.0, "drive.speed": 40.0}
 
 
 def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,202 @@
+"""Instances of the parts of a system through FMPy, of FMI 2.0 and 3.0."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from ctypes import byref, c_void_p
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from fmpy import extract
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi3 import FMU3Slave
+from fmpy.logging import addLoggerProxy
+from numpy.typing import NDArray
+
+from ..run import unpacking_folder
+from .wiring import Part
+
+Floats: TypeAlias = NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def _unpacked(fmu: Path, changed: int, folder: str | None) -> tempfile.TemporaryDirectory[str]:
+    """Unpack an FMU once in a process, into a folder that goes with it."""
+    place = tempfile.TemporaryDirectory(dir=folder, prefix="linkwork-", ignore_cleanup_errors=True)
+    extract(str(fmu), place.name)
+    return place
+
+
+class Instance:
+    """An instance of a part of FMI 2.0: `begin`, `begun`, then steps.
+
+    Attributes
+    ----------
+    messages : list of str
+        What it has logged; FMPy gives the messages of all FMUs of FMI 2.0 to one of them.
+    outputs : tuple of str
+        Its real outputs, in the order of `read`.
+    goes_back : bool
+        Whether it can return to a saved state.
+    """
+
+    _running: type = FMU2Slave
+
+    def __init__(self, part: Part) -> None:
+        self.part = part
+        self.messages: list[str] = []
+        self.outputs = part.named("output")
+        self._references = [part.ports[name].reference for name in self.outputs]
+        interface = part.description.coSimulation
+        self.goes_back = bool(interface.canGetAndSetFMUstate)
+        wrapped = str(part.description.generationTool).startswith("PythonFMU")
+        changed = part.fmu.stat().st_mtime_ns
+        self._place = _unpacked(part.fmu.resolve(), changed, unpacking_folder() if wrapped else None)
+        self._fmu = self._running(
+            guid=part.description.guid,
+            unzipDirectory=self._place.name,
+            modelIdentifier=interface.modelIdentifier,
+            instanceName=part.name,
+        )
+        self._instantiate(interface)
+
+    def _instantiate(self, interface: Any) -> None:
+        self._interpolates = bool(interface.canInterpolateInputs)
+        self._callbacks = fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        addLoggerProxy(byref(self._callbacks))
+        self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+
+    def _log(self, *arguments: Any) -> None:
+        self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
+
+    def begin(self) -> None:
+        """Set the start values and enter the initialisation."""
+        self._fmu.setupExperiment(startTime=0.0)
+        self._set_start_values()
+        self._fmu.enterInitializationMode()
+
+    def _set_start_values(self) -> None:
+        for name, value in self.part.values.items():
+            port = self.part.ports[name]
+            kind = {"Real": float, "Float64": float, "Boolean": bool}.get(port.type, int)
+            # FMI 2.0 sets enumerations as integers, FMI 3.0 as integers of 64 bits
+            setter = port.type if port.type != "Enumeration" else self._enumerations
+            getattr(self._fmu, f"set{setter}")([port.reference], [kind(value)])
+
+    _enumerations = "Integer"
+
+    def begun(self) -> None:
+        """Leave the initialisation."""
+        self._fmu.exitInitializationMode()
+
+    def read(self) -> NDArray[np.float64]:
+        """Return all real outputs."""
+        return np.array(self._fmu.getReal(self._references))
+
+    def put(self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool) -> None:
+        """Set inputs for a step.
+
+        Parameters
+        ----------
+        names : sequence of str
+        values : float array
+            At the start of the step.
+        slopes : float array or None
+            Over the step; None where the inputs are held.
+        middle : float
+            Time after which a part that takes no slopes gets the values, for the whole step (s).
+        updated : bool
+            Whether a part of FMI 3.0 goes along the lines by intermediate updates.
+        """
+        references = [self.part.ports[name].reference for name in names]
+        lines = slopes is not None and self._interpolates
+        if slopes is not None and not lines:
+            values = values + middle * slopes
+        self._values, self._slopes = values, slopes if slopes is not None and lines else np.zeros(len(values))
+        if references:
+            self._fmu.setReal(references, values.tolist())
+            if lines:
+                self._fmu.setRealInputDerivatives(references, [1] * len(references), self._slopes.tolist())
+
+    def at_end(self, step: float) -> Floats:
+        """Return what the inputs came to at the end of a step."""
+        return self._values + step * self._slopes
+
+    def step(self, time: float, step: float) -> None:
+        """Take a step; raises FMPy's FMICallException where the part refuses it."""
+        self._fmu.doStep(time, step)
+
+    def saved(self) -> Any:
+        """Return its present state."""
+        return self._fmu.getFMUState()
+
+    def restore(self, state: Any) -> None:
+        """Return to a state."""
+        self._fmu.setFMUState(state)
+
+    def forget(self, state: Any) -> None:
+        """Free a state."""
+        self._fmu.freeFMUState(c_void_p(getattr(state, "value", state)))
+
+    def close(self) -> None:
+        """Free the instance."""
+        self._fmu.freeInstance()
+
+
+class Instance3(Instance):
+    """An instance of a part of FMI 3.0, where inputs have no derivatives but can be set at each step of its own integrator."""
+
+    _running = FMU3Slave
+    _enumerations = "Int64"
+
+    def _instantiate(self, interface: Any) -> None:
+        self._begins, self._lines = 0.0, False
+        self._references_set: list[int] = []
+        update = self._update if interface.providesIntermediateUpdate else None
+        self._fmu.instantiate(loggingOn=True, logMessage=self._log, intermediateUpdate=update)
+
+    def _update(self, environment: Any, time: float, setting: bool, *_: Any) -> None:
+        if setting and self._lines:
+            self._last = self._values + (time - self._begins) * self._slopes
+            self._fmu.setFloat64(self._references_set, self._last.tolist())
+
+    def begin(self) -> None:
+        """Set the start values and enter the initialisation."""
+        self._set_start_values()
+        self._fmu.enterInitializationMode(startTime=0.0)
+
+    def read(self) -> NDArray[np.float64]:
+        """Return all real outputs."""
+        return np.array(self._fmu.getFloat64(self._references))
+
+    def put(self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool) -> None:
+        """Set inputs for a step as `Instance.put` does; without updates lines are held at what they are in the middle."""
+        references = [self.part.ports[name].reference for name in names]
+        self._values, self._slopes = values, np.zeros(len(values)) if slopes is None else slopes
+        self._lines = bool(references) and slopes is not None and updated
+        self._last = values if updated else values + middle * self._slopes
+        self._references_set = references
+        if references:
+            self._fmu.setFloat64(references, self._last.tolist())
+
+    def at_end(self, step: float) -> Floats:
+        """Return what the inputs came to at the end of a step: what was set last, or the ends of their lines."""
+        return self._last if self._lines else self._values + step * self._slopes
+
+    def step(self, time: float, step: float) -> None:
+        """Take a step as `Instance.step` does."""
+        self._begins = time
+        self._fmu.doStep(time, step)
+
+    def forget(self, state: Any) -> None:
+        """Free a state."""
+        self._fmu.freeFMUState(state)
+
+
+def instance_of(part: Part) -> Instance:
+    """Return an instance of a part, by the version of its FMI."""
+    return (Instance3 if part.description.fmiVersion.startswith("3") else Instance)(part)

@@ -1,0 +1,236 @@
+"""Many runs of a system over processes or a cluster, each with its own values; kept on disk, continued where they stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.lib.format import open_memmap
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, LinkworkError
+
+from ..files import unknown_name
+from ..numerics.workers import WorkersLost, interruptible, over_workers
+from ..run import CosimulationError, shown
+from .master import run_system
+from .wiring import End, Part, Wiring
+
+#: Runs that are given out together.
+_BATCH = 16
+
+
+class SystemRunsEnded(LinkworkError):
+    """Runs were stopped, or their workers lost; ``runs`` has those that are done, and a folder keeps them."""
+
+    def __init__(self, reason: str, runs: SystemRuns, folder: Path | None) -> None:
+        self.runs = runs
+        kept = f"; the same call with folder={str(folder)!r} goes on from there" if folder else ""
+        super().__init__(f"{reason}: {np.count_nonzero(runs.lengths)} of {len(runs)} runs are done{kept}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SystemRuns:
+    """Runs of a system with different values.
+
+    Attributes
+    ----------
+    time : (M,) float array
+        Of the samples (s).
+    names : tuple of str
+        Outputs, as ``part.output``.
+    samples : (N, K, M) float array
+        By run, output and time; see `output`.
+    lengths : (N,) int array
+        Samples of each run; 0 where it was not begun, or could not be.
+    messages : mapping of int to str
+        What a part said that ended a run early or could not begin, by its number.
+    """
+
+    time: NDArray[Any]
+    names: tuple[str, ...]
+    samples: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    messages: Mapping[int, str]
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
+        """Return an output of all runs, (N, M), masked where a run had ended."""
+        if name not in self.names:
+            raise unknown_name(name, self.names, f"output {name!r}")
+        after = np.arange(len(self.time)) >= self.lengths[:, None]
+        return np.ma.masked_array(self.samples[:, self.names.index(name)], mask=after)
+
+
+class _Task(NamedTuple):
+    """A batch: the parts' FMUs and values and the connections, what is varied, and how it is run."""
+
+    parts: tuple[tuple[str, Path, tuple[tuple[str, float], ...]], ...]
+    connections: tuple[tuple[End, End], ...]
+    varied: tuple[str, ...]
+    sets: NDArray[np.float64]
+    names: tuple[str, ...]
+    run: tuple[str, float, float, int]
+
+
+def run_many(
+    wiring: Wiring,
+    vary: Mapping[str, ArrayLike],
+    outputs: Sequence[str],
+    *,
+    coupling: str = "hold",
+    step: float | None = None,
+    stop_time: float | None = None,
+    every: int = 1,
+    folder: str | Path | None = None,
+    n_jobs: int | None = None,
+    progress: bool = False,
+) -> SystemRuns:
+    """Run a system many times, with values of its own in each run.
+
+    Parameters
+    ----------
+    wiring : Wiring
+        Its FMUs lie where all workers see them.
+    vary : mapping of str to array
+        Values of parameters and inputs by ``part.variable``, one for each run (SI).
+    outputs : sequence of str
+        Outputs to keep, as ``part.output``.
+    coupling, step, stop_time
+        As of `run_system`.
+    every : int
+        Every so many communication points is a sample.
+    folder : path, optional
+        Where the runs are kept; what is there of the same runs is not run again.
+    n_jobs : int, optional
+        Processes; by default, or within `joblib.parallel_config`, as `over_workers` has it.
+    progress : bool
+
+    Raises
+    ------
+    InputError
+        If the numbers of values differ, or the folder has other runs.
+    SystemRunsEnded
+        On Ctrl-C, and if workers are lost.
+    UnknownNameError
+        If there is no such variable or output.
+    """
+    step, stop_time = wiring.step if step is None else step, wiring.stop_time if stop_time is None else stop_time
+    sets = _sets(wiring, vary)
+    known = [f"{name}.{output}" for name, part in wiring.parts.items() for output in part.named("output")]
+    for name in outputs:
+        if name not in known:
+            raise unknown_name(name, known, f"output {name!r}")
+    time = step * np.arange(0, round(stop_time / step) + 1, every)
+    parts = tuple((name, part.fmu.resolve(), tuple(part.values.items())) for name, part in wiring.parts.items())
+    task = _Task(
+        parts, tuple(wiring.connections.items()), tuple(vary), sets, tuple(outputs), (coupling, step, stop_time, every)
+    )
+    kept = _Kept(task, len(time), None if folder is None else Path(folder))
+    runs = SystemRuns(time=time, names=task.names, samples=kept.samples, lengths=kept.lengths, messages=kept.messages)
+    todo = [n for n in range(len(sets)) if kept.lengths[n] == 0 and n not in kept.messages]
+    batches = [todo[k : k + _BATCH] for k in range(0, len(todo), _BATCH)]
+    tasks = [task._replace(sets=sets[batch]) for batch in batches]
+    with interruptible() as heard, shown(progress, len(sets), "running the system") as show:
+        try:
+            for number, found in over_workers(_batch, tasks, heard, n_jobs=n_jobs):
+                kept.add(batches[number], found)
+                show(float(np.count_nonzero(kept.lengths)))
+        except WorkersLost as error:
+            raise SystemRunsEnded(str(error), runs, kept.folder) from error
+    if heard:
+        raise SystemRunsEnded("stopped", runs, kept.folder)
+    return runs
+
+
+def _sets(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    """Return the values by run and variable."""
+    arrays = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in vary.items()}
+    known = [f"{n}.{v}" for n, p in wiring.parts.items() for k in ("parameter", "input") for v in p.named(k)]
+    for name in arrays:
+        if name not in known:
+            raise unknown_name(name, known, f"parameter or input {name!r}")
+    if not arrays or len({array.shape for array in arrays.values()}) > 1 or next(iter(arrays.values())).ndim > 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "nothing"
+        raise InputError(f"the values to vary are {shapes}: there must be one of each for every run")
+    return np.column_stack(list(arrays.values()))
+
+
+class _Kept:
+    """Samples, lengths and messages, in memory or in a folder, where those of the same runs are taken over."""
+
+    def __init__(self, task: _Task, count: int, folder: Path | None) -> None:
+        self.folder, self.messages = folder, dict[int, str]()
+        shape = (len(task.sets), len(task.names), count)
+        if folder is None:
+            self.samples, self.lengths = np.zeros(shape), np.zeros(len(task.sets), dtype=np.int64)
+            return
+        key, mark = _key(task), folder / "runs.json"
+        there = json.loads(mark.read_text(encoding="utf-8")) if mark.is_file() else None
+        if there is not None and there["key"] != key:
+            raise InputError(f"{folder} has runs of another system or with other values: give another folder")
+        folder.mkdir(parents=True, exist_ok=True)
+        mode = "w+" if there is None else "r+"
+        self.samples = open_memmap(folder / "samples.npy", mode=mode, dtype=float, shape=shape)
+        self.lengths = open_memmap(folder / "lengths.npy", mode=mode, dtype=np.int64, shape=shape[:1])
+        if there is None:
+            mark.write_text(json.dumps({"key": key, "outputs": task.names, "varied": task.varied}), encoding="utf-8")
+        said = folder / "messages.jsonl"
+        for line in said.read_text(encoding="utf-8").splitlines() if said.is_file() else ():
+            number, message = json.loads(line)
+            self.messages[number] = message
+
+    def add(self, numbers: Sequence[int], found: list[tuple[NDArray[np.float64], str]]) -> None:
+        """Keep a batch: first what was found, then that it was."""
+        for number, (samples, _) in zip(numbers, found):
+            self.samples[number, :, : samples.shape[1]] = samples
+        said = {number: message for number, (_, message) in zip(numbers, found) if message}
+        self.messages |= said
+        if self.folder is not None:
+            self.samples.flush()  # type: ignore[attr-defined]  # a memmap here
+            with (self.folder / "messages.jsonl").open("a", encoding="utf-8") as file:
+                file.writelines(json.dumps(item) + "\n" for item in said.items())
+        for number, (samples, _) in zip(numbers, found):
+            self.lengths[number] = samples.shape[1]
+
+
+def _key(task: _Task) -> str:
+    """Return a digest of all that the runs depend on."""
+    digest = hashlib.sha256(task.sets.tobytes())
+    for _, fmu, _ in task.parts:
+        digest.update(fmu.read_bytes())
+    named = [(name, values) for name, _, values in task.parts]
+    digest.update(repr((named, task.connections, task.varied, task.names, task.run)).encode())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=4)
+def _parts(parts: tuple[tuple[str, Path, tuple[tuple[str, float], ...]], ...]) -> dict[str, Part]:
+    return {name: Part.of(name, fmu, dict(values)) for name, fmu, values in parts}
+
+
+def _batch(task: _Task) -> list[tuple[NDArray[np.float64], str]]:
+    """Return samples by output and time of each run of a batch, and what ended it early."""
+    coupling, step, stop_time, every = task.run
+    found = []
+    for values in task.sets.tolist():
+        parts = dict(_parts(task.parts))
+        for name, value in zip(task.varied, values):
+            part, _, variable = name.partition(".")
+            parts[part] = replace(parts[part], values={**parts[part].values, variable: value})
+        wiring = Wiring(title="", parts=parts, connections=dict(task.connections), stop_time=stop_time, step=step)
+        try:
+            run = run_system(wiring, coupling=coupling, step=step, stop_time=stop_time)
+        except CosimulationError as error:
+            found.append((np.zeros((len(task.names), 0)), str(error)))
+            continue
+        found.append((np.array([run[name][::every] for name in task.names]), run.message))
+    return found
