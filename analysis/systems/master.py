@@ -34,6 +34,9 @@ COUPLINGS = {
 #: Gains of the controller of the communication step, proportional and integral; the least and greatest growth of a step, and of
 #: all steps, as shares of the first one (Sadjina et al., section 5).
 _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
+#: What a step leaves of the power that residuals are measured by: some fifty steps are remembered, so that zeros of a power do
+#: not count.
+_MEMORY = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,7 +274,7 @@ class _Stepper:
         """Take note of the power residuals and the powers after a step: PI control of the share that is brought in."""
         if self.share is None:
             return
-        self.scale = max(self.scale, float(np.sqrt(np.mean(flows**2))))
+        self.scale = max(_MEMORY * self.scale, float(np.sqrt(np.mean(flows**2))))
         error = 0.5 * float(np.sqrt(np.mean(powers**2))) / (self.share * self.scale) if self.scale > 0.0 else 0.0
         proportional, integral = _GAINS
         if error > 0.0:
@@ -302,7 +305,7 @@ def run_system(
         Communication step and end (s); by default the wiring's.
     share : float, optional
         With it the steps, of which ``step`` is the first, become as long as the coupling brings in about this share of the
-        greatest power through the bonds, such as 1e-3.
+        power that has gone through the bonds lately, such as 1e-3.
     progress : bool
 
     Returns
