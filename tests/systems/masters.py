@@ -1,4 +1,4 @@
-"""The masters of the tests of systems, each a function that runs in a process of its own, and imports what it needs inside itself.
+"""The masters of the tests of systems. Each function runs in a process of its own, and imports what it needs inside itself.
 
 All take an archive of SSP, which some read themselves; a communication step and the number of steps; names of outputs; and
 options of their own. They return the outputs at the end.
@@ -134,7 +134,10 @@ def by_cofmupy(archive: str, step: float, count: int, names: list[str], iterativ
 
 
 def by_pathsim(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """PathSim's blocks of FMUs, wired by hand; a block shows what it came to at its next step, and its neighbour sees it then."""
+    """PathSim's blocks of FMUs, wired by hand.
+
+    A block shows what it came to at its next step, and its neighbour sees it then.
+    """
     from pathsim import Connection, Simulation
     from pathsim.blocks import Constant
     from pathsim_fmi.blocks import CoSimulationFMU
@@ -153,7 +156,7 @@ def by_pathsim(archive: str, step: float, count: int, names: list[str]) -> Any:
             connections.append(Connection(source, block[place]))
     simulation = Simulation([*others, *blocks.values()], connections, dt=step, log=False)
     simulation.run((count - 2.5) * step)
-    found = {}
+    found: dict[str, float] = {}
     for part, block in blocks.items():
         values = zip(block.fmu_wrapper.output_refs, map(float, block.fmu_wrapper.get_outputs_as_array()))
         found |= {f"{part}.{name}": value for name, value in values if f"{part}.{name}" in names}

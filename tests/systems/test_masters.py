@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,11 +15,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from analysis.systems import Joined, run_system, write_ssp
+from benchmarks.masters import RESULTS, RUNS, find, read
 
 from ..fmu.runner import run_in_process
-from ..fmu.test_masters import SLOW, need
+from ..fmu.test_masters import PAGE, SLOW, need
 from . import masters
-from .conftest import started_in_its_modes, system_of
+from .conftest import started_in_its_modes, system_of, wiring_of
 
 STEP, STEPS = 5e-4, 100
 #: What is compared.
@@ -66,3 +70,43 @@ def test_ecco_keeps_its_tolerance_on_the_bond(archive: Path, tolerance: float) -
     joined = Joined(system).run(0.1, 1e-4)
     right = CubicSpline(joined.time, joined[supplied])(time)
     assert np.abs(found[supplied] - right).max() < len(time) * tolerance < 0.1 * right[-1]
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of what the masters run, made as it is needed."""
+    return tmp_path_factory.mktemp("watched")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="FMUs that write down what is called are for Linux")
+@pytest.mark.parametrize("master", RUNS)
+def test_the_table_of_what_masters_use_is_what_a_run_finds(watched: Path, master: str) -> None:
+    name, stored = master.lower(), read(RESULTS)
+    assert list(stored) == list(RUNS)
+    if name in NEAR:
+        need(name)
+    if name in SLOW and not os.environ.get("LINKWORK_ALL_MASTERS"):
+        pytest.skip("it takes a minute: LINKWORK_ALL_MASTERS runs it")
+    assert find(master, watched) == stored[master]
+
+
+def test_the_code_of_the_page_on_systems_runs(tmp_path: Path) -> None:
+    """All but ECCO end at the speed of the crank that ours has."""
+    (section,) = re.findall(r"^## Systems$(.*?)^## ", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    (commands,) = re.findall(r"```sh\n(.*?)```", section, flags=re.DOTALL)
+    runs = [["-m", "analysis.cli", *line.split()[1:]] for line in commands.splitlines()]
+    runs += [["-c", code] for code in re.findall(r"```python\n(.*?)```", section, flags=re.DOTALL)]
+    speeds = []
+    for run in runs:
+        need(next((name for name in ("libcosimpy", "ecospy") if name in run[-1]), "fmpy"))
+        done = subprocess.run(
+            [sys.executable, *run], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        # the last number of a line of nothing but numbers: masters log beside it
+        speeds += re.findall(r"^[^a-zA-Z:]*?([\d.]+)[\])]*$", done.stdout, re.MULTILINE)
+    ours = run_system(wiring_of("motor-crank"), step=5e-4, stop_time=0.1)["linkage.crank.speed"][-1]
+    fmpy, fixed, ecco, ecos = map(float, speeds)
+    assert [fmpy, fixed, ecos] == pytest.approx([float(ours)] * 3, rel=1e-5)
+    assert ecco == pytest.approx(float(ours), rel=0.02)
