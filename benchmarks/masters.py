@@ -174,7 +174,7 @@ def lines(run: Run, material: Path) -> set[str]:
         calls.touch()
         os.environ["LINKWORK_CALLS"] = str(calls)
         try:
-            run_in_process(run.by, material, *run.arguments, options=())
+            run_in_process(run.by, material, *run.arguments, options=(), timeout=300.0)
         except AssertionError as error:
             if run.fails not in str(error) or not run.fails:
                 raise

@@ -43,7 +43,7 @@ def test_a_master_comes_to_where_ours_does(archive: Path, tmp_path: Path, master
         archive = write_ssp(started_in_its_modes("motor-crank", tmp_path), tmp_path / "motor-crank.ssp")
     ours = run_system(system_of("motor-crank").without_rates().wiring(), step=STEP, stop_time=STEP * STEPS)
     by: Callable[..., Any] = getattr(masters, f"by_{master}")
-    found = run_in_process(by, archive, STEP, STEPS, list(COMPARED), options=())
+    found = run_in_process(by, archive, STEP, STEPS, list(COMPARED), options=(), timeout=300.0)
     assert found
     for name, value in found.items():
         assert value == pytest.approx(float(ours[name][-1]), rel=NEAR[master]), name
