@@ -140,12 +140,19 @@ def crossing(of: str, page: str) -> str:
     return markdown(read(HERE / "crossing.csv"))
 
 
+def masters(of: str, page: str) -> str:
+    """Return the table of docs/masters.csv."""
+    from benchmarks.masters import markdown, read
+
+    return markdown(read(HERE / "masters.csv"))
+
+
 #: The parts of the pages of the theses: chapters of Youssef's, Rahman's figures, and our own studies.
 CHAPTERS = (*"345678", "R", "ours")
 #: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
-    "crossing": crossing, "accuracy": accuracy,
+    "crossing": crossing, "accuracy": accuracy, "masters": masters,
 }  # fmt: skip
 
 

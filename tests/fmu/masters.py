@@ -53,6 +53,48 @@ def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     }
 
 
+def by_fmpy_with(fmu: str, case: list[Any], outputs: list[str], option: str) -> Any:
+    """Co-simulation by FMPy with an option of `simulate_fmu`, or of `instantiate_fmu` with a callback that ends steps early."""
+    import numpy as np
+    from fmpy import extract, instantiate_fmu, read_model_description, simulate_fmu
+    from fmpy.fmi3 import fmi3IntermediateUpdateCallback
+
+    reals, integers, changed, later = case
+
+    @fmi3IntermediateUpdateCallback
+    def update(environment: Any, time: float, *flags_and_answer: Any) -> None:
+        *_, requested, until = flags_and_answer
+        requested[0], until[0] = True, time
+
+    description = read_model_description(fmu)
+    ramp = np.array([(0.0, reals[changed]), (0.1, later)], dtype=[("time", float), (changed, float)])
+    options: dict[str, Any] = {
+        "stop_time": 0.1,
+        "step_size": 1e-3,
+        "output_interval": 1e-3,
+        "output": outputs,
+        "input": ramp,
+    }
+    if option == "fmu_state":
+        made = instantiate_fmu(extract(fmu), description, "CoSimulation")
+        half = options | {
+            "stop_time": 0.05,
+            "set_stop_time": False,
+            "terminate": False,
+            "start_values": reals | integers,
+        }
+        simulate_fmu(fmu, fmu_instance=made, **half)
+        options |= {"start_time": 0.05, "initialize": False, "fmu_instance": made, "fmu_state": made.getFMUState()}
+    else:
+        options |= {"start_values": reals | integers, option: True}
+    if option == "early_return_allowed":
+        options["fmu_instance"] = instantiate_fmu(
+            extract(fmu), description, "CoSimulation", early_return_allowed=True, intermediate_update=update
+        )
+    run = simulate_fmu(fmu, model_description=description, **options)
+    return {"end": {name: float(run[-1][name]) for name in outputs}, "time": float(run[-1]["time"])}
+
+
 def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     """The case by libcosim's fixed-step algorithm."""
     import zipfile

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
+from analysis.export import NATIVE, build_native, with_starts
 from analysis.systems import System, Wiring, library, load_system
+from analysis.systems.wiring import Part
 
 
 @cache
@@ -15,3 +19,13 @@ def system_of(name: str) -> System:
 @cache
 def wiring_of(name: str) -> Wiring:
     return system_of(name).wiring()
+
+
+def started_in_its_modes(name: str, folder: Path) -> Wiring:
+    """A system without rates, with FMUs that have all its start values inside, for masters that do not set integers."""
+    wiring, parts = system_of(name).without_rates().wiring(), {}
+    for part, member in system_of(name).members.items():
+        assert member.mechanism is not None
+        fmu = build_native(with_starts(member.mechanism, member.values), NATIVE, folder)
+        parts[part] = Part.of(part, fmu, member.values)
+    return replace(wiring, parts=parts)

@@ -3,125 +3,30 @@
 from __future__ import annotations
 
 import os
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
-from analysis.systems import run_system, write_ssp
+from analysis.systems import Joined, run_system, write_ssp
+from benchmarks.masters import RESULTS, RUNS, find, read
 
 from ..fmu.runner import run_in_process
-from ..fmu.test_masters import need
-from .conftest import system_of
+from ..fmu.test_masters import PAGE, SLOW, need
+from . import masters
+from .conftest import started_in_its_modes, system_of, wiring_of
 
 STEP, STEPS = 5e-4, 100
 #: What is compared.
 COMPARED = ("linkage.crank.angle", "linkage.crank.speed", "linkage.slider.position", "motor.rotor.angle")
-
-
-def by_fmpy(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """FMPy's runner of SSP: it takes start values as one set, and records what is connected."""
-    import zipfile
-    from pathlib import Path
-
-    from fmpy.ssp.simulation import simulate_ssp
-    from fmpy.ssp.ssd import ParameterSet, read_ssv
-
-    with zipfile.ZipFile(archive) as content:
-        content.extractall("unpacked")
-    start = ParameterSet()
-    for file in Path("unpacked/resources").glob("*.ssv"):
-        for parameter in read_ssv(str(file)).parameters:
-            parameter.name = f"{file.stem}.{parameter.name}"
-            start.parameters.append(parameter)
-    # a row has the outputs at the end of the step that begins at its time
-    run = simulate_ssp(archive, stop_time=(count - 0.5) * step, step_size=step, parameter_set=start)
-    return {name: float(run[-1][name]) for name in names if name in run.dtype.names}
-
-
-def by_libcosimpy(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """libcosim's fixed-step algorithm on the unpacked archive."""
-    import zipfile
-    from pathlib import Path
-
-    from fmpy import read_model_description
-    from libcosimpy.CosimExecution import CosimExecution
-    from libcosimpy.CosimObserver import CosimObserver
-
-    with zipfile.ZipFile(archive) as content:
-        content.extractall("unpacked")
-    execution = CosimExecution.from_ssp_file("unpacked", round(step * 1e9))
-    observer = CosimObserver.create_last_value()
-    execution.add_observer(observer)
-    assert execution.step(count)
-    found = {}
-    for info in execution.slave_infos():
-        part = info.name.decode() if isinstance(info.name, bytes) else info.name
-        fmu = {"motor": "InductionMotor-native.fmu", "linkage": "FiveBarSlider-native.fmu"}[part]
-        variables = read_model_description(str(Path("unpacked/resources") / fmu)).modelVariables
-        reference = {f"{part}.{v.name}": v.valueReference for v in variables}
-        own = [name for name in names if name in reference]
-        found |= dict(zip(own, observer.last_real_values(info.index, [reference[name] for name in own])))
-    return found
-
-
-def by_ecospy(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """ecos on the archive, with the start values of the sets of one name."""
-    from ecospy import EcosSimulation
-
-    with EcosSimulation(ssp_path=archive, step_size=step) as simulation:
-        simulation.init(parameter_set="default")
-        simulation.step(count)
-        found = {name: simulation.get_real(name.replace(".", "::", 1)) for name in names}
-        simulation.terminate()
-    return found
-
-
-def by_pathsim(archive: str, step: float, count: int, names: list[str]) -> Any:
-    """PathSim's blocks of FMUs, wired by hand; a block shows what it came to at its next step, and its neighbour sees it then."""
-    import zipfile
-
-    from fmpy.ssp.ssd import read_ssv
-    from pathsim import Connection, Simulation
-    from pathsim.blocks import Constant
-    from pathsim_fmi.blocks import CoSimulationFMU
-
-    with zipfile.ZipFile(archive) as content:
-        content.extractall("unpacked")
-    kinds = {"Integer": int}
-    blocks = {}
-    for part, fmu in (("motor", "InductionMotor-native.fmu"), ("linkage", "FiveBarSlider-native.fmu")):
-        parameters = read_ssv(f"unpacked/resources/{part}.ssv").parameters
-        start = {p.name: kinds.get(p.type, float)(p.value) for p in parameters}
-        blocks[part] = (CoSimulationFMU(f"unpacked/resources/{fmu}", part, start, dt=step), start)
-    wires = {("linkage", "drive.torque"): ("motor", "shaft.exerted_torque")}
-    wires["motor", "flangeDrive.speed"] = ("linkage", "crank.speed")
-    others, connections = [], []
-    for part, (block, start) in blocks.items():
-        for place, name in enumerate(block.fmu_wrapper.input_refs):
-            if (part, name) in wires:
-                of, output = wires[part, name]
-                source = blocks[of][0]
-                connections.append(Connection(source[list(source.fmu_wrapper.output_refs).index(output)], block[place]))
-            else:
-                others.append(Constant(start.get(name, 0.0)))
-                connections.append(Connection(others[-1], block[place]))
-    simulation = Simulation([*others, *(block for block, _ in blocks.values())], connections, dt=step, log=False)
-    simulation.run((count - 2.5) * step)
-    found = {}
-    for part, (block, _) in blocks.items():
-        values = dict(zip(block.fmu_wrapper.output_refs, map(float, block.fmu_wrapper.get_outputs_as_array())))
-        found |= {f"{part}.{name}": value for name, value in values.items() if f"{part}.{name}" in names}
-    return found
-
-
-MASTERS: dict[str, Callable[..., Any]] = {
-    "fmpy": by_fmpy,
-    "libcosimpy": by_libcosimpy,
-    "ecospy": by_ecospy,
-    "pathsim": by_pathsim,
-}
+#: How near a master comes. PathSim's blocks see each other a step late.
+NEAR = {"fmpy": 1e-6, "libcosimpy": 1e-6, "ecospy": 1e-6, "cofmupy": 1e-6, "pathsim": 1e-2}
 
 
 @pytest.fixture(scope="module")
@@ -131,13 +36,77 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
 
 
-@pytest.mark.parametrize("master", [pytest.param(m, marks=pytest.mark.slow if m == "pathsim" else ()) for m in MASTERS])
-def test_a_master_comes_to_where_ours_does(archive: Path, master: str) -> None:
+@pytest.mark.parametrize("master", [pytest.param(m, marks=pytest.mark.slow if m in SLOW else ()) for m in NEAR])
+def test_a_master_comes_to_where_ours_does(archive: Path, tmp_path: Path, master: str) -> None:
     need(master)
+    if master == "cofmupy":
+        archive = write_ssp(started_in_its_modes("motor-crank", tmp_path), tmp_path / "motor-crank.ssp")
     ours = run_system(system_of("motor-crank").without_rates().wiring(), step=STEP, stop_time=STEP * STEPS)
-    found = run_in_process(MASTERS[master], str(archive), STEP, STEPS, list(COMPARED), options=())
+    by: Callable[..., Any] = getattr(masters, f"by_{master}")
+    found = run_in_process(by, archive, STEP, STEPS, list(COMPARED), options=(), timeout=300.0)
     assert found
     for name, value in found.items():
-        assert value == pytest.approx(float(ours[name][-1]), rel=1e-2 if master == "pathsim" else 1e-6), name
+        assert value == pytest.approx(float(ours[name][-1]), rel=NEAR[master]), name
     if os.environ.get("LINKWORK_ALL_MASTERS") and master != "fmpy":
         assert set(found) == set(COMPARED)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8])
+def test_ecco_keeps_its_tolerance_on_the_bond(archive: Path, tolerance: float) -> None:
+    """It holds the energy that a step brings in: at rest its controller is where 0.8 e^-0.15 = 1, e relative to the tolerance.
+
+    What goes through the bond is then right to as many tolerances as there were steps.
+    """
+    need("libcosimpy")
+    system, supplied = system_of("motor-crank").without_rates(), "linkage.energy.supplied"
+    (bond,) = system.wiring().bonds()
+    names = [str(end) for end in bond]
+    found = run_in_process(masters.by_ecco, archive, 0.1, tolerance, names, [supplied], options=())
+    time, *sides = (np.array(found[name]) for name in ("time", *names))
+    effort, effort_to, flow, flow_to = sides
+    brought = np.abs(effort * flow_to - flow * effort_to)[1:] * np.diff(time)
+    assert np.median(brought) == pytest.approx(0.8 ** (1.0 / 0.15) * tolerance, rel=0.1)
+    assert brought.max() < 2.0 * tolerance
+    joined = Joined(system).run(0.1, 1e-4)
+    right = CubicSpline(joined.time, joined[supplied])(time)
+    assert np.abs(found[supplied] - right).max() < len(time) * tolerance < 0.1 * right[-1]
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of what the masters run, made as it is needed."""
+    return tmp_path_factory.mktemp("watched")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="FMUs that write down what is called are for Linux")
+@pytest.mark.parametrize("master", RUNS)
+def test_the_table_of_what_masters_use_is_what_a_run_finds(watched: Path, master: str) -> None:
+    name, stored = master.lower(), read(RESULTS)
+    assert list(stored) == list(RUNS)
+    if name in NEAR:
+        need(name)
+    if name in SLOW and not os.environ.get("LINKWORK_ALL_MASTERS"):
+        pytest.skip("it takes a minute: LINKWORK_ALL_MASTERS runs it")
+    assert find(master, watched) == stored[master]
+
+
+def test_the_code_of_the_page_on_systems_runs(tmp_path: Path) -> None:
+    """All but ECCO end at the speed of the crank that ours has."""
+    (section,) = re.findall(r"^## Systems$(.*?)^## ", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    (commands,) = re.findall(r"```sh\n(.*?)```", section, flags=re.DOTALL)
+    runs = [["-m", "analysis.cli", *line.split()[1:]] for line in commands.splitlines()]
+    runs += [["-c", code] for code in re.findall(r"```python\n(.*?)```", section, flags=re.DOTALL)]
+    speeds = []
+    for run in runs:
+        need(next((name for name in ("libcosimpy", "ecospy") if name in run[-1]), "fmpy"))
+        done = subprocess.run(
+            [sys.executable, *run], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        # the last number of a line of nothing but numbers: masters log beside it
+        speeds += re.findall(r"^[^a-zA-Z:]*?([\d.]+)[\])]*$", done.stdout, re.MULTILINE)
+    ours = run_system(wiring_of("motor-crank"), step=5e-4, stop_time=0.1)["linkage.crank.speed"][-1]
+    fmpy, fixed, ecco, ecos = map(float, speeds)
+    assert [fmpy, fixed, ecos] == pytest.approx([float(ours)] * 3, rel=1e-5)
+    assert ecco == pytest.approx(float(ours), rel=0.02)

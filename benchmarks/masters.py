@@ -1,0 +1,231 @@
+"""What masters use of the FMUs in this project, found by running them with FMUs that write down what is called.
+
+    python -m benchmarks.masters                     # all masters, five minutes; writes docs/masters.csv
+    python -m benchmarks.masters --master FMPy       # one of them (repeatable); prints what it finds
+
+Each run is a process of its own, on Linux; `tests/fmu/spy.c` stands before the library of an FMU. `docs/generate.py` puts the
+table into docs/masters.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from analysis.export import NATIVE, NATIVE_FMI3, build_native
+from analysis.mechanisms import FIVE_BAR
+from analysis.systems import write_ssp
+from tests.fmu import masters as alone
+from tests.fmu.runner import run_in_process
+from tests.fmu.spy import changed, watched
+from tests.fmu.test_masters import CASES, COMMANDED, STATES, STEPS
+from tests.systems import masters as together
+from tests.systems.conftest import started_in_its_modes, system_of
+
+RESULTS = Path(__file__).parents[1] / "docs" / "masters.csv"
+YES, NO, NONE = "yes", "no", "-"
+
+
+class Run(NamedTuple):
+    """A run of a master on a `material`.
+
+    ``label`` is the option that it has, ``fails`` a part of what it says where it must fail.
+    """
+
+    on: str
+    by: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+    label: str = YES
+    fails: str = ""
+
+
+_SYSTEM = (5e-4, 20, ["linkage.crank.angle"])
+_BOND = ["motor.shaft.exerted_torque", "linkage.drive.torque", "linkage.crank.speed", "motor.flangeDrive.speed"]
+_FREE, _COMMANDED = ([*cases["FiveBarSlider"][:4]] for cases in (CASES, COMMANDED))
+_LIMIT = [*_FREE[:3], CASES["FiveBarSlider"].too_much]
+_OUTPUTS = ["crank.angle"]
+
+
+def _alone(on: str, by: Callable[..., Any], case: Any = _FREE, interface: str = STEPS, label: str = YES) -> Run:
+    return Run(on, by, (case, _OUTPUTS, interface), label)
+
+
+def _system(by: Callable[..., Any], label: str = YES, *option: Any, on: str = "archive") -> Run:
+    return Run(on, by, (*_SYSTEM, *option), label)
+
+
+def _exchange(by: Callable[..., Any]) -> list[Run]:
+    return [_alone("jump", by, interface=STATES), _alone("limit", by, _LIMIT, STATES)]
+
+
+#: The runs of each master. A master that sets integers at no place runs FMUs that start in their modes.
+RUNS = {
+    "FMPy": [
+        _system(together.by_fmpy, YES, False),
+        _system(together.by_fmpy, "`parameter_set`", True),
+        _system(together.by_fmpy, on="wrong"),
+        _alone("FMI 2.0", alone.by_fmpy_with, interface="fmu_state", label="`fmu_state`"),
+        _alone("FMI 2.0", alone.by_fmpy_with, interface="set_input_derivatives")._replace(
+            fails="sequence of same size"
+        ),
+        _alone("FMI 3.0", alone.by_fmpy),
+        _alone("FMI 3.0", alone.by_fmpy_with, interface="early_return_allowed", label="`instantiate_fmu`"),
+        *_exchange(alone.by_fmpy),
+    ],
+    "libcosimpy": [
+        _system(together.by_libcosimpy),
+        Run("archive", together.by_ecco, (0.01, 1e-6, _BOND, []), "ECCO"),
+        _system(together.by_libcosimpy, on="wrong"),
+        _alone("FMI 3.0", alone.by_libcosimpy)._replace(fails="ended with -"),
+    ],
+    "ecospy": [
+        _system(together.by_ecospy),
+        _system(together.by_ecospy, on="wrong"),
+        _alone("FMI 3.0", alone.by_ecospy),
+    ],
+    "CoFMUPy": [
+        _system(together.by_cofmupy, on="started"),
+        _system(together.by_cofmupy, "`iterative`", True, on="started"),
+        _system(together.by_cofmupy, on="wrong"),
+        _alone("FMI 3.0", alone.by_cofmupy, _COMMANDED),
+    ],
+    "PathSim": [
+        _system(together.by_pathsim),
+        _system(together.by_pathsim, on="wrong"),
+        _alone("FMI 3.0", alone.by_pathsim, _COMMANDED),
+        *_exchange(alone.by_pathsim),
+    ],
+    "`run_system`": [
+        _system(together.by_linkwork),
+        *(_system(together.by_linkwork, f'`"{c}"`', c) for c in ("derivatives", "rollback")),
+        _system(together.by_linkwork, on="wrong")._replace(fails="the units do not match"),
+    ],
+}
+#: Those that read an archive themselves.
+READERS = (together.by_fmpy, together.by_libcosimpy, together.by_ecospy, together.by_linkwork)
+
+
+class Capability(NamedTuple):
+    """What a master does: on which materials it is looked for, and the line that tells."""
+
+    name: str
+    on: tuple[str, ...]
+    line: str
+
+
+_FMI2 = ("archive", "started", "FMI 2.0")
+CAPABILITIES = (
+    Capability("reads the `.ssp`", ("archive", "started"), "read"),
+    Capability("sets integers", _FMI2, "fmi2SetInteger"),
+    Capability("refuses a torque wired to a force", ("wrong",), "refused"),
+    Capability("varies its step", ("archive", "started"), "variedStep"),
+    Capability("sets a saved state", _FMI2, "fmi2SetFMUstate"),
+    Capability("derivatives of inputs", _FMI2, "fmi2SetRealInputDerivatives"),
+    Capability("FMI 3.0: intermediate update", ("FMI 3.0",), "intermediateUpdate"),
+    Capability("FMI 3.0: early return", ("FMI 3.0",), "earlyReturn"),
+    Capability("model exchange: event at a jump of an input", ("jump",), "fmi2EnterEventMode"),
+    Capability("model exchange: event at the limit of assembly", ("limit",), "fmi2EnterEventMode"),
+)
+
+
+def _cross(folder: Path) -> None:
+    """Connect the torque of the shaft to the force on the slider, in an archive that is unpacked."""
+    # in the text: two of the masters know elements by their prefixes
+    path = folder / "SystemStructure.ssd"
+    text = path.read_text(encoding="utf-8").replace('"drive.torque"', '"slider.force"')
+    text, count = re.subn(r'(name="slider\.force"[^>]*>\s*<ssc:Real) unit="N\.m"', r"\1", text)
+    assert count == 1
+    path.write_text(text, encoding="utf-8")
+
+
+def _watch(folder: Path) -> None:
+    for fmu in (folder / "resources").glob("*.fmu"):
+        watched(fmu, fmu)
+
+
+def material(folder: Path, on: str) -> Path:
+    """Return what a run is on, made if it is not in the folder; all that is called is written down."""
+    name = {"jump": "FMI 2.0", "limit": "FMI 2.0"}.get(on, on)
+    target = folder / f"{name}.{'fmu' if name.startswith('FMI') else 'ssp'}"
+    if target.exists():
+        return target
+    match name:
+        case "archive":
+            wiring = system_of("motor-crank").without_rates().wiring()
+            return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
+        case "started":
+            wiring = started_in_its_modes("motor-crank", folder)
+            return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
+        case "wrong":
+            return changed(material(folder, "archive"), target, _cross)
+    return watched(build_native(FIVE_BAR, NATIVE if name == "FMI 2.0" else NATIVE_FMI3, folder), target)
+
+
+def lines(run: Run, material: Path) -> set[str]:
+    """Return what is told of a run: what it called, that the master read the archive itself, or refused it for its units."""
+    with tempfile.TemporaryDirectory() as folder:
+        calls = Path(folder, "calls")
+        calls.touch()
+        os.environ["LINKWORK_CALLS"] = str(calls)
+        try:
+            run_in_process(run.by, material, *run.arguments, options=(), timeout=300.0)
+        except AssertionError as error:
+            if run.fails not in str(error) or not run.fails:
+                raise
+            found = {"refused"} if "units" in run.fails else set()
+        else:
+            found = {"read"} if run.by in READERS else set()
+        finally:
+            del os.environ["LINKWORK_CALLS"]
+        return found | set(calls.read_text(encoding="utf-8").split())
+
+
+def find(master: str, folder: Path) -> dict[str, str]:
+    """Return for each capability of a master `YES`, an option that it needs, `NO`, or `NONE` where it does not come to run."""
+    told = [(run, lines(run, material(folder, run.on))) for run in RUNS[master]]
+    found = {}
+    for capability in CAPABILITIES:
+        looked = [(run.label, said) for run, said in told if run.on in capability.on and said]
+        labels = [label for label, said in looked if capability.line in said]
+        found[capability.name] = labels[0] if labels else NO if looked else NONE
+    return found
+
+
+Table = dict[str, dict[str, str]]
+
+
+def read(path: Path) -> Table:
+    """Read what was found, by master and capability."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return {row.pop("master"): row for row in csv.DictReader(file)}
+
+
+def write(path: Path, table: Table) -> None:
+    """Write what was found."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.DictWriter(file, ["master", *(c.name for c in CAPABILITIES)], lineterminator="\n")
+        rows.writeheader()
+        rows.writerows({"master": master, **found} for master, found in table.items())
+
+
+def markdown(table: Table) -> str:
+    """Write the table of the page, a column for each master."""
+    rows: Iterable[Sequence[str]] = [(c.name, *(found[c.name] for found in table.values())) for c in CAPABILITIES]
+    return "\n".join(f"| {' | '.join(row)} |" for row in [("", *table), ["---"] * (len(table) + 1), *rows])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--master", choices=tuple(RUNS), action="append", help="this master alone (repeatable)")
+    chosen = parser.parse_args().master
+    with tempfile.TemporaryDirectory() as place:
+        table = {master: find(master, Path(place)) for master in chosen or RUNS}
+    if not chosen:
+        write(RESULTS, table)
+    print(markdown(table))

@@ -1,0 +1,52 @@
+"""Copies of FMUs and archives that write down what masters call; for Linux."""
+
+from __future__ import annotations
+
+import tempfile
+import zipfile
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+
+from analysis.export import PLATFORMS, compile_library, this_platform
+
+from .c_host import unpack
+
+SOURCE = Path(__file__).with_name("spy.c")
+OPTIONS = (
+    "-std=c11",
+    "-O2",
+    "-D_GNU_SOURCE",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-shared",
+    "-fPIC",
+    "-Wl,-rpath,$ORIGIN,--no-as-needed",
+)
+
+
+def watched(fmu: Path, target: Path) -> Path:
+    """Write a copy of a native FMU whose calls are written to the file that the variable LINKWORK_CALLS names."""
+    with tempfile.TemporaryDirectory() as folder:
+        library = unpack(fmu, Path(folder)).library
+        real = library.rename(library.with_name(f"real-{library.name}"))
+        options = (*OPTIONS, "-I", str(resources.files("fmpy") / "c-code"), real.name)
+        compile_library(library.parent, [str(SOURCE)], library.name, PLATFORMS[this_platform()].target, options)
+        return packed(Path(folder), target)
+
+
+def changed(archive: Path, target: Path, change: Callable[[Path], None]) -> Path:
+    """Write a copy of an archive, such as of SSP, with a change made to the folder that it is unpacked to."""
+    with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(archive) as content:
+        content.extractall(folder)
+        change(Path(folder))
+        return packed(Path(folder), target)
+
+
+def packed(folder: Path, target: Path) -> Path:
+    """Write an archive of a folder's files."""
+    with zipfile.ZipFile(target, "w") as content:
+        for path in sorted(folder.rglob("*")):
+            content.write(path, path.relative_to(folder))
+    return target
