@@ -104,6 +104,8 @@ RUNS = {
     "`run_system`": [
         _system(together.by_linkwork),
         *(_system(together.by_linkwork, f'`"{c}"`', c) for c in ("derivatives", "rollback")),
+        _system(together.by_linkwork, "`share`", "hold", 1e-3),
+        _system(together.by_linkwork, '`"updates"`', "updates", on="archive 3"),
         _system(together.by_linkwork, on="wrong")._replace(fails="the units do not match"),
     ],
 }
@@ -120,6 +122,7 @@ class Capability(NamedTuple):
 
 
 _FMI2 = ("archive", "started", "FMI 2.0")
+_FMI3 = ("archive 3", "FMI 3.0")
 CAPABILITIES = (
     Capability("reads the `.ssp`", ("archive", "started"), "read"),
     Capability("sets integers", _FMI2, "fmi2SetInteger"),
@@ -127,8 +130,8 @@ CAPABILITIES = (
     Capability("varies its step", ("archive", "started"), "variedStep"),
     Capability("sets a saved state", _FMI2, "fmi2SetFMUstate"),
     Capability("derivatives of inputs", _FMI2, "fmi2SetRealInputDerivatives"),
-    Capability("FMI 3.0: intermediate update", ("FMI 3.0",), "intermediateUpdate"),
-    Capability("FMI 3.0: early return", ("FMI 3.0",), "earlyReturn"),
+    Capability("FMI 3.0: intermediate update", _FMI3, "intermediateUpdate"),
+    Capability("FMI 3.0: early return", _FMI3, "earlyReturn"),
     Capability("model exchange: event at a jump of an input", ("jump",), "fmi2EnterEventMode"),
     Capability("model exchange: event at the limit of assembly", ("limit",), "fmi2EnterEventMode"),
 )
@@ -158,6 +161,9 @@ def material(folder: Path, on: str) -> Path:
     match name:
         case "archive":
             wiring = system_of("motor-crank").without_rates().wiring()
+            return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
+        case "archive 3":
+            wiring = system_of("motor-crank").without_rates().wiring(fmi=3)
             return changed(write_ssp(wiring, folder / "unwatched.ssp"), target, _watch)
         case "started":
             wiring = started_in_its_modes("motor-crank", folder)

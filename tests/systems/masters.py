@@ -163,9 +163,11 @@ def by_pathsim(archive: str, step: float, count: int, names: list[str]) -> Any:
     return found
 
 
-def by_linkwork(archive: str, step: float, count: int, names: list[str], coupling: str = "hold") -> Any:
+def by_linkwork(
+    archive: str, step: float, count: int, names: list[str], coupling: str = "hold", share: float | None = None
+) -> Any:
     """Our own master."""
     from analysis.systems import read_ssp, run_system
 
-    run = run_system(read_ssp(archive), step=step, stop_time=count * step, coupling=coupling)
+    run = run_system(read_ssp(archive), step=step, stop_time=count * step, coupling=coupling, share=share)
     return {name: float(run[name][-1]) for name in names}
