@@ -115,7 +115,7 @@ def convergence(
             raise unknown_name(way, WAYS, f"coupling {way!r}")
     if steps is None:
         periods = [m.values.get("sample_time", 1e-3) for m in system.members.values() if m.controller]
-        first = min(system.run.step, *periods, system.run.stop_time)
+        first = min([system.run.step, *periods, system.run.stop_time])
         steps = [first * share * 0.1**n for n in range(decades) for share in _DECADE] + [first * 0.1**decades]
     stop_time = min(system.run.stop_time, 50.0 * steps[0]) if stop_time is None else stop_time
     for whole, part in [(stop_time, steps[0]), *((steps[0], step) for step in steps)]:
