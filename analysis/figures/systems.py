@@ -89,12 +89,14 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         for place, name in zip(axes, names):
             unit, factor = display_of(run.units[name])
             place.plot(run.time, factor * run[name])
-            place.set_ylabel(f"{name}\n[{unit}]", fontsize=SMALL)
+            of, _, output = name.rpartition(".")
+            place.set_ylabel(f"{of}\n{output}\n[{unit}]", fontsize=SMALL)
         for name, power in run.powers.items():
             axes[-1].plot(run.time, power, label=name)
         if run.powers:
             axes[-1].set_ylabel("power residual\n[W]", fontsize=SMALL)
-            axes[-1].legend()
+            # above the axes: the curves fill them
+            axes[-1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=TINY, borderaxespad=0.2)
         axes[-1].set_xlabel("time [s]")
         write_title(figure, title or f"{run.title}, coupling: {run.coupling}")
         return finish(figure)
