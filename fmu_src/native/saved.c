@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* The text is JSON. Its numbers are written as the hexadecimal digits of their bits, which are the same on every platform and in
@@ -14,7 +13,7 @@
 static const char hexadecimal[] = "0123456789abcdef";
 
 Status instance_save(Instance *c, void **state) {
-    Saved *saved = *state ? *state : malloc(sizeof *saved);
+    Saved *saved = *state ? *state : c->memory.allocate(1, sizeof *saved);
     if (!saved)                                                                /* no memory */
         return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
     *saved = c->s;
@@ -73,9 +72,9 @@ static void put_saved(Out *out, const Saved *saved) {
     put(out, "\"}");
 }
 
-void instance_forget_saved(void **state) {
-    if (state) {
-        free(*state);
+void instance_forget_saved(const Instance *c, void **state) {
+    if (state && *state) {
+        c->memory.release(*state);
         *state = NULL;
     }
 }
@@ -154,7 +153,7 @@ static bool sound(const Saved *s) {
 }
 
 Status instance_deserialize(Instance *c, const char *text, size_t size, void **state) {
-    Saved *saved = calloc(1, sizeof *saved);
+    Saved *saved = c->memory.allocate(1, sizeof *saved);
     In in = {text, text + size};
     if (!saved)                                                                /* no memory */
         return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
@@ -164,7 +163,7 @@ Status instance_deserialize(Instance *c, const char *text, size_t size, void **s
            take_text(&in, "\",\"cause\":\"", saved->cause_message) && take_check(&in, text) && take(&in, "\"}") &&
            in.at == in.end && sound(saved);
     if (!good) {
-        free(saved);
+        c->memory.release(saved);
         return instance_say(c, ERROR, "the serialised state is damaged, or not one of a " MODEL_IDENTIFIER);
     }
     *state = saved;
