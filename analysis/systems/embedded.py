@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
 from ..export import BuildError, compile_library, this_platform
 from ..files import write_text
-from .wiring import End, Part, Wiring, WiringError
+from .wiring import Part, Wiring, WiringError
 
 _HOST, _CONTROLLERS = "host.c", "controllers.h"
 #: NO_HEAP leaves out of the FMUs what they have for hosts that give them no memory.
@@ -23,7 +23,8 @@ OPTIONS = (
 def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
     """Write a system as C files into a folder, and return the names of those to compile.
 
-    These are ``host.c``, the master with its clock, and one file of each native FMU. ``system.h`` has the start values and connections.
+    These are ``host.c``, the master with its clock, and one file of each native FMU. ``system.h`` has the start values and
+    the connections.
 
     Raises
     ------
@@ -107,7 +108,10 @@ def _header(wiring: Wiring) -> str:
         c, kind = names[name], native.get(name)
         if kind is None:
             kind = part.description.modelName
-            starts = ", ".join(f".{_field(port)} = {value!r}" for port, value in part.values.items())
+            own = {v.name: float(v.start) for v in part.description.modelVariables if v.type == "Real" and v.start}
+            starts = ", ".join(
+                f".{_field(port)} = {value!r}" for port, value in {**own, **part.values}.items() if value
+            )
             declared.append(f"static {kind} {c} = {{{starts}}}; /* {name} */")
             initialise.append(f"SAMPLE({kind}, {c}, 0.5 * {c}.sample_time)")
             advance.append(f"SAMPLE({kind}, {c}, time + step)")
