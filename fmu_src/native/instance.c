@@ -9,14 +9,13 @@
 
 static char *copy(Memory memory, const char *text) {
     char *result = memory.allocate(strlen(text) + 1, 1);
-    return result ? strcpy(result, text) : NULL; /* no memory */
+    return result ? strcpy(result, text) : NULL;
 }
 
 Instance *instance_new(const char *name, const char *token, Interface interface, Memory memory, bool logging, void *environment,
                        void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void)) {
     Instance *c = memory.allocate(1, sizeof *c);
-    if (!c)          /* no memory */
-        return NULL; /* no memory */
+    if (!c) return NULL;
     c->interface = interface;
     c->memory = memory;
     c->logging = logging ? ALL_CATEGORIES : 0;
@@ -25,8 +24,8 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
     c->logger = logger;
     c->name = copy(memory, name ? name : "");
     c->text = memory.allocate(1, SENTENCE);
-    bool good = c->name && c->text; /* no memory */
-    if (good && c->name[0] == 0) {  /* no memory */
+    bool good = c->name && c->text;
+    if (good && c->name[0] == 0) {
         instance_say(c, ERROR, "an instance must have a name");
         good = false;
     }
@@ -45,8 +44,8 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
 void instance_free(Instance *c) {
     if (!c) return;
     void (*release)(void *) = c->memory.release;
-    if (c->name) release(c->name); /* no memory */
-    if (c->text) release(c->text); /* no memory */
+    if (c->name) release(c->name);
+    if (c->text) release(c->text);
     release(c);
 }
 

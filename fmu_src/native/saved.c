@@ -14,8 +14,7 @@ static const char hexadecimal[] = "0123456789abcdef";
 
 Status instance_save(Instance *c, void **state) {
     Saved *saved = *state ? *state : c->memory.allocate(1, sizeof *saved);
-    if (!saved)                                                                /* no memory */
-        return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
+    if (!saved) return instance_say(c, ERROR, "there is no memory for a saved state");
     *saved = c->s;
     *state = saved;
     return OK;
@@ -155,8 +154,7 @@ static bool sound(const Saved *s) {
 Status instance_deserialize(Instance *c, const char *text, size_t size, void **state) {
     Saved *saved = c->memory.allocate(1, sizeof *saved);
     In in = {text, text + size};
-    if (!saved)                                                                /* no memory */
-        return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
+    if (!saved) return instance_say(c, ERROR, "there is no memory for a saved state");
     bool good = take(&in, HEADER);
     for (size_t i = 0; i < NUMBERS && good; i++) good = take_number(&in, (char *)saved + i * sizeof(double));
     good = good && take_text(&in, "\",\"message\":\"", saved->message) &&
