@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         host = build_host(wiring, folder)
         free = run_host(host, options.steps)
-        ways: dict[str, tuple[str, ...]] = {"": ()} | ({"real-time, ": REAL_TIME} if may_be_real_time() else {})
+        ways: dict[str, tuple[str, ...]] = {"": ()} | ({", real-time": REAL_TIME} if may_be_real_time() else {})
         paced = {
             (way, rate): run_host(host, round(rate * options.seconds), rate, by=by)
             for rate in RATES
@@ -87,16 +87,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for heading in ("run", "steps", *(p.replace("%", " %") for p in PERCENTILES)):
         table.add_column(heading, justify="left" if heading == "run" else "right")
     rows = {f"as fast as it goes, {1e3 * wiring.step:g} ms": free}
-    rows |= {f"{way}{rate / 1000:g} kHz": run for (way, rate), run in paced.items()}
+    rows |= {f"{rate / 1000:g} kHz{way}": run for (way, rate), run in paced.items()}
     for what, run in rows.items():
         table.add_row(what, f"{run['steps']:.0f}", *(f"{run[f'step_us_{p}']:.1f}" for p in PERCENTILES))
     console.print(table)
-    report = Table(title="Deadlines, and how late a step began, microseconds")
-    for heading in ("run", "deadlines", "missed", "latest", *(f"begun {p.replace('%', ' %')}" for p in PERCENTILES)):
+    report = Table(title="Deadlines missed, and how late a step began, microseconds")
+    for heading in ("run", "deadlines", "missed", "latest", *(p.replace("%", " %") for p in PERCENTILES)):
         report.add_column(heading, justify="left" if heading == "run" else "right")
     for (way, rate), run in paced.items():
         counts = (f"{run[name]:.0f}" for name in ("steps", "deadlines_missed", "latest_us"))
-        report.add_row(f"{way}{rate / 1000:g} kHz", *counts, *(f"{run[f'wake_us_{p}']:.1f}" for p in PERCENTILES))
+        report.add_row(f"{rate / 1000:g} kHz{way}", *counts, *(f"{run[f'wake_us_{p}']:.1f}" for p in PERCENTILES))
     console.print(report)
     python = 1e6 * python_step(wiring)
     middle = free["step_us_median"]

@@ -94,7 +94,8 @@ static void need(int good, const char *part, const char *what) {
 
 /* Times */
 
-enum { BIN = 100, BINS = 100000 }; /* ns; what takes more than 10 ms is counted in the last one */
+/* Bins of 1 ns, and from 2 * FINE ns on FINE of one width for each doubling: what is read from them is right within 1 / FINE. */
+enum { FINE = 128, BINS = 40 * FINE };
 
 /* How often something took how long (ns). */
 typedef struct {
@@ -103,7 +104,10 @@ typedef struct {
 } Times;
 
 static void count(Times *times, int64_t taken) {
-    times->bins[taken < (int64_t)BIN * (BINS - 1) ? taken / BIN : BINS - 1]++;
+    int doublings = 0;
+    while (taken >> doublings >= 2 * FINE) doublings++;
+    int64_t bin = (int64_t)doublings * FINE + (taken >> doublings);
+    times->bins[bin < BINS ? bin : BINS - 1]++;
     if (taken > times->worst) times->worst = taken;
 }
 
@@ -112,8 +116,9 @@ static double percentile(const Times *times, double share, long all) {
     double below = 0.0;
     int bin = 0;
     while (bin < BINS - 1 && (below += times->bins[bin]) < share * (double)all) bin++;
-    int64_t end = (int64_t)BIN * (bin + 1);
-    return 1e-3 * (double)(share == 1.0 || bin == BINS - 1 || end > times->worst ? times->worst : end);
+    int doublings = bin < 2 * FINE ? 0 : bin / FINE - 1;
+    int64_t end = (int64_t)(bin - doublings * FINE + 1) << doublings;
+    return 1e-3 * (double)(share == 1.0 || end > times->worst ? times->worst : end);
 }
 
 static void print(const char *name, double value) {
