@@ -30,7 +30,7 @@ test-all: $(DEV) lint
 lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/clang-format --dry-run --Werror fmu_src/native/*.[ch] analysis/export/browser/*.[ch]
+	$(BIN)/clang-format --dry-run --Werror fmu_src/native/*.[ch] analysis/export/browser/*.[ch] analysis/systems/*.[ch]
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python docs/generate.py --check

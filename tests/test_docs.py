@@ -208,6 +208,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ),
         ("linkages.md", 6, 1, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
+        ("real-time.md", 2, 0, ("out/motor-tracking-host/system.h", "out/motor-tracking-host/host")),
     ],
 )
 def test_a_page_runs_and_says_what_is_so(page, commands, checked, files, tmp_path):

@@ -38,6 +38,7 @@ def system() -> None:
       linkwork system check motor-crank.toml
       linkwork system build motor-crank.toml
       linkwork system run out/motor-crank.ssp --stop '3 s' --coupling derivatives
+      linkwork system host motor-crank.toml
     """
 
 
@@ -222,3 +223,15 @@ def draw(file: str, out: str) -> None:
     """Draw the parts of a system and their connections."""
     for path in plotted(True, _wiring(file), folder_of(out) / f"{Path(file).stem}-diagram.png"):
         say(f"wrote {path}")
+
+
+@system.command()
+@_FILE
+@out_option(help="Folder for the folder of the host.")
+@handled
+def host(file: str, out: str) -> None:
+    """Build a system as one program in C for real-time targets: no heap, no Python, step times and missed deadlines."""
+    from ..systems import build_host
+
+    made = build_host(_wiring(file), folder_of(out) / f"{Path(file).stem}-host")
+    say(f"wrote {made} with its sources: {made} STEPS [RATE]")

@@ -74,9 +74,7 @@ def _true(*flags: str) -> dict[str, str]:
 
 
 _STEPS = {"needsExecutionTool": "false"} | _true("canHandleVariableCommunicationStepSize")
-_STATE_2 = {"canBeInstantiatedOnlyOncePerProcess": "false"} | _true(
-    "canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate"
-)
+_STATE_2 = {"canBeInstantiatedOnlyOncePerProcess": "false"} | _true("canGetAndSetFMUstate", "canSerializeFMUstate")
 _NATIVE_2 = {"needsExecutionTool": "false"} | _STATE_2 | _true("providesDirectionalDerivative")
 _NATIVE_3 = {"needsExecutionTool": "false", "canBeInstantiatedOnlyOncePerProcess": "false"} | _true(
     "canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives", "providesAdjointDerivatives"
@@ -86,7 +84,12 @@ PYTHON = Kind(
     2,
     "",
     f"PythonFMU {version('pythonfmu')}",
-    {"CoSimulation": _STEPS | {"canInterpolateInputs": "false"} | _STATE_2},
+    {
+        "CoSimulation": _STEPS
+        | {"canInterpolateInputs": "false"}
+        | _STATE_2
+        | _true("canNotUseMemoryManagementFunctions")
+    },
 )
 NATIVE = Kind(
     2,

@@ -6,6 +6,8 @@ from .description import PARTNERS as PARTNERS
 from .description import System as System
 from .description import library as library
 from .description import load_system as load_system
+from .embedded import build_host as build_host
+from .embedded import write_host as write_host
 from .joined import Joined as Joined
 from .layout import Box as Box
 from .layout import boxes as boxes

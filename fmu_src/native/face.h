@@ -115,7 +115,7 @@ FMI(Status) STATE(Set, )(void *component, void *state) {
 
 FMI(Status) STATE(Free, )(void *component, void **state) {
     ALLOW(ANY_STATE)
-    instance_forget_saved(state);
+    instance_forget_saved(c, state);
     return FMI(OK);
 }
 

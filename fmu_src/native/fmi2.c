@@ -1,4 +1,6 @@
 /* The FMI 2.0 face: co-simulation and model exchange. */
+#include <stdlib.h>
+
 #include "fmi2Functions.h"
 
 #define FMI(name) fmi2##name
@@ -8,6 +10,13 @@
 #include "face.h"
 
 typedef fmi2ValueReference Reference;
+
+/* For hosts that give no functions of their own. A target without a heap is compiled with NO_HEAP: its host must give them. */
+#ifdef NO_HEAP
+static const Memory HEAP = {NULL, NULL};
+#else
+static const Memory HEAP = {calloc, free};
+#endif
 
 static void log_message(const Instance *c, Status status, const char *category, const char *message) {
     if (c->logger) ((fmi2CallbackLogger)c->logger)(c->environment, c->name, (fmi2Status)status, category, "%s", message);
@@ -22,7 +31,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     (void)resources; /* nothing is read: any folder will do */
     (void)visible;
     if (!functions || (type != fmi2ModelExchange && type != fmi2CoSimulation)) return NULL;
-    return instance_new(name, guid, type == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE, logging,
+    Memory memory = {functions->allocateMemory, functions->freeMemory};
+    if (!memory.allocate || !memory.release) memory = HEAP;
+    if (!memory.allocate) return NULL; /* NO_HEAP */
+    return instance_new(name, guid, type == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE, memory, logging,
                         functions->componentEnvironment, log_message, (void (*)(void))functions->logger);
 }
 

@@ -1,4 +1,6 @@
 /* The FMI 3.0 face: co-simulation and model exchange. */
+#include <stdlib.h>
+
 #include "fmi3Functions.h"
 
 #define FMI(name) fmi3##name
@@ -8,6 +10,8 @@
 #include "face.h"
 
 typedef fmi3ValueReference Reference;
+
+static const Memory HEAP = {calloc, free};
 
 #define COUNTS(count, right)                                                                                                   \
     if (!instance_counts(c, __func__, count, right)) return fmi3Error;
@@ -21,7 +25,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3LogMessageCallback log) {
     (void)resources; /* nothing is read: any folder will do */
     (void)visible;
-    return instance_new(name, token, MODEL_EXCHANGE, logging, environment, log_message, (void (*)(void))log);
+    return instance_new(name, token, MODEL_EXCHANGE, HEAP, logging, environment, log_message, (void (*)(void))log);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -31,7 +35,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3IntermediateUpdateCallback update) {
     (void)resources, (void)visible;
     (void)intermediate, (void)intermediate_count; /* all of them */
-    Instance *c = instance_new(name, token, CO_SIMULATION, logging, environment, log_message, (void (*)(void))log);
+    Instance *c = instance_new(name, token, CO_SIMULATION, HEAP, logging, environment, log_message, (void (*)(void))log);
     if (c && event_mode) {
         instance_say(c, ERROR, "%s: this FMU has no event mode in co-simulation", __func__);
         instance_free(c);

@@ -3,30 +3,29 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Life */
 
-static char *copy(const char *text) {
-    char *result = malloc(strlen(text) + 1);
-    return result ? strcpy(result, text) : NULL; /* no memory */
+static char *copy(Memory memory, const char *text) {
+    char *result = memory.allocate(strlen(text) + 1, 1);
+    return result ? strcpy(result, text) : NULL;
 }
 
-Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
+Instance *instance_new(const char *name, const char *token, Interface interface, Memory memory, bool logging, void *environment,
                        void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void)) {
-    Instance *c = calloc(1, sizeof *c);
-    if (!c)          /* no memory */
-        return NULL; /* no memory */
+    Instance *c = memory.allocate(1, sizeof *c);
+    if (!c) return NULL;
     c->interface = interface;
+    c->memory = memory;
     c->logging = logging ? ALL_CATEGORIES : 0;
     c->environment = environment;
     c->log = log;
     c->logger = logger;
-    c->name = copy(name ? name : "");
-    c->text = calloc(1, SENTENCE);
-    bool good = c->name && c->text; /* no memory */
-    if (good && c->name[0] == 0) {  /* no memory */
+    c->name = copy(memory, name ? name : "");
+    c->text = memory.allocate(1, SENTENCE);
+    bool good = c->name && c->text;
+    if (good && c->name[0] == 0) {
         instance_say(c, ERROR, "an instance must have a name");
         good = false;
     }
@@ -44,9 +43,10 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
 
 void instance_free(Instance *c) {
     if (!c) return;
-    free(c->name);
-    free(c->text);
-    free(c);
+    void (*release)(void *) = c->memory.release;
+    if (c->name) release(c->name);
+    if (c->text) release(c->text);
+    release(c);
 }
 
 void instance_reset(Instance *c) {

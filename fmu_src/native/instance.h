@@ -43,9 +43,16 @@ typedef struct {
 
 #define NUMBERS (offsetof(Saved, message) / sizeof(double))
 
+/* Where the memory of an instance and of its saved states comes from: zeros, as calloc has them. Nothing is allocated in a step. */
+typedef struct {
+    void *(*allocate)(size_t count, size_t size);
+    void (*release)(void *memory);
+} Memory;
+
 struct Instance {
     Saved s;
     Interface interface;
+    Memory memory;
     int logging;  /* categories that are logged */
     bool stale;   /* the outputs are older than state and inputs */
     bool stopped; /* an early return at the limit of assembly */
@@ -58,8 +65,9 @@ struct Instance {
     char *text; /* what the last get of a string returned */
 };
 
-LOCAL Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
-                             void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void));
+LOCAL Instance *instance_new(const char *name, const char *token, Interface interface, Memory memory, bool logging,
+                             void *environment, void (*log)(const Instance *, Status, const char *, const char *),
+                             void (*logger)(void));
 LOCAL void instance_free(Instance *c);
 LOCAL void instance_reset(Instance *c);
 
@@ -115,7 +123,7 @@ LOCAL Status instance_directional(Instance *c, const char *function, bool adjoin
 /* Saved state */
 LOCAL Status instance_save(Instance *c, void **state);
 LOCAL Status instance_restore(Instance *c, const void *state);
-LOCAL void instance_forget_saved(void **state);
+LOCAL void instance_forget_saved(const Instance *c, void **state);
 LOCAL size_t instance_serialized_size(const void *state);
 LOCAL Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size);
 LOCAL Status instance_deserialize(Instance *c, const char *text, size_t size, void **state);

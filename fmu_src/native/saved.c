@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* The text is JSON. Its numbers are written as the hexadecimal digits of their bits, which are the same on every platform and in
@@ -14,9 +13,8 @@
 static const char hexadecimal[] = "0123456789abcdef";
 
 Status instance_save(Instance *c, void **state) {
-    Saved *saved = *state ? *state : malloc(sizeof *saved);
-    if (!saved)                                                                /* no memory */
-        return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
+    Saved *saved = *state ? *state : c->memory.allocate(1, sizeof *saved);
+    if (!saved) return instance_say(c, ERROR, "there is no memory for a saved state");
     *saved = c->s;
     *state = saved;
     return OK;
@@ -73,9 +71,9 @@ static void put_saved(Out *out, const Saved *saved) {
     put(out, "\"}");
 }
 
-void instance_forget_saved(void **state) {
-    if (state) {
-        free(*state);
+void instance_forget_saved(const Instance *c, void **state) {
+    if (state && *state) {
+        c->memory.release(*state);
         *state = NULL;
     }
 }
@@ -154,17 +152,16 @@ static bool sound(const Saved *s) {
 }
 
 Status instance_deserialize(Instance *c, const char *text, size_t size, void **state) {
-    Saved *saved = calloc(1, sizeof *saved);
+    Saved *saved = c->memory.allocate(1, sizeof *saved);
     In in = {text, text + size};
-    if (!saved)                                                                /* no memory */
-        return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
+    if (!saved) return instance_say(c, ERROR, "there is no memory for a saved state");
     bool good = take(&in, HEADER);
     for (size_t i = 0; i < NUMBERS && good; i++) good = take_number(&in, (char *)saved + i * sizeof(double));
     good = good && take_text(&in, "\",\"message\":\"", saved->message) &&
            take_text(&in, "\",\"cause\":\"", saved->cause_message) && take_check(&in, text) && take(&in, "\"}") &&
            in.at == in.end && sound(saved);
     if (!good) {
-        free(saved);
+        c->memory.release(saved);
         return instance_say(c, ERROR, "the serialised state is damaged, or not one of a " MODEL_IDENTIFIER);
     }
     *state = saved;

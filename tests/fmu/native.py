@@ -33,6 +33,27 @@ class Callbacks(ctypes.Structure):
     )
 
 
+class Memory:
+    """Memory of a host: how often it was asked for some, what it gave and did not get back; none after so many times."""
+
+    def __init__(self, most: int = 1000) -> None:
+        self.asked, self.given = 0, dict[int, Any]()
+
+        def allocate(count: int, size: int) -> int | None:
+            self.asked += 1
+            if self.asked > most:
+                return None
+            block = ctypes.create_string_buffer(count * size)
+            self.given[ctypes.addressof(block)] = block
+            return ctypes.addressof(block)
+
+        self._kept = (
+            ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)(allocate),
+            ctypes.CFUNCTYPE(None, c_void_p)(lambda address: self.given.pop(address) and None),
+        )
+        self.functions = [ctypes.cast(function, c_void_p) for function in self._kept]
+
+
 class Library:
     """A native FMU, unpacked and loaded.
 
@@ -83,6 +104,7 @@ class Instance:
         name: bytes | None = b"test",
         logging: bool = False,
         callbacks: bool = True,
+        memory: Memory | None = None,
         early: bool = False,
         event_mode: bool = False,
         update: Any = None,
@@ -94,6 +116,8 @@ class Instance:
         if library.fmi == 2:
             self._logger: Any = LOG_2(lambda _, name, status, category, form, text: self._say(status, text, form))
             self._callbacks = Callbacks(logger=self._logger) if callbacks else Callbacks()
+            if memory is not None:
+                self._callbacks.allocate, self._callbacks.free = memory.functions
             given = byref(self._callbacks)
             self.handle = dll.fmi2Instantiate(
                 name, int(interface == "cs"), key, b"file:/nowhere", given, 0, int(logging)

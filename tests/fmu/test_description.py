@@ -305,14 +305,16 @@ def test_initial_unknowns_are_all_outputs_and_derivatives(description: Element, 
 
 #: Stop time and step of the default experiment: three turns at 420 rpm, two at 50 rpm.
 EXPERIMENTS = {"FiveBarSlider": (3 / 7, 1e-3), "SliderCrank": (2 * 60 / 50, 5e-3)}
-_STATE_2 = {"canGetAndSetFMUstate", "canSerializeFMUstate", "canNotUseMemoryManagementFunctions"}
+_STATE_2 = {"canGetAndSetFMUstate", "canSerializeFMUstate"}
 _STATE_3 = {
     *("canGetAndSetFMUState", "canSerializeFMUState"),
     *("providesDirectionalDerivatives", "providesAdjointDerivatives"),
 }
 #: Of each kind, what each interface can do.
 CAPABILITIES = {
-    "python": {"CoSimulation": _STATE_2 | {"canHandleVariableCommunicationStepSize"}},
+    "python": {
+        "CoSimulation": _STATE_2 | {"canHandleVariableCommunicationStepSize", "canNotUseMemoryManagementFunctions"}
+    },
     "native": {
         "ModelExchange": _STATE_2 | {"providesDirectionalDerivative", "completedIntegratorStepNotNeeded"},
         "CoSimulation": _STATE_2

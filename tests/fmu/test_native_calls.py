@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from .native import DISCARD, ERROR, LOG_3, OK, Callbacks, Instance, Library, phases
+from .native import DISCARD, ERROR, LOG_3, OK, Callbacks, Instance, Library, Memory, phases
 
 INITIAL, RUN = {"instantiated"}, {"step", "event", "continuous"}
 READ = {"initialization", "terminated"} | RUN
@@ -405,6 +405,51 @@ def test_no_callbacks_at_all(library: Library) -> None:
     c = library.instance(callbacks=False).start()
     assert c.step(5.0, 1e-3) == DISCARD
     assert c("ExitInitializationMode") == ERROR
+    assert c.step(0.0, 1e-3) == OK
+
+
+def test_memory_is_that_of_the_host_and_none_is_asked_for_in_a_step(library: Library) -> None:
+    if library.fmi == 3:
+        pytest.skip("FMI 3.0 has no such functions")
+    memory = Memory()
+    c = library.instance(memory=memory).start()
+    asked = memory.asked
+    assert asked > 0
+    for k in range(10):
+        assert c.step(1e-3 * k, 1e-3) == OK
+    assert memory.asked == asked
+    state = c_void_p()
+    for _ in range(2):
+        assert c("GetFMUstate", byref(state)) == OK
+    assert memory.asked == asked + 1
+    assert c("FreeFMUstate", byref(state)) == OK
+    assert state.value is None
+    assert c("FreeFMUstate", byref(state)) == OK
+    assert len(memory.given) == asked
+    c.free()
+    assert memory.given == {}
+    # one function alone is of no use
+    memory = Memory()
+    memory.functions[1] = c_void_p()
+    assert library.instance(memory=memory).start().step(0.0, 1e-3) == OK
+    assert memory.asked == 0
+
+
+def test_memory_that_runs_out(library: Library) -> None:
+    if library.fmi == 3:
+        pytest.skip("FMI 3.0 has no such functions")
+    full = Memory()
+    first = library.instance(memory=full)
+    assert first.handle is not None
+    for most in range(full.asked):
+        memory = Memory(most)
+        assert library.instance(memory=memory).handle is None
+        assert memory.given == {}
+    c = library.instance(memory=Memory(full.asked)).start()
+    state, text = c_void_p(), b"{}"
+    assert c("GetFMUstate", byref(state)) == ERROR
+    assert c("DeSerializeFMUstate", text, c_size_t(len(text)), byref(state)) == ERROR
+    assert [said for _, said in c.log] == 2 * ["there is no memory for a saved state"]
     assert c.step(0.0, 1e-3) == OK
 
 

@@ -1,0 +1,70 @@
+/* Controllers, as analysis/export/controllers.py has them: a structure of variables by their names, and what an instant of sampling does. */
+#ifndef CONTROLLERS_H
+#define CONTROLLERS_H
+
+#include <math.h>
+
+enum { HARMONICS = 6 };
+
+static inline double limited(double value, double limit) {
+    return fmin(fmax(value, -limit), limit);
+}
+
+typedef struct {
+    double sample_time, gain, integral_gain, derivative_gain, filter_time, tracking_time, limit, reference, measured,
+        feed_forward;
+    double force, error, integral, derivative;
+    long count;
+} PidController;
+
+static inline void PidController_sample(PidController *c) {
+    double before = c->error;
+    c->error = c->reference - c->measured;
+    if (c->count > 0)
+        c->derivative =
+            (c->filter_time * c->derivative + c->derivative_gain * (c->error - before)) / (c->filter_time + c->sample_time);
+    double wanted = c->gain * c->error + c->integral + c->derivative + c->feed_forward;
+    c->force = limited(wanted, c->limit);
+    c->integral += c->sample_time * (c->integral_gain * c->error + (c->force - wanted) / c->tracking_time);
+}
+
+typedef struct {
+    double sample_time, position_gain, velocity_gain, limit, reference, reference_velocity, position, velocity, feed_forward;
+    double force;
+    long count;
+} StateFeedbackController;
+
+static inline void StateFeedbackController_sample(StateFeedbackController *c) {
+    double back = c->position_gain * (c->position - c->reference);
+    back += c->velocity_gain * (c->velocity - c->reference_velocity);
+    c->force = limited(c->feed_forward - back, c->limit);
+}
+
+typedef struct {
+    double sample_time, motion[1], motion_cos[HARMONICS + 1], motion_sin[HARMONICS + 1];
+    double load[1], load_cos[HARMONICS + 1], load_sin[HARMONICS + 1], angle, speed;
+    double position, velocity, force;
+    long count;
+} MotionReferenceController;
+
+static inline void MotionReferenceController_sample(MotionReferenceController *c) {
+    double slope = 0.0;
+    c->position = c->motion[0];
+    c->force = c->load[0];
+    for (int n = 1; n <= HARMONICS; n++) {
+        double cosine = cos(n * c->angle), sine = sin(n * c->angle);
+        c->position += c->motion_cos[n] * cosine + c->motion_sin[n] * sine;
+        slope += n * (c->motion_sin[n] * cosine - c->motion_cos[n] * sine);
+        c->force += c->load_cos[n] * cosine + c->load_sin[n] * sine;
+    }
+    c->velocity = slope * c->speed;
+}
+
+/* Take the samples before an instant. */
+#define SAMPLE(type, part, end)                                                                                                \
+    while ((double)part.count * part.sample_time < (end) - 1e-6 * part.sample_time) {                                          \
+        type##_sample(&part);                                                                                                  \
+        part.count++;                                                                                                          \
+    }
+
+#endif

@@ -1,0 +1,171 @@
+"""A system as one program in C for real-time targets: its native FMUs linked from their sources, no heap, no Python."""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from collections.abc import Iterable
+from importlib import resources
+from pathlib import Path
+
+from ..export import BuildError, compile_library, this_platform
+from ..files import write_text
+from .wiring import Part, Wiring, WiringError
+
+_HOST, _CONTROLLERS = "host.c", "controllers.h"
+#: NO_HEAP leaves out of the FMUs what they have for hosts that give them no memory.
+OPTIONS = (
+    "-std=c11", "-O2", "-ffp-contract=off", "-fno-sanitize=undefined", "-Wall", "-Wextra", "-Werror", "-DNO_HEAP",
+)  # fmt: skip
+
+
+def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
+    """Write a system as C files into a folder, and return the names of those to compile.
+
+    These are ``host.c``, the master with its clock, and one file of each native FMU. ``system.h`` has the start values and
+    the connections.
+
+    Raises
+    ------
+    WiringError
+        If a part is neither a native FMU with its sources nor a controller that the host has.
+    """
+    folder = Path(folder)
+    files = {name: (resources.files(__package__) / name).read_text(encoding="utf-8") for name in (_HOST, _CONTROLLERS)}
+    files["system.h"] = _header(wiring)
+    fmus: dict[str, Path] = {}
+    for name, part in wiring.parts.items():
+        if not _compiled(part):
+            known = re.findall(r"void (\w+)_sample\(", files[_CONTROLLERS])
+            if part.description.modelName not in known:
+                raise WiringError(
+                    f"{name}: {part.fmu.name} has no sources in C, and the host has none of it: it has {', '.join(known)}"
+                )
+        elif fmus.setdefault(_identifier(part), part.fmu) != part.fmu:
+            raise WiringError(f"{name}: two different FMUs are named {_identifier(part)}: one of them must be renamed")
+    for identifier, path in fmus.items():
+        with zipfile.ZipFile(path) as archive:
+            sources = {
+                entry.removeprefix("sources/"): archive.read(entry).decode()
+                for entry in archive.namelist()
+                if re.fullmatch(r"sources/[^/]+\.[ch]", entry)
+            }
+        files |= {name: text for name, text in sources.items() if re.fullmatch(r"fmi2\w+\.h", name)}
+        files |= {f"{identifier}/{name}": text for name, text in sources.items()}
+        part = next(part for part in wiring.parts.values() if part.fmu == path)
+        included = "".join(f'#include "{identifier}/{name}"\n' for name in _compiled(part))
+        files[f"{identifier}.c"] = (
+            f"#define FMI2_FUNCTION_PREFIX {identifier}_\n"
+            '#pragma GCC diagnostic ignored "-Wunused-function"\n'
+            f'#pragma GCC diagnostic ignored "-Wunused-parameter"\n{included}'
+        )
+    for name, text in files.items():
+        write_text(folder / name, text)
+    return [_HOST, *(f"{identifier}.c" for identifier in fmus)]
+
+
+def build_host(wiring: Wiring, folder: str | Path) -> Path:
+    """Write a system as C files into a folder, compile them there with Zig, and return the program; see ``host.c``.
+
+    Raises
+    ------
+    BuildError
+        If it is not Linux, whose clock the host goes by, or the files do not compile.
+    """
+    architecture, _, name = this_platform().partition("-")
+    if name != "linux":
+        raise BuildError(f"the host in C is for Linux, this is {name}: compile the files on the target")
+    files = write_host(wiring, folder)
+    compile_library(folder, files, "host", f"{architecture}-linux-musl", (*OPTIONS, "-static"))
+    return Path(folder) / "host"
+
+
+def _identifier(part: Part) -> str:
+    return str(part.description.coSimulation.modelIdentifier)
+
+
+def _compiled(part: Part) -> list[str]:
+    """Return the C files of an FMU that are to be compiled."""
+    return [
+        name
+        for configuration in part.description.buildConfigurations or ()
+        if configuration.modelIdentifier == _identifier(part)
+        for group in configuration.sourceFileSets
+        for name in group.sourceFiles
+    ]
+
+
+def _header(wiring: Wiring) -> str:
+    """Return system.h: instances of the parts, their start values, and functions that call all of them in turn."""
+    names = {name: f"part{n}" for n, name in enumerate(wiring.parts)}
+    native = {name: _identifier(part) for name, part in wiring.parts.items() if _compiled(part)}
+    ends = dict.fromkeys(wiring.connections.values())
+    at = {end: f"y[{n}]" for n, end in enumerate(ends)}
+    declared = [f"FMU({identifier})" for identifier in dict.fromkeys(native.values())]
+    begin, read, put, initialise, advance, finish = ([] for _ in range(6))
+    for name, part in wiring.parts.items():
+        c, kind = names[name], native.get(name)
+        if kind is None:
+            kind = part.description.modelName
+            own = {v.name: float(v.start) for v in part.description.modelVariables if v.type == "Real" and v.start}
+            starts = ", ".join(
+                f".{_field(port)} = {value!r}" for port, value in {**own, **part.values}.items() if value
+            )
+            declared.append(f"static {kind} {c} = {{{starts}}}; /* {name} */")
+            initialise.append(f"SAMPLE({kind}, {c}, 0.5 * {c}.sample_time)")
+            advance.append(f"SAMPLE({kind}, {c}, time + step)")
+            continue
+        declared.append(f"static fmi2Component {c}; /* {name} */")
+        begin.append(f"NEW({kind}, {c}, {json.dumps(name)}, {json.dumps(part.description.guid)})")
+        for port, value in part.values.items():
+            of = part.ports[port]
+            text = repr(float(value)) if of.type == "Real" else str(int(value))
+            type_ = of.type if of.type in ("Real", "Boolean") else "Integer"
+            begin.append(f"SET({kind}, {type_}, {c}, {of.reference}, {text}) /* {port} */")
+        begin.append(f"ENTER({kind}, {c})")
+        initialise.append(f"EXIT({kind}, {c})")
+        advance.append(f"STEP({kind}, {c}, time, step)")
+        finish.append(f"END({kind}, {c})")
+    for end, place in at.items():
+        read.append(
+            f"GET({native[end.part]}, {names[end.part]}, {wiring.port(end).reference}, {place})"
+            if end.part in native
+            else f"{place} = {names[end.part]}.{_field(end.port)};"
+        )
+    for target, source in wiring.connections.items():
+        put.append(
+            (
+                f"SET({native[target.part]}, Real, {names[target.part]}, {wiring.port(target).reference}, {at[source]})"
+                if target.part in native
+                else f"{names[target.part]}.{_field(target.port)} = {at[source]};"
+            )
+            + f" /* {source} -> {target} */"
+        )
+    said = ", ".join(json.dumps(str(end)) for end in ends)
+    return "\n".join(
+        [
+            f"/* {wiring.title}: parts, start values and connections, for host.c. Generated. */",
+            f"enum {{ PARTS = {len(names)}, OUTPUTS = {len(at)} }};",
+            f"static const double COMMUNICATION_STEP = {wiring.step!r};",
+            f"static double y[{len(at) or 1}];",
+            f"static const char *const outputs[] = {{{said or 'NULL'}}};",
+            *declared,
+            *_function("begin(void)", begin),
+            *_function("initialise(void)", initialise),
+            *_function("read_outputs(void)", read),
+            *_function("set_inputs(void)", put),
+            *_function("advance(double time, double step)", advance),
+            *_function("finish(void)", finish),
+            "",
+        ]
+    )
+
+
+def _function(head: str, lines: Iterable[str]) -> list[str]:
+    return ["", f"static void {head} {{", *(f"    {line}" for line in lines), "}"]
+
+
+def _field(port: str) -> str:
+    """Return the field of a controller's structure: harmonics are elements of an array."""
+    return re.sub(r"_(\d+)$", r"[\1]", port)
