@@ -16,11 +16,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 
 from .. import files
-<<<<<<< HEAD
-from ..export import NATIVE, NATIVE_FMI3, build_controller, build_native
-=======
-from ..export import NATIVE, SOURCES, build_controller, build_native
->>>>>>> realtime
+from ..export import NATIVE, NATIVE_FMI3, SOURCES, build_controller, build_native
 from ..export.controllers import CONTROLLERS, UNITS
 from ..files import Quantity, Table, entry, unknown_name
 from ..linkages import load_linkage
@@ -219,17 +215,11 @@ class Member:
             return self.fmu
         if self.mechanism is None:
             return build_controller(self.controller, folder)
-<<<<<<< HEAD
-        key = _tag(*(Path(str(m.__file__)).read_text(encoding="utf-8") for m in self.mechanism.modules), __version__)
-        target = folder / key / kinds[fmi].file_name(self.mechanism)
-        return target if target.is_file() else build_native(self.mechanism, kinds[fmi], target.parent)
-=======
         shell = sorted((SOURCES / "native").glob("*.[ch]"))
         sources = [*(Path(str(module.__file__)) for module in self.mechanism.modules), *shell]
         key = _tag(*(path.read_text(encoding="utf-8") for path in sources), __version__)
-        target = folder / key / NATIVE.file_name(self.mechanism)
-        return target if target.is_file() else build_native(self.mechanism, NATIVE, target.parent)
->>>>>>> realtime
+        target = folder / key / kinds[fmi].file_name(self.mechanism)
+        return target if target.is_file() else build_native(self.mechanism, kinds[fmi], target.parent)
 
 
 def _number(value: Any, name: str) -> float:
