@@ -268,6 +268,20 @@ def race_pictures() -> Iterator[Picture]:
     yield "race", picture(read(HERE / "race.csv")), 100
 
 
+def system_pictures() -> Iterator[Picture]:
+    """Draw the pictures of docs/systems.md."""
+    from analysis import figures as draw
+    from analysis.systems import convergence, library, load_system, run_system
+
+    names = {"motor-crank": ["motor.shaft.exerted_torque", "linkage.crank.speed"],
+             "press": ["flywheel.shaft.exerted_torque", "press.crank.speed", "load.contact.exerted_force"]}  # fmt: skip
+    for name, outputs in names.items():
+        run = run_system(load_system(library()[name]).wiring(), coupling="derivatives")
+        yield f"system-{name}", draw.plot(run, outputs), 70
+    found = convergence(load_system(library()["press"]))
+    yield "system-check", draw.plot(found), 90
+
+
 def slider_crank_pictures() -> Iterator[Picture]:
     """Draw the pictures of docs/slider-crank.md."""
     from dataclasses import replace
@@ -307,6 +321,7 @@ def main(arguments: list[str]) -> int:
             closed_form_pictures,
             linkage_pictures,
             race_pictures,
+            system_pictures,
             slider_crank_pictures,
         ):
             for name, figure, dpi in pictures():

@@ -90,7 +90,11 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
             node = SubElement(definitions, "Unit", name=unit)
             SubElement(node, "BaseUnit", {base: str(power) for base, power in UNITS[unit].items()})
         root.insert([child.tag for child in root].index("LogCategories"), definitions)
-        for variable in root.iterfind("ModelVariables/ScalarVariable"):
+        (structure,) = root.iter("ModelStructure")
+        unknowns = SubElement(structure, "InitialUnknowns")
+        for number, variable in enumerate(root.iterfind("ModelVariables/ScalarVariable"), 1):
+            if variable.get("causality") == "output":
+                SubElement(unknowns, "Unknown", index=str(number))
             if variable.get("name") in units:
                 variable[0].set("unit", units[str(variable.get("name"))])
         return root
