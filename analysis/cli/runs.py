@@ -506,6 +506,8 @@ def figures(numbers: Sequence[str], out: str, listing: bool) -> None:
       linkwork figures 3.2 3.4 7.2 R5
       linkwork figures --out figures
     """
+    from textwrap import indent
+
     from ..studies import STUDIES, make
 
     if listing:
@@ -518,8 +520,9 @@ def figures(numbers: Sequence[str], out: str, listing: bool) -> None:
     for number in numbers or STUDIES:
         with console.status(f"figure {number}"):
             result, paths = make(number, Path(out))
-        console.print(
-            f"[bold]{number}[/bold]  {result.title}: wrote {', '.join(p.name for p in paths)}", highlight=False
-        )
-        for verdict in result.verdicts:
-            console.print(f"        {verdict}", highlight=False, markup=False, soft_wrap=True)
+        wrote = f": wrote {', '.join(p.name for p in paths)}" if paths else ""
+        console.print(f"[bold]{number}[/bold]  {result.title}{wrote}", highlight=False)
+        if result.see:
+            console.print(f"  its statements are judged at {result.see}", highlight=False)
+        for statement in (*result.statements, *result.verdicts):
+            console.print(indent(str(statement), "  "), highlight=False, markup=False, soft_wrap=True)

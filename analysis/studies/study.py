@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,136 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 from ..figures import Curve, Figure
 from ..files import save_figure, write_csv
 from . import STUDIES, file_stem, is_figure
-
-#: Kinds of sources: the thesis's text, and its program when run.
-TEXT, LISTING = "text", "listing"
-#: What a verdict may be.
-HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
-
-
-class Source(NamedTuple):
-    """Source of a statement: its kind, and its place in the thesis (section, lines L of the scanned text)."""
-
-    kind: str
-    place: str = ""
-
-    @property
-    def words(self) -> str:
-        """The source as a reader without the documentation understands it."""
-        kinds = {TEXT: "the thesis", LISTING: "the thesis's program"}
-        place = re.sub(r"\bL(?=\d)", "line ", self.place)
-        return ", ".join(part for part in (kinds.get(self.kind, "our own check"), place) if part)
-
-
-#: Our own derivations and checks.
-OURS = Source("ours")
-
-
-def text(place: str) -> Source:
-    """Return a place in the thesis's text as a source."""
-    return Source(TEXT, place)
-
-
-def listing(place: str) -> Source:
-    """Return the thesis's program when run as a source."""
-    return Source(LISTING, place)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """Stated result beside the computed one; it holds if ``computed`` lies from ``lower`` to ``upper``.
-
-    Attributes
-    ----------
-    statement : str
-        The statement in words, without its number.
-    source : Source
-    stated, computed : float or None
-        The two values in ``unit``; None where the statement cannot be judged.
-    lower, upper : float
-        Range that the source supports.
-    why : str
-        Reason why the statement cannot be judged, or why it fails.
-    """
-
-    statement: str
-    source: Source
-    stated: float | None = None
-    computed: float | None = None
-    lower: float = -np.inf
-    upper: float = np.inf
-    unit: str = ""
-    why: str = ""
-
-    def __str__(self) -> str:
-        source = self.source.words
-        if self.computed is None:
-            return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
-        outcome = HOLDS if self.holds else f"{FAILS.upper()}{self.why and f': {self.why}'}"
-        return f"{self.statement}: {self.expected} ({source}), computed {self.found}: {outcome}"
-
-    @property
-    def expected(self) -> str:
-        """The stated value with its unit, and whether it is a bound; empty where there is none."""
-        if self.stated is None:
-            return ""
-        bound = "at most " if np.isneginf(self.lower) else "at least " if np.isposinf(self.upper) else ""
-        return f"{bound}{self.stated:.6g} {self.unit}".rstrip()
-
-    @property
-    def found(self) -> str:
-        """The computed value with its unit; empty where there is none."""
-        return "" if self.computed is None else f"{self.computed:.6g} {self.unit}".rstrip()
-
-    @property
-    def holds(self) -> bool:
-        """Whether the computed value is in the range."""
-        return self.computed is not None and bool(self.lower <= self.computed <= self.upper)
-
-    @property
-    def outcome(self) -> str:
-        """`HOLDS`, `FAILS` or `UNJUDGED`."""
-        return UNJUDGED if self.computed is None else HOLDS if self.holds else FAILS
-
-
-def near(
-    statement: str, source: Source, stated: float, computed: float, tolerance: float, unit: str = "", *, why: str = ""
-) -> Verdict:
-    """Judge a value that is stated to within a tolerance."""
-    bounds = {"lower": stated - tolerance, "upper": stated + tolerance}
-    return _judged(statement, source, stated, computed, unit, why, **bounds)
-
-
-def at_least(
-    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
-) -> Verdict:
-    """Judge a value that is stated as a lower bound."""
-    return _judged(statement, source, stated, computed, unit, why, lower=stated)
-
-
-def at_most(
-    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
-) -> Verdict:
-    """Judge a value that is stated as an upper bound."""
-    return _judged(statement, source, stated, computed, unit, why, upper=stated)
-
-
-def _judged(
-    statement: str, source: Source, stated: float, computed: float, unit: str, why: str, **bounds: float
-) -> Verdict:
-    return Verdict(
-        statement=statement, source=source, stated=stated, computed=float(computed), unit=unit, why=why, **bounds
-    )
-
-
-def unjudged(statement: str, source: Source, why: str) -> Verdict:
-    """Record a statement that cannot be judged, with the reason."""
-    return Verdict(statement=statement, source=source, why=why)
+from .rows import OURS as OURS
+from .rows import Verdict as Verdict
+from .rows import at_least as at_least
+from .rows import at_most as at_most
+from .rows import near as near
+from .rows import unjudged as unjudged
+from .statements import LISTING as LISTING
+from .statements import TEXT as TEXT
+from .statements import Statement
+from .statements import listing as listing
+from .statements import text as text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyResult:
-    """Result of a study: what is claimed, the data of the plot, and the verdicts.
+    """Result of a study: what is claimed, the data of the plot, and the statements with their verdicts.
 
     Attributes
     ----------
@@ -154,15 +38,19 @@ class StudyResult:
     assignment : str
         Our choices in the figure, because the caption is lost; empty if there are none.
     columns : mapping
-        Data of the plot by name with unit; all of one length, padded with NaN.
-    verdicts : tuple of Verdict
+        Data of the plot by name with unit; all of one length, padded with NaN. Empty where there is no plot.
+    statements : tuple of Statement
+    see : str
+        Number of the figure whose statements are about this one too; empty if there are none.
     """
 
     number: str
     claim: str
     assignment: str = ""
-    columns: Mapping[str, NDArray[np.float64]]
-    verdicts: tuple[Verdict, ...]
+    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    statements: tuple[Statement, ...] = ()
+    see: str = ""
+    verdicts: tuple[Verdict, ...] = ()
 
     @property
     def title(self) -> str:
@@ -177,16 +65,21 @@ class StudyResult:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Figure of a thesis: functions that compute, draw and, for some, animate it."""
+    """Figure of a thesis, or statements without one: functions that compute, draw and, for some, animate it."""
 
     number: str
     compute: Callable[[], StudyResult]
-    draw: Callable[[StudyResult], Figure]
+    draw: Callable[[StudyResult], Figure] | None = None
     animate: Callable[[StudyResult, Path], Path] | None = None
 
     def make(self, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
-        """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths."""
+        """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths.
+
+        A study without a plot writes nothing.
+        """
         result = self.compute()
+        if self.draw is None:
+            return result, ()
         stem = Path(out) / file_stem(self.number)
         paths = [
             save_figure(self.draw(result), stem.with_suffix(".png")),

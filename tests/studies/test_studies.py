@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 from analysis import studies
-from analysis.studies.study import OURS, at_least, at_most, near, text, unjudged
+from analysis.studies.page import block
+from analysis.studies.statements import FAILS, HOLDS, IN_PART, UNJUDGED, Case, Statement, at_least, at_most, near, text
 from linkwork.errors import InputError
 
 from .results import check
@@ -55,14 +56,54 @@ def test_the_linkage_is_animated(tmp_path: Path) -> None:
         assert image.n_frames == 72
 
 
-def test_a_verdict_says_what_it_found() -> None:
-    worse = near("length", text("L12"), 2.0, 2.5, 0.1, "m")
-    assert str(worse) == "length: 2 m (the thesis, line 12), computed 2.5 m: DOES NOT HOLD"
-    assert str(at_least("length", OURS, 2.0, 2.5)) == "length: at least 2 (our own check), computed 2.5: holds"
-    assert (
-        str(unjudged("length", text("L12"), "no scale")) == "length (the thesis, line 12): cannot be judged: no scale"
+class TestStatements:
+    PLACE = text("3.2, L12")
+    SHORT, LONG = near("short", "2.0", 2.04, unit="m"), near("long", "2.0", 2.06, unit="m", why="it sags")
+
+    def test_a_printed_number_is_judged_to_half_a_unit_of_its_last_digit(self) -> None:
+        assert (self.SHORT.lower, self.SHORT.upper) == pytest.approx((1.95, 2.05))
+        assert self.SHORT.holds
+        assert not self.LONG.holds
+        assert near("", "1e4", 1.6e4).lower == 0.5e4
+        assert (self.SHORT.stated, near("", 2.0, 2.04, 0.1).stated) == ("2.0", "")
+
+    @pytest.mark.parametrize(
+        ("cases", "outcome"),
+        [
+            ((SHORT,), HOLDS),
+            ((SHORT, LONG), IN_PART),
+            ((LONG,), FAILS),
+            ((), UNJUDGED),
+            ((Case(label="lost", computed=None, why="no scale"), SHORT), IN_PART),
+        ],
     )
-    assert not at_most("length", OURS, 2.0, 2.5).holds
+    def test_one_verdict_for_all_cases(self, cases: tuple[Case, ...], outcome: str) -> None:
+        assert Statement("It is 2.0 m long.", self.PLACE, cases=cases).outcome == outcome
+
+    def test_the_terminal_says_statement_verdict_and_cases(self) -> None:
+        both = Statement("It is 2.0 m long.", self.PLACE, "length", "half a unit", (self.SHORT, self.LONG))
+        assert str(both).splitlines() == [
+            '"It is 2.0 m long." (the thesis, 3.2, line 12)',
+            "  HOLDS IN PART: 1 of 2 cases; it sags",
+            "    short: holds; stated 2.0 m; allowed 1.95 to 2.05; computed 2.04 m",
+            "    long: does not hold; stated 2.0 m; allowed 1.95 to 2.05; computed 2.06 m",
+        ]
+        lost = Statement("It is long.", self.PLACE, why="no scale")
+        assert str(lost).splitlines()[1] == "  CANNOT BE JUDGED: no scale"
+
+    def test_bounds(self) -> None:
+        assert at_least("", 1.0, 1.0).allowed == "at least 1"
+        assert not at_most("", "2.0", 2.5).holds
+
+    def test_bars_do_not_break_the_page(self) -> None:
+        """A single case stands in the line of the verdict, several in a table."""
+        one = Statement("|x| is 2.", self.PLACE, "|x|", "", (at_most("", "2", 3.0, why="|x| grows"),))
+        assert list(block(one))[-2:] == [
+            "**Does not hold**: stated 2; allowed at most 2; computed 3; |x| grows.",
+            "",
+        ]
+        two = Statement("|x| is 2.", self.PLACE, "|x|", "", (self.SHORT, near("|x|", "1", 1.0)))
+        assert list(block(two))[-2] == r"| \|x\| | 1 | 0.5 to 1.5 | 1 | holds |"
 
 
 @pytest.mark.slow

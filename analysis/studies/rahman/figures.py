@@ -36,7 +36,10 @@ from ...slider_crank import (
     ranges,
 )
 from ...units import INCH
-from ..study import OURS, Study, StudyResult, Verdict, at_least, at_most, near, padded, text
+from .. import rows
+from ..rules import ABOUT
+from ..statements import Statement, at_least, at_most
+from ..study import OURS, Study, StudyResult, Verdict, near, padded, text
 from .table import (
     AXIAL_LB,
     COMPONENTS,
@@ -49,8 +52,6 @@ from .table import (
     SPIKES,
     SPIKES_DEG,
     SPOTS,
-    STROKES_BY_TWIST_IN,
-    STROKES_IN,
     Case,
     Component,
 )
@@ -158,38 +159,51 @@ def difference_from_dual(case: Case, component: Component) -> float:
     return float(np.abs(values(case, component)[clear(case)] - other).max()) / scale
 
 
-def _motion(family: str) -> list[Verdict]:
-    """Judge stroke, shape and dead centres of the slider's motion, and its power."""
-    cases, place = FAMILIES[family].cases, "section 3.3, L1125"
-    verdicts = []
-    for case in cases:
+def _motion() -> tuple[Statement, ...]:
+    """Judge shape and stroke of the slider's motion, and its power."""
+    offsets, shapes = FAMILIES["offset"].cases, []
+    for case in FAMILIES["all"].cases:
         first = 2.0 * np.fft.rfft(position(case)[:-1])[1] / (ANGLES_DEG.size - 1)
         sine = (first * np.exp(1j * np.radians(ANGLES_DEG))).real
         away = np.abs(position(case) - np.mean(position(case)[:-1]) - sine).max() / (0.5 * _stroke(case))
-        statement = f"greatest departure of the displacement from a sine, relative to half the stroke; {case.name}"
-        verdicts.append(at_most(statement, text(place), ALMOST, away))
-        if case.twist_deg == IDEAL.twist_deg:
-            longer, name = _stroke(case) / _stroke(IDEAL), f"stroke relative to the ideal one's; {case.name}"
-            verdicts.append(at_most(name, text(place), 1.0, longer, why="a4 lengthens it"))
-    if family == "offset":
-        power = [float(np.mean(_torque(case)[:-1]) * CRANK_SPEED) for case in (IDEAL, *cases)]
-        saved, name = power[0] - min(power[1:]), "mean power that an offset saves at the same RPM without a load"
-        why = "a motion without friction takes none"
-        verdicts.append(at_least(name, text(place), NOTHING, saved, "lb.in/s", why=why))
-        for a4, stroke in STROKES_IN.items():
-            planar = Case("", a4, 0.0, 270.0)
-            verdicts.append(near(f"stroke; a4 = {a4:g} in with S1 = 0", OURS, stroke, _stroke(planar), 5e-4, "in"))
-        for a4, stated in DEAD_CENTRES_DEG.items():
-            found = dead_centres_deg(Case("", a4, 0.0, 270.0))
-            verdicts += [
-                near(f"{which} dead centre; a4 = {a4:g} in with S1 = 0", OURS, angle, at, 0.005, "deg")
-                for which, angle, at in zip(("first", "second"), stated, found)
-            ]
-    return verdicts + [
-        near(f"stroke; {case.name}", OURS, STROKES_BY_TWIST_IN[case.twist_deg], _stroke(case), 0.005, "in")
-        for case in cases
-        if case.twist_deg in STROKES_BY_TWIST_IN
-    ]
+        shapes.append(at_most(_name(case), ABOUT, away))
+    strokes = [at_most(case.name, 1.0, _stroke(case) / _stroke(IDEAL)) for case in offsets]
+    loads = (("no load on the slider", _torque), ("a torque of 100 lb.in", lambda case: turn(case).torque / POUND_INCH))
+    power = {
+        words: [float(np.mean(torque(c)[:-1]) * CRANK_SPEED) for c in (IDEAL, *offsets)] for words, torque in loads
+    }
+    saved = [at_least(words, NOTHING, first - min(rest), "lb.in/s") for words, (first, *rest) in power.items()]
+    return (
+        Statement(
+            "Slider displacement curves are almost semi-sinusoidal type of graphs which seem to be quite reasonable.",
+            text("section 3.3, L1125"),
+            "greatest distance of S4 from its mean and first harmonic, relative to half the stroke, in Figs R5 to R7",
+            f"{ABOUT:g}, the rule for *almost*",
+            tuple(shapes),
+        ),
+        Statement(
+            "When crank is placed at higher level than the plane on which slider is moving by providing positive offset "
+            "distance [a4], the stroke of the engine is reduced.",
+            text("section 3.3, L1125"),
+            "stroke relative to the ideal one's",
+            "none, the sign decides",
+            tuple(strokes),
+            "the offset lengthens the stroke",
+        ),
+        Statement(
+            "So in that case, while consuming less power the same RPM of the engine can be obtained.",
+            text("section 3.3, L1125"),
+            "mean power at 50 rpm of the ideal case less the least of a4 = 10, 20, 30 in",
+            "more than 1e-6 lb.in/s, the rounding",
+            tuple(saved),
+            "a motion without friction takes no power, and a given torque at a given speed takes the same at any offset",
+        ),
+    )
+
+
+def _name(case: Case) -> str:
+    """Return what distinguishes a case among those of all families."""
+    return f"{case.name}, S1 = {case.shift_in:g} in" if case.name.startswith("a4") else case.name
 
 
 def _stroke(case: Case) -> float:
@@ -217,17 +231,21 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
     if any(spikes.size for spikes in found):
         distance = max(float(np.abs(spikes - SPIKES_DEG).max()) for spikes in found)
         name = f"distance of the spikes of {symbol} from 100 and 300 deg"
-        verdicts.append(at_most(name, text("sections 3.2, 3.3, L1115, L1125"), SPIKES_TO, distance, "deg"))
+        verdicts.append(rows.at_most(name, text("sections 3.2, 3.3, L1115, L1125"), SPIKES_TO, distance, "deg"))
         distance = max(float(np.abs(spikes - dead_centres_deg(case)).max()) for case, spikes in zip(cases, found))
-        verdicts.append(at_most(f"distance of the spikes of {symbol} from dead centres", OURS, 0.005, distance, "deg"))
+        verdicts.append(
+            rows.at_most(f"distance of the spikes of {symbol} from dead centres", OURS, 0.005, distance, "deg")
+        )
     if family == "offset":
         name = f"greatest magnitude of {symbol}, least gain from one a4 to the next"
         gain, with_load = (_offsets_gain(component, given) for given in ("torque", "load"))
         why = "nearer to a dead centre than the others" if gain < 0.0 else ""
-        verdicts.append(at_least(name, text("section 3.3, L1125"), 0.0, gain, component.unit, why=why))
+        verdicts.append(rows.at_least(name, text("section 3.3, L1125"), 0.0, gain, component.unit, why=why))
         # along the guide nothing acts without a load
         if component.source != "slider_force":
-            verdicts.append(at_least(f"{name}, with the slider's load given", OURS, 0.0, with_load, component.unit))
+            verdicts.append(
+                rows.at_least(f"{name}, with the slider's load given", OURS, 0.0, with_load, component.unit)
+            )
     if "T" in symbol:
         verdicts += _bearing_moment(component, cases)
     if component.source == "slider_force":
@@ -235,7 +253,7 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
     difference = max(difference_from_dual(case, component) for case in (IDEAL, *cases))
     scale = "T" if component.unit == "lb.in" else "T/a1"
     name = f"difference of {symbol} from that by dual vectors, relative to {scale}"
-    return [*verdicts, at_most(name, OURS, SAME, difference)]
+    return [*verdicts, rows.at_most(name, OURS, SAME, difference)]
 
 
 def _offsets_gain(component: Component, given: str) -> float:
@@ -267,7 +285,7 @@ def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict
         verdicts.append(near(name, OURS, 0.0, full, NOTHING, "lb.in"))
     least = min(greatest(case, values(case, component)) for case in cases)
     name = f"greatest magnitude of {symbol}, which S1 brings about, least of the cases"
-    return [*verdicts, at_least(name, text("section 3.3, L1125-1127"), NOTHING, least, "lb.in")]
+    return [*verdicts, rows.at_least(name, text("section 3.3, L1125-1127"), NOTHING, least, "lb.in")]
 
 
 def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
@@ -315,7 +333,7 @@ def _constant() -> list[Verdict]:
                 verdicts.append(none(f"{symbol}, where S1 = 0", case, size, "lb.in", "section 3.2, L1119", why))
     balance = max(greatest(case, a + b) for case, a, b in zip(cases, about["1F1k"], about["2F2k"]))
     verdicts.append(
-        at_most("greatest magnitude of 1F1k + 2F2k, the shift at rest, in all cases", OURS, SAME, balance, "lb")
+        rows.at_most("greatest magnitude of 1F1k + 2F2k, the shift at rest, in all cases", OURS, SAME, balance, "lb")
     )
     for which, pick in (("least", np.nanmin), ("greatest", np.nanmax)):
         pin, torque = (pick([pick(found) for found in about[name]]) for name in ("2F2j", "1T1k"))
@@ -347,7 +365,7 @@ def compute(number: str) -> StudyResult:
     for component in components:
         columns |= {_curve_name(component.symbol, case, component.unit): values(case, component) for case in cases}
     columns |= {_dead_centre_name(case): dead_centres_deg(case) for case in cases}
-    verdicts = _motion(family) if not components else _constant() if number == CONSTANT else []
+    verdicts = _constant() if number == CONSTANT else []
     for component in components:
         verdicts += _force_verdicts(family, component)
     shown = ", ".join(symbols) or "displacement S4"
@@ -357,7 +375,13 @@ def compute(number: str) -> StudyResult:
         claim = f"The {shown} over a turn of the crank for variable {family}, beside the ideal case."
     assignment = "" if number == CONSTANT else INFERRED
     return StudyResult(
-        number=number, claim=claim, assignment=assignment, columns=padded(columns), verdicts=tuple(verdicts)
+        number=number,
+        claim=claim,
+        assignment=assignment,
+        columns=padded(columns),
+        statements=_motion() if number == "R5" else (),
+        see="R5" if number in ("R6", "R7") else "",
+        verdicts=tuple(verdicts),
     )
 
 
