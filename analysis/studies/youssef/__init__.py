@@ -10,7 +10,7 @@ from ..contents import Entry
 #: Figures in the order of the thesis, and our own studies: number or name, module (empty where there is nothing to compute),
 #: place in the thesis, title.
 _ROWS = (
-    ("3.1", "", "3.2.1, L1804", "The linkage with its loads"),
+    ("3.1", "formulation", "II, 3.1, L554-1804", "The linkage with its loads: equations and integration"),
     (
         "3.2",
         "chapter_3",
