@@ -30,7 +30,7 @@ def test_there_is_a_study_of_every_figure() -> None:
     asked = [
         f"{chapter}.{n}" for chapter, numbers in chapters.items() for n in numbers if f"{chapter}.{n}" not in drawings
     ]
-    ours = ["quality", "control", "rig-1-resonance", "rig-1-friction", "rig-2-forces", "linkage"]
+    ours = ["quality", "control", "rig-1-resonance", "rig-1-friction", "rig-2-forces", "conclusions", "linkage"]
     assert list(studies.YOUSSEF) == [*asked, *ours]
     words = [f"rahman-{word}" for word in ("constant", "closure", "rates", "forces")]
     assert list(studies.RAHMAN) == [f"R{n}" for n in range(5, 39)] + words

@@ -94,6 +94,7 @@ _ROWS = (
     ("rig-1-resonance", "chapter_8", "", "Rig 1 about resonance: amplitude over the speed, springs A and B"),
     ("rig-1-friction", "chapter_8", "", "What friction explains of the amplitudes; rig 1, springs A and B"),
     ("rig-2-forces", "chapter_8", "", "Crank torque and pin forces over the speed; rig 2"),
+    ("conclusions", "conclusions", "8.0, 9.1", "Conclusions of the thesis"),
     ("linkage", "linkage", "", "The five-bar slider of Table 3.1 at 420 rpm"),
 )
 

@@ -630,8 +630,8 @@ def _fig_8_18() -> tuple[Statement, ...]:
             text(f"{section}, L6820; again L6970"),
             "force on a damped mass-spring system of the mean effective mass that gives the first harmonic, divided "
             "by the square of the speed: its spread from 300 to 1000 rpm relative to its mean",
-            f"{ALIKE:g}, the rule for *the same*",
-            tuple(at_most(f"spring {s}", ALIKE, value) for s, value in zip("CD", spread)),
+            f"{ABOUT:g}, the rule for *almost*, for *similar* too",
+            tuple(at_most(f"spring {s}", ABOUT, value) for s, value in zip("CD", spread)),
             f"F0 is not constant: as of a rotating unbalance it grows with the square of the speed, {min(growth):.0f} "
             "times over this range",
         ),

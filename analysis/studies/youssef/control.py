@@ -28,8 +28,9 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, text
 from ..study import Study, StudyResult, padded
+from .chapter_7 import slider
 from .problems import PROBLEMS
-from .series_2 import PATH, ROCKER, error_of, path_motion, rocker_motion, slider
+from .series_2 import PATH, ROCKER, error_of, path_motion, rocker_motion
 
 NUMBER = "control"
 #: Crank speed (rad/s).
@@ -225,20 +226,21 @@ def compute() -> StudyResult:
                         f"{n} harmonics corrected",
                         SMALL,
                         error[-1] / error[0],
-                        why="it falls, but stalls at what the harmonics leave",
+                        why="it falls ever more slowly",
                     )
                     for n, error in errors.items()
                 ),
             ),
             Statement(
-                "[The] simplest and the most widely used is the mechanically coupled arrangement of type (7.1.1).",
+                "Of these and other methods, the simplest and the most widely used is the mechanically coupled "
+                "arrangement of type (7.1.1).",
                 text("7.1.3, L5389"),
                 why="no survey of mechanisms is given",
             ),
             Statement(
-                '[The] direct search method, however, may be used "on-line" and accommodate the dynamic '
+                'The direct search method, however, may be used "on-line" and accommodate the dynamic '
                 "considerations into its structure.",
-                text("7.3.1, L5855"),
+                text("7.3.1, L5853"),
                 why="no example is given; the trial cycles above do the same by harmonics, without a search",
             ),
             Statement(

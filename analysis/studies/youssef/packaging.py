@@ -116,7 +116,8 @@ def compute() -> StudyResult:
                 "straightest travel of the printed linkage within 120 deg of crank rotation that is at least as long "
                 "as AB, 154 cm between the program's points: how far it is off straight, relative to its length; "
                 "height of the crank shaft",
-                f"1 %, our choice: a package that is pushed must not lift, and {off}; below {line:g} cm",
+                "1 %, our choice, and not the rule for what looks *straight* on a graph: packages are pushed along "
+                f"it, and {off}; below {line:g} cm",
                 (
                     at_most(
                         f"off straight, on {CM_PER_METRE * printed.travel:.0f} cm",

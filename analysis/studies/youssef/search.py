@@ -178,7 +178,7 @@ def compute() -> StudyResult:
     reached = {name: float(np.mean(e <= (1.0 + SMALL) * least)) for name, e in errors.items()}
     work = {name: float(np.median([end.evaluations for end in ends])) for name, ends in found.items()}
     medians = {name: float(np.median(e) / np.median(errors[plain])) for name, e in errors.items()}
-    at_bottom = np.mean([end.error <= (1.0 + SMALL) * bottom(end) for end in found[plain]])
+    at_bottom = float(np.mean([end.error <= (1.0 + SMALL) * bottom(end) for end in found[plain]]))
     random = np.random.default_rng(611)
     sets = np.array([drawn(random) for _ in range(SETS)])
     outside = int(np.sum((sets < LOW) | (sets > HIGH)))
