@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,8 +96,10 @@ class TestSearch:
     def test_its_error_is_that_of_the_package(self) -> None:
         p = PROBLEMS[search.PROBLEM]
         for linkage in (p.linkage, best(search.PROBLEM).linkage):
-            expected = p.convert(evaluate(p.task, linkage).error)
-            assert search.error(self.vector(linkage)) == pytest.approx(expected, rel=1e-9)
+            sides = [p.convert(evaluate(p.task, replace(linkage, branch=branch)).error) for branch in (1, -1)]
+            for away, expected in zip(search.residuals(self.vector(linkage)), sides):
+                assert away @ away == pytest.approx(expected, rel=1e-9)
+            assert search.error(self.vector(linkage)) == pytest.approx(min(sides), rel=1e-9)
 
     def test_sets_are_within_their_bounds_and_close(self) -> None:
         sets = search.starting_sets(np.random.default_rng(1), [])

@@ -71,7 +71,12 @@ _ROWS = (
     ("8.1", "", "8.2.1.1, L6118", "Rig 1, a side plate of the guide removed"),
     ("8.2", "", "8.2.1.1, L6124", "Rig 1 from above: coupling to the motor, slider and guide"),
     ("8.3", "", "8.2.1.1, L6126", "Rig 1: exploded views of linkage (a) and guide (b)"),
-    ("8.4", "chapter_8", "8.2.1.2, L6248, L6281", "Circuits of photocell (a) and displacement transducer (b)"),
+    (
+        "8.4",
+        "chapter_8",
+        "8.2.1.2, L6248, L6281",
+        "Circuits of photocell and transducer: the crank speed by its pulses",
+    ),
     ("8.5", "", "8.2.2, L6291", "Rig 2"),
     ("8.6", "chapter_8", "8.3.3, L6393", "Impulse response of the disconnected slider: the logarithmic decrement"),
     ("8.7", "chapter_8", "8.4.1.1, L6441", "Steady motion of the slider; rig 1, spring A, 360 rpm"),

@@ -34,29 +34,29 @@ from ...synthesis import (
     turn,
 )
 from ...units import CM_PER_METRE
-from ..rules import ALIKE
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from .problems import DEG2_PER_RAD2, PROBLEMS, N, ellipse, rocker_function
 
 FINDINGS = """\
 The chapter claims that the downhill simplex, begun at many random sets of lengths and angles, finds the four-bar of least
-error for a curve with or without timing or for a function of the rocker's angle, and it prints eight linkages with their
-errors.
+error for a curve with or without timing or for a function of the rocker's angle. It prints eight linkages, seven of them
+with their errors.
 
 *What stands.* The quality functions are sound: the area by triangles is the area between the curves to a thousandth, the
 crank's phase does not change it, both closures of the links have to be tried, and the test of assembly by its two extremes
 is exact. Weights do what they are said to do. Ellipse and path (b) are harder than (a). The printed linkage for path (b)
-has the stated area once a digit is mended. Beginning with fewer points or fewer parameters helps the search.
+has the stated area once a digit is mended. Searches that include known minima take half the work.
 
-*What does not.* Six of the eight printed linkages do not have the stated error, whatever digit is mended: ellipse (a) has
-5.64 cm2, not 0.889. The printed linkages are no minima either: under the same limits there are linkages with a fiftieth to
-a fifth of the error, but for the two rocker functions, which are within 5 % of the optimum. The search itself, repeated
-from the program, ends before it is at a minimum in most cases, and none of its techniques reached the least error. The
-packaging machine's straight part is 7 cm off straight on 176 cm.
+*What does not.* Six of the seven errors are not those of the printed linkages, whatever digit is mended and however they
+are rounded: the linkage for ellipse (a) has 5.64 cm2, not 0.889. The printed linkages are no minima either: under the same
+limits there are linkages with a fortieth to a fifth of their errors, but for the two rocker functions, which are within 5 %
+of the optimum. The search itself, repeated from the program, never ends at a minimum, none of its techniques reached the
+least error, and to begin with fewer points or parameters is no better than chance. The packaging machine's straight part is
+7 cm off straight on 176 cm.
 
-*Why.* The downhill simplex becomes flat in ten dimensions. The problem without bounds has no solution at all: the longer
-the links, the smaller the error. With exact derivatives nearly every start ends at the same optimum
+*Why.* The downhill simplex becomes flat in ten dimensions. And without bounds the problem has no solution: the longer the
+links, the smaller the error. With exact derivatives nearly every start ends at the same optimum
 (`docs/synthesis-methods.md`).
 """
 
@@ -146,8 +146,8 @@ def as_stated(label: str, stated: str, found: tuple[float, float, float], name: 
 def _ellipse_a() -> tuple[Statement, ...]:
     return (
         Statement(
-            "It may be seen from fig. (6.4) that the [four] bar output compares favourably with the desired output "
-            "and in fact has an error value [E1p] of 0.889 cm2.",
+            "It may be seen from fig. (6.4) that the [four] bar output compares favourably with the desired output and in "
+            "fact has an error value [E1p] of 0.889 cm2.",
             text("6.4.2 A, L4864"),
             "sum of the squared distances of the printed linkage at 72 crank angles",
             ROUNDED,
@@ -159,11 +159,11 @@ def _ellipse_a() -> tuple[Statement, ...]:
 def _ellipse_b() -> tuple[Statement, ...]:
     return (
         Statement(
-            "However, as may be seen from fig. (6.5), the four bar is not able to produce output (b) to the same "
-            "tolerances and has an error [E1p] of 4.001 cm2.",
+            "However, as may be seen from fig. (6.5), the four bar is not able to produce output (b) to the same tolerances "
+            "and has an error [E1p] of 4.001 cm2.",
             text("6.4.2 A, L4870"),
-            "sum of the squared distances of the printed linkage at 72 crank angles; least error that we find, with "
-            "no link longer than the longest printed one, over that of ellipse (a)",
+            "sum of the squared distances of the printed linkage at 72 crank angles; least error that we find, with no link "
+            "longer than the longest printed one, over that of ellipse (a)",
             f"{ROUNDED}; above 1",
             (
                 as_stated("error", "4.001", rounded("ellipse-b", 0.005, 0.005), "ellipse-b"),
@@ -181,8 +181,8 @@ def _bounded() -> tuple[Statement, ...]:
     wrong = "the curve lies beside the ellipse"
     return (
         Statement(
-            "Let us illustrate this by requiring that output (a) be generated from a four bar linkage with the "
-            "following constraints [10 < l1, l3, l4 < 30, 10 > l2].",
+            "Let us illustrate this by requiring that output (a) be generated from a four bar linkage with the following "
+            "constraints [10 < l1, l3, l4 < 30, 10 > l2].",
             text("6.4.2 A, L4909"),
             "lengths of the printed linkage that are out of these bounds",
             "none of a count",
@@ -192,8 +192,8 @@ def _bounded() -> tuple[Statement, ...]:
             "The resulting minimum error is now 53.6 cm2 which when compared with the error resulting from the "
             "unconstrained case gives an increase of 52.7 cm2.",
             text("6.4.2 A, L4931"),
-            "sum of the squared distances of the printed linkage, as printed and with a1 = -93.8 deg; increase over "
-            "that of Fig 6.4",
+            "sum of the squared distances of the printed linkage, as printed and with a1 = -93.8 deg; increase over that of "
+            "Fig 6.4",
             f"{ROUNDED}; {HALF}",
             (
                 near("as printed", "53.6", p.convert(evaluate(p.task, p.printed).error), unit="cm2", why=wrong),
@@ -214,11 +214,11 @@ def _rocker() -> tuple[Statement, ...]:
         cases.append(as_stated(f"{kind}; {nearest} crank angles", stated, found[nearest], name))
     return (
         Statement(
-            "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the "
-            "unweighted and weighted outputs are 700.0 and 35.0 degree2 respectively.",
+            "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "
+            "and weighted outputs are 700.0 and 35.0 degree2 respectively.",
             text("6.4.2 B, L4965"),
-            "error of the printed linkages; the number of crank angles is not stated: of those in steps of whole or "
-            "half degrees, the one that brings it nearest",
+            "error of the printed linkages; the number of crank angles is not stated: of those in steps of whole or half "
+            "degrees, the one that brings it nearest",
             ROUNDED,
             tuple(cases),
         ),
@@ -242,11 +242,11 @@ def _weighted() -> tuple[Statement, ...]:
     free, _ = window_sums(mounted().linkage, mounting=True)
     return (
         Statement(
-            "It is clearly seen from the figures that by weighting a portion of the output it is generated closely "
-            "but at the expense of the remaining portions of the output.",
-            text("6.4.2 B, L4973"),
-            "squared errors of the weighted printed linkage over those of the unweighted one, within the window and "
-            f"out of it, at {N} crank angles",
+            "It is clearly seen from the figures that by weighting a portion of the output it is generated closely but at "
+            "the expense of the remaining portions of the output.",
+            text("6.4.2 B, L4973; also 6.2.2, L4245"),
+            "squared errors of the weighted printed linkage over those of the unweighted one, within the window and out of "
+            f"it, at {N} crank angles",
             "below 1; above 1",
             (
                 at_most("within the window", 1.0, inside / even_inside),
@@ -256,12 +256,11 @@ def _weighted() -> tuple[Statement, ...]:
             f"{inside:.1f} to {free:.1f} deg2",
         ),
         Statement(
-            "This procedure of weighting factors may be used when outputs in the form of straight lines are required "
-            "by giving the straight line portion of the output a weighting of unity and the remainder a weighting of "
-            "zero.",
+            "This procedure of weighting factors may be used when outputs in the form of straight lines are required by "
+            "giving the straight line portion of the output a weighting of unity and the remainder a weighting of zero.",
             text("6.4.2 B, L4981"),
-            "rms distance of the best linkage from 13 points of a line of 100 mm, passed within 60 deg of crank "
-            "rotation, all others weighted zero",
+            "rms distance of the best linkage from 13 points of a line of 100 mm, passed within 60 deg of crank rotation, "
+            "all others weighted zero",
             "1 mm, 1 % of its length as in Fig 6.11",
             (at_most("distance", 1.0, straight_error(), "mm"),),
         ),
@@ -272,8 +271,8 @@ def _paths() -> tuple[Statement, ...]:
     why = "the printed linkage has another area, as the point P of X0 = 154.85 cm is misplaced by a digit"
     return (
         Statement(
-            "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable "
-            "errors but as shown in fig. (6.10) it is unable to generate the desired output (b) as accurately.",
+            "As shown in fig. (6.9) the four bar is able to generate the desired output (a) to within tolerable errors but "
+            "as shown in fig. (6.10) it is unable to generate the desired output (b) as accurately.",
             text("6.4.3, L5043"),
             "area of (b) over that of (a): of the printed linkages, and the least that we find with no longer link",
             "above 1",
@@ -283,11 +282,10 @@ def _paths() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "The error values involved in the output generation of outputs (a) and (b) are 2.3 and 12.6 [cm2] "
-            "respectively.",
+            "The error values involved in the output generation of outputs (a) and (b) are 2.3 and 12.6 [cm2] respectively.",
             text("6.4.3, L5051"),
-            "area between the curves, of the printed linkages with X0 = 15.485 cm for 154.85 in (a) and l4 = 184.443 "
-            "cm for 183.443 in (b)",
+            "area between the curves, of the printed linkages with X0 = 15.485 cm for 154.85 in (a) and l4 = 184.443 cm for "
+            "183.443 in (b)",
             f"0.05 cm2, {HALF}",
             (
                 near("(a)", "2.3", printed_error("path-a"), unit="cm2", why=why),

@@ -39,11 +39,11 @@ as 0.31 and the guide's angle is taken from the horizontal. Cams of a few centim
 without feedback fails on a machine that is not quite as modelled, and feedback holds the motion to a quarter of a per cent
 of the stroke.
 
-*What does not.* The envelope has a hole wherever all curves of the family go round the same place, if the limits of U are
-wide. If the coupler cannot point at the desired point the rocker need not stand upright: for half of all places it hangs.
-The printed series for the rocker function gives the stated 4.8 deg2 in no reading: 47 deg2 at best. Neither printed series
-is an optimum. A mechanism that corrects itself in trial cycles does not converge: the deviation falls to an eighth or a
-quarter, and ever more slowly.
+*What does not.* The envelope has a hole where all curves of the family go round the same place: P reaches 24 to 85 % of
+what it encloses, by the limits of U. If the coupler cannot point at the desired point the rocker need not stand upright:
+for half of all places it hangs. The printed series for the rocker function gives the stated 4.8 deg2 in no reading: 47 deg2
+at best. Neither printed series is an optimum. A mechanism that corrects itself in trial cycles does not converge: the
+deviation falls to an eighth or a quarter, and ever more slowly.
 
 *What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. With a curve of ours all that the
 thesis says of it is so, and the numbers are given, but none of it is counted as holding. Methods that are only named, as
@@ -197,26 +197,24 @@ def family() -> StudyResult:
     kept, changed, least = between_precision_points()
     return StudyResult(
         number="7.2",
-        claim="With the slider free P reaches any point on or within the outer boundaries of the family of coupler "
-        "curves.",
+        claim="With the slider free P reaches any point on or within the outer boundaries of the family of coupler curves.",
         assignment="The values of U are lost: 0.6 to 1.4 are our choice; the crank turns fully from 0.5 to 1.5.",
         columns=padded(columns),
         statements=(
             Statement(
-                "If, however, a second input is established to which a controller is attached the output may be "
-                "modified, anywhere in an infinite variety, yet still prescribing the same originally desired "
-                "precision points.",
+                "If, however, a second input is established to which a controller is attached the output may be modified, "
+                "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 text("7.0, L5203"),
                 f"distance of P from the path at U = 1 with u = a sin^2({PRECISION} th2 / 2), a = "
-                f"{', '.join(f'{a:g}' for a in BETWEEN)} l3: the most at the {PRECISION} crank angles where u = 0; "
-                "the most in each part between them, the least of the parts",
+                f"{', '.join(f'{a:g}' for a in BETWEEN)} l3: the most at the {PRECISION} crank angles where u = 0; the most "
+                "in each part between them, the least of the parts",
                 f"1e-12 l3, the rounding; more than {READ:g} l3, what a graph can be read to",
                 (
                     at_most("at the precision points", 1e-12, kept, "l3"),
                     at_least("between the precision points", READ, changed, "l3"),
                 ),
-                "each amplitude gives another path, but P moves along the isochronous curve only; in one part one of "
-                f"the amplitudes moves it by {least:.3f} l3",
+                "each amplitude gives another path, but P moves along the isochronous curve only; in one part one of the "
+                f"amplitudes moves it by {least:.3f} l3",
             ),
             Statement(
                 "First, any point lying on or within the outer boundaries of the family is accessible to the chosen "
@@ -230,8 +228,8 @@ def family() -> StudyResult:
                         1.0,
                         area.area / enclosed(low, high),
                         0.01,
-                        why="what all curves of the family go round is out of reach; it is smaller with wider limits, "
-                        "but the crank turns fully for U from 0.5 to 1.5 only",
+                        why="what all curves of the family go round is out of reach; it is smaller with wider limits, but "
+                        "the crank turns fully for U from 0.5 to 1.5 only",
                     )
                     for (low, high), area in areas.items()
                 ),
@@ -293,8 +291,8 @@ def curve_wanted() -> StudyResult:
         number="7.4",
         claim="The desired curve is given by numbers, depends on time, and lies within the family of Fig 7.2.",
         assignment=(
-            "The curve is lost. Ours: where P is at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad ahead, at "
-            "72 crank angles; p1 p2 from 150 to 210 deg."
+            "The curve is lost. Ours: where P is at U = 0.8 + 0.4 |sin th2| with the crank 0.05 sin th2 rad ahead, at 72 "
+            "crank angles; p1 p2 from 150 to 210 deg."
         ),
         columns=padded(columns),
         statements=(
@@ -348,27 +346,26 @@ def two_positions() -> StudyResult:
     standing = np.sin(anywhere.rocker_angle[anywhere.kind == "perpendicular"]) > 0.999
     return StudyResult(
         number="7.5",
-        claim="The coupler points at the desired point, the rocker in either of two positions; else the rocker is "
-        "upright.",
-        assignment=f"{SERIES_1} The crank stands at {degrees(ROTATION[k]):.0f} deg. The statements are judged with "
-        "random points.",
+        claim="The coupler points at the desired point, the rocker in either of two positions; else the rocker is upright.",
+        assignment=f"{SERIES_1} The crank stands at {degrees(ROTATION[k]):.0f} deg. The statements are judged with random "
+        "points.",
         columns=padded(columns),
         statements=(
             Statement(
-                "This corresponds to the relation that for minimum error the coupler takes the position of a straight "
-                "line with the point p(x*, y*).",
+                "This corresponds to the relation that for minimum error the coupler takes the position of a straight line "
+                "with the point p(x*, y*).",
                 text("7.3.1, L5628"),
-                f"error with the coupler pointing at the point less the least of {POSITIONS.size} slider positions "
-                f"and both assemblies, the most of the {least.size} random points where (7.14) has a root",
+                f"error with the coupler pointing at the point less the least of {POSITIONS.size} slider positions and both "
+                f"assemblies, the most of the {least.size} random points where (7.14) has a root",
                 "1e-3 l3, more than P moves from one position to the next",
                 (at_most("greatest difference", 1e-3, float((pointing[~missing] - least).max()), "l3"),),
             ),
             Statement(
-                "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. "
-                "[theta4 = pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
+                "In these circumstances the optimum condition must surely be when the rocker CD is upright, i.e. [theta4 = "
+                "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
                 text("7.3.1, L5685"),
-                f"share of upright rockers at the least error, of the {standing.size} points of {ROTATION.size} "
-                "random ones, no farther from A than l3 along either axis, where (7.14) has no root",
+                f"share of upright rockers at the least error, of the {standing.size} points of {ROTATION.size} random "
+                "ones, no farther from A than l3 along either axis, where (7.14) has no root",
                 "none: *must surely be*",
                 (near("upright", 1.0, standing.mean(), 0.0, why="for the others it hangs, th4 = -90 deg"),),
             ),
@@ -438,11 +435,11 @@ def _unweighted() -> tuple[Statement, ...]:
             why=f"{LOST}; with ours 41 terms have {more:.3f} times the squared error",
         ),
         Statement(
-            "By studying curve (a) of Fig. (7.6) we find it very difficult, if not impossible, to accomplish at high "
-            "speeds while curve (b) of the same figure is a more feasible task.",
+            "By studying curve (a) of Fig. (7.6) we find it very difficult, if not impossible, to accomplish at high speeds "
+            "while curve (b) of the same figure is a more feasible task.",
             text("7.3.1, L5789"),
-            why=f"{LOST}; with ours the greatest second derivative of U is {corners / smooth:.0f} times greater in "
-            "(a), at corners",
+            why=f"{LOST}; with ours the greatest second derivative of U is {corners / smooth:.0f} times greater in (a), at "
+            "corners",
         ),
         Statement(
             "In many cases this entails a far greater effort than would otherwise be needed with a direct search.",
@@ -459,15 +456,15 @@ def _weighted() -> tuple[Statement, ...]:
     relaxed, _ = squared_errors(direct(inside=WEIGHT, outside=0.01, acceleration=1.0))
     return (
         Statement(
-            "It is clearly seen from Fig. (7.10) how a close generation of range [p1p2] is accomplished while larger "
-            "errors are tolerated outside it.",
+            "It is clearly seen from Fig. (7.10) how a close generation of range [p1p2] is accomplished while larger errors "
+            "are tolerated outside it.",
             text("7.3.1, L5834"),
-            why=f"{LOST}; with ours the weight changes the squared error on p1 p2 by a factor of {inside:.2f}, on the "
-            f"rest of {outside:.2f}",
+            why=f"{LOST}; with ours the weight changes the squared error on p1 p2 by a factor of {inside:.2f}, on the rest "
+            f"of {outside:.2f}",
         ),
         Statement(
-            "Another interesting point is that if the requirements outside [p1p2] are very relaxed the controller "
-            "motion U involved there, may be modified further to give a more favourable dynamic condition.",
+            "Another interesting point is that if the requirements outside [p1p2] are very relaxed the controller motion U "
+            "involved there, may be modified further to give a more favourable dynamic condition.",
             text("7.3.1, L5838"),
             why=f"{LOST}; with ours and the second derivative of U at most 1, a weight of 0.01 on the rest brings the "
             f"squared error on p1 p2 to {relaxed / strict:.2f} of that with a weight of 1",
@@ -510,8 +507,7 @@ class Motions(NamedTuple):
 
 TABLE = {
     "7.6": Motions(
-        "The variational motion is the nearest that U can come; eleven terms come near it and can be followed at "
-        "speed.",
+        "The variational motion is the nearest that U can come; eleven terms come near it and can be followed at speed.",
         ("variational", "direct"),
         "U",
         _unweighted,

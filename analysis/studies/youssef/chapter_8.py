@@ -107,16 +107,15 @@ def compute_pulses() -> StudyResult:
     return StudyResult(
         number="8.4",
         claim="The widths of the pulses of a photocell behind sixty holes show whether the speed varies within a turn.",
-        assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant "
-        "torque.",
+        assignment="No moment of inertia of crank and flywheels is printed: two are tried out, driven by a constant torque.",
         columns=padded(columns),
         statements=(
             Statement(
-                "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed "
-                "varies within the crank cycle.",
+                "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "
+                "within the crank cycle.",
                 text("8.2.1.2, L6255"),
-                "range of the crank speed over a turn by the times between holes, relative to the range itself; "
-                f"spring A, {PULSED:g} rpm",
+                "range of the crank speed over a turn by the times between holes, relative to the range itself; spring A, "
+                f"{PULSED:g} rpm",
                 f"{READ:g}, what a graph can be read to",
                 tuple(
                     near(
@@ -131,8 +130,8 @@ def compute_pulses() -> StudyResult:
             Statement(
                 "A further [flywheel] (4) is mounted on the shaft to ensure constant speed input.",
                 text("8.2.1.1, L6142"),
-                why=f"no moment of inertia is printed; {enough:.3f} kg.m2 keep the speed within {ALIKE:.0%} at "
-                f"{PULSED:g} rpm",
+                why=f"no moment of inertia is printed; {enough:.3f} kg.m2 keep the speed within {ALIKE:.0%} at {PULSED:g} "
+                "rpm",
             ),
         ),
     )
@@ -198,22 +197,20 @@ def compute_decay() -> StudyResult:
         added.append(f"{fit_decay(time, rubbed).damping(rig(spring).slider_mass)[0] - stated:.1f}")
     return StudyResult(
         number="8.6",
-        claim="The slider, disconnected and struck, swings out; its logarithmic decrement gives the damping "
-        "coefficient.",
+        claim="The slider, disconnected and struck, swings out; its logarithmic decrement gives the damping coefficient.",
         assignment="The text does not say whose response is shown: both rigs', computed, with springs A and C.",
         columns=columns,
         statements=(
             Statement(
-                "Average values of the coefficient were found to be [9 x 10^3 dyne.Sec/cm.] for Experimental Rig 1 and "
-                "[5.5 x 10^3 dyne.Sec/cm.] for Experimental Rig 2 (linearised rig).",
+                "Average values of the coefficient were found to be [9 x 10^3 dyne.Sec/cm.] for Experimental Rig 1 and [5.5 "
+                "x 10^3 dyne.Sec/cm.] for Experimental Rig 2 (linearised rig).",
                 text("8.3.3, L6401"),
-                why=f"{LOST}; {DRY:g} N of dry friction, if it counts as damping, adds {' and '.join(added)} N.s/m to "
-                "the 9 and 5.5 N.s/m of the two rigs",
+                why=f"{LOST}; {DRY:g} N of dry friction, if it counts as damping, adds {' and '.join(added)} N.s/m to the 9 "
+                "and 5.5 N.s/m of the two rigs",
             ),
             Statement(
-                "Theoretical calculations of the stiffness, based on the number of coils, the wire and mean coil "
-                "diameters and the modulus of rigidity of the material gave good agreement with the experimentally "
-                "determined values.",
+                "Theoretical calculations of the stiffness, based on the number of coils, the wire and mean coil diameters "
+                "and the modulus of rigidity of the material gave good agreement with the experimentally determined values.",
                 text("8.3.2, L6383"),
                 why="no coil, diameter or modulus is printed; by the theory, k = G d^4 / (8 n D^3), 1 % of the wire's "
                 "diameter is 4 % of the stiffness, and 1 % of the coil's 3 %",
@@ -323,14 +320,14 @@ def _periodic() -> tuple[Statement, ...]:
             (at_most("about 360 rpm", 1.0, here),),
         ),
         Statement(
-            "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady "
-            "state motion of the slider is shown against the crank angle.",
+            "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady state "
+            "motion of the slider is shown against the crank angle.",
             text("8.4.1.1, L6439"),
             why=LOST,
         ),
         Statement(
-            "However, for all other speeds, using this spring and also spring B, the motion was always periodic with "
-            "one crank cycle.",
+            "However, for all other speeds, using this spring and also spring B, the motion was always periodic with one "
+            "crank cycle.",
             text("8.4.1.1, L6449"),
             f"largest Floquet multiplier of that motion from {SLOWEST:g} rpm up to the speed at which each spring was "
             "stopped",
@@ -392,8 +389,8 @@ def _fig_8_14() -> tuple[Statement, ...]:
     top = near_fraction("A", 2)[0]
     return (
         Statement(
-            "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and "
-            "with spring B in the region of 1160 RPM.",
+            "Theoretical calculations give the natural frequency with spring A to be in the region of 580 RPM and with "
+            "spring B in the region of 1160 RPM.",
             text("8.4.1.2, L6551"),
             "crank speed at the natural frequency, by the stiffness and the mean effective mass",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
@@ -405,11 +402,11 @@ def _fig_8_14() -> tuple[Statement, ...]:
             f"{ratio:.3f} to 1",
         ),
         Statement(
-            "They also show that a typical oscillation has four peaks indicating that, since the oscillations are "
-            "periodic in the crank cycle, more than one harmonic is present in the solution.",
+            "They also show that a typical oscillation has four peaks indicating that, since the oscillations are periodic "
+            "in the crank cycle, more than one harmonic is present in the solution.",
             text("8.4.1.2, L6579"),
-            "maxima and minima together in a turn at the speeds of Fig 8.8 to 8.10, 8.14 and 8.15 but the last; "
-            "second harmonic over the first, the least of these speeds",
+            "maxima and minima together in a turn at the speeds of Fig 8.8 to 8.10, 8.14 and 8.15 but the last; second "
+            "harmonic over the first, the least of these speeds",
             f"none of a count; more than {NOTICED:g}, what one notices on a graph",
             (
                 *(near(f"peaks at {speed:g} rpm", 4.0, n, 0.0) for speed, n in counted.items()),
@@ -417,9 +414,9 @@ def _fig_8_14() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural "
-            "frequency, where it reaches a maximum after which the amplitude decreases with increase of speed up to "
-            "345 RPM beyond which it increases with increase of speed.",
+            "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural frequency, "
+            "where it reaches a maximum after which the amplitude decreases with increase of speed up to 345 RPM beyond "
+            "which it increases with increase of speed.",
             text("8.4.1.2, L6734"),
             "amplitude over the speed with spring A, from 240 rpm on",
             f"{TENS}; 2.5 rpm, half the step of the other; of rises the sign alone",
@@ -456,13 +453,12 @@ def _fig_8_15() -> tuple[Statement, ...]:
     u = slider(turn("A", 500.0))
     return (
         Statement(
-            "At 240 RPM the slider oscillation has four peaks; however when the speed is 450 RPM the first and last "
-            "peaks coincide and become an inflection point and as the speed is increased further this inflection "
-            "point coincides with the third peak, thus resulting in a sinusoidal type oscillation as shown in the "
-            "case of 500 RPM.",
+            "At 240 RPM the slider oscillation has four peaks; however when the speed is 450 RPM the first and last peaks "
+            "coincide and become an inflection point and as the speed is increased further this inflection point coincides "
+            "with the third peak, thus resulting in a sinusoidal type oscillation as shown in the case of 500 RPM.",
             text("8.4.1.2, L6724"),
-            "peaks of a turn; speed above which there are two instead of four; points of inflection of a turn at 500 "
-            "rpm, of which a sine has two",
+            "peaks of a turn; speed above which there are two instead of four; points of inflection of a turn at 500 rpm, "
+            "of which a sine has two",
             f"none of a count; {TENS}",
             (
                 near("peaks at 240 rpm", 4.0, peaks(turn("A", 240.0)), 0.0),
@@ -498,8 +494,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
             tuple(near(f"{speed:g} rpm", 4.0, n, 0.0) for speed, n in counted.items()),
         ),
         Statement(
-            "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where "
-            "it reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
+            "The amplitude of oscillations increases with speed up to 580 RPM, i.e. half the natural frequency, where it "
+            "reaches a maximum after which the amplitude decreases and then increases with increase of speed.",
             text("8.4.1.2, L6752"),
             "amplitude over the speed with spring B, from 500 rpm on",
             f"{TENS}; of rises and falls the sign alone",
@@ -522,8 +518,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of "
-            "vibrations were observed at [w = wn/3, wn/4], where wn is the natural frequency.",
+            "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of vibrations "
+            "were observed at [w = wn/3, wn/4], where wn is the natural frequency.",
             text("8.4.1.2, L6770"),
             "rise of the amplitude at the maximum there over the next minimum, relative",
             f"{NOTICED:g}, what one notices on a graph",
@@ -531,8 +527,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
                 at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, rise_at(s, n), why=meets[n])
                 for s, n, part in fractions
             ),
-            f"with a coefficient of friction of {rig_1.STRONG:g} in the guide the greatest of these rises is "
-            f"{hidden:.3f}, but that is not slight (rig-1-friction); no figure is for a speed so low",
+            f"with a coefficient of friction of {rig_1.STRONG:g} in the guide the greatest of these rises is {hidden:.3f}, "
+            "but that is not slight (rig-1-friction); no figure is for a speed so low",
         ),
         Statement(
             "This suggested [a slider] solution based on the first and second harmonics, and that the third and higher "
@@ -560,8 +556,8 @@ def _fig_8_17() -> tuple[Statement, ...]:
             (near("spring B over A", 1.0, of_natural[1] / of_natural[0], ALIKE),),
         ),
         Statement(
-            "Although it is not possible to show these peaks coinciding in this case the tendency may be predicted "
-            "from Figs. (8.11) to (8.13) and (8.16) to (8.17).",
+            "Although it is not possible to show these peaks coinciding in this case the tendency may be predicted from "
+            "Figs. (8.11) to (8.13) and (8.16) to (8.17).",
             text("8.4.1.2, L6764"),
             "speed at which first and last peak meet with spring B",
             "above 800 rpm, the greatest speed that was run with it",
@@ -606,8 +602,8 @@ def _fig_8_18() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed "
-            "in this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
+            "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "
+            "this experiment, i.e. a range of 300 to 1000 RPM, and the phase shift varies with speed.",
             text(f"{section}, L6808"),
             "second harmonic over the first, the most over the range; change of the phase of the first over the range",
             f"{almost}; 90 deg, half of what a resonance turns it by",
@@ -617,23 +613,23 @@ def _fig_8_18() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is "
-            "very small in comparison and no evidence of the third and higher harmonics exists.",
+            "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
+            "small in comparison and no evidence of the third and higher harmonics exists.",
             text(f"{section}, L6814; again L6965"),
             "second and third harmonic over the first, the most from 300 to 1000 rpm",
             f"{SMALL:g}, the rule for *small*",
             tuple(at_most(f"spring {s}, harmonic {n}", SMALL, most[s][n - 2], why=why) for s in "CD" for n in (2, 3)),
         ),
         Statement(
-            "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring "
-            "system described by [m u'' + mu u' + k u = F0 Sin (wt + phi)].",
+            "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
+            "described by [m u'' + mu u' + k u = F0 Sin (wt + phi)].",
             text(f"{section}, L6820; again L6970"),
-            "force on a damped mass-spring system of the mean effective mass that gives the first harmonic, divided "
-            "by the square of the speed: its spread from 300 to 1000 rpm relative to its mean",
+            "force on a damped mass-spring system of the mean effective mass that gives the first harmonic, divided by the "
+            "square of the speed: its spread from 300 to 1000 rpm relative to its mean",
             f"{ABOUT:g}, the rule for *almost*, for *similar* too",
             tuple(at_most(f"spring {s}", ABOUT, value) for s, value in zip("CD", spread)),
-            f"F0 is not constant: as of a rotating unbalance it grows with the square of the speed, {min(growth):.0f} "
-            "times over this range",
+            f"F0 is not constant: as of a rotating unbalance it grows with the square of the speed, {min(growth):.0f} times "
+            "over this range",
         ),
     )
 

@@ -160,9 +160,9 @@ def compute() -> StudyResult:
             Statement(
                 "Examples include secondary linkages, cams and latch mechanisms.",
                 text("7.1.1 (a), L5307"),
-                "least radius of curvature of the smallest plate cam for the two harmonics of Fig 7.11 and 7.12; "
-                "weighted error of the rocker function with one harmonic, which a Scotch yoke on the crank shaft "
-                "gives, over that with the pivot fixed",
+                "least radius of curvature of the smallest plate cam for the two harmonics of Fig 7.11 and 7.12; weighted "
+                "error of the rocker function with one harmonic, which a Scotch yoke on the crank shaft gives, over that "
+                "with the pivot fixed",
                 f"{small}; below {1.0 - ALIKE:g}, a fall that is seen",
                 (
                     *(
@@ -174,19 +174,19 @@ def compute() -> StudyResult:
                 ),
             ),
             Statement(
-                "A passive mechanical system embodying elements such as springs or latches whose operation depend on "
-                "the pre-determined load or on inertia or other forces transmitted through the mechanism.",
+                "A passive mechanical system embodying elements such as springs or latches whose operation depend on the "
+                "pre-determined load or on inertia or other forces transmitted through the mechanism.",
                 text("7.1.1 (b), L5311"),
-                why=f"no example is given; with our masses the best spring leaves {sprung / bare:.0%} of the rms "
-                "force of the drive at 120 rpm",
+                why=f"no example is given; with our masses the best spring leaves {sprung / bare:.0%} of the rms force of "
+                "the drive at 120 rpm",
             ),
             Statement(
-                "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary "
-                "input by non mechanical means, e. g. electrical signals: this offers considerable versatility "
-                "although reproduction of a sufficiently accurate cyclic variation may be difficult.",
+                "An independent drive of the appropriate periodic [form] maintained in correct phase with the primary input "
+                "by non mechanical means, e. g. electrical signals: this offers considerable versatility although "
+                "reproduction of a sufficiently accurate cyclic variation may be difficult.",
                 text("7.1.1 (c), L5321"),
-                "rms deviation of the slider from the two harmonics of Fig 7.11, relative to the stroke, with the "
-                "force that the model needs and no feedback, on a machine that differs from the model",
+                "rms deviation of the slider from the two harmonics of Fig 7.11, relative to the stroke, with the force "
+                "that the model needs and no feedback, on a machine that differs from the model",
                 f"more than {ALIKE:g}, what one sees; one example is enough for *may be*",
                 (at_least("no feedback", ALIKE, missed),),
                 f"after {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns the links cannot be joined any more",
@@ -200,23 +200,21 @@ def compute() -> StudyResult:
                 (at_most("feedback", ALIKE, kept),),
             ),
             Statement(
-                "A variant of this arrangement is to take the mechanism manually through its correct path for the "
-                "desired overall output and to record simultaneously and separately the values of the inputs.",
+                "A variant of this arrangement is to take the mechanism manually through its correct path for the desired "
+                "overall output and to record simultaneously and separately the values of the inputs.",
                 text("7.1.2, L5346"),
-                why="no record is given; one without errors would be the motion that the links need, computed in Fig "
-                "7.6",
+                why="no record is given; one without errors would be the motion that the links need, computed in Fig 7.6",
             ),
             Statement(
                 "Whichever the first stage may be, considerable demands will be placed on the drive to achieve the "
                 "appropriate mechanical response, which clearly establishes a limit of the range of application.",
                 text("7.1.2, L5360"),
-                why=f"neither a drive nor a speed is named; ours needs {bare:.1f} N (rms) at 120 rpm and {faster:.1f} "
-                "N at 240 rpm",
+                why=f"neither a drive nor a speed is named; ours needs {bare:.1f} N (rms) at 120 rpm and {faster:.1f} N at "
+                "240 rpm",
             ),
             Statement(
-                "If the adjustments are made automatically on the basis of a defined error criterion, the mechanism "
-                "becomes self adaptive to its reference, and is thus a self-learning device converging to the desired "
-                "output.",
+                "If the adjustments are made automatically on the basis of a defined error criterion, the mechanism becomes "
+                "self adaptive to its reference, and is thus a self-learning device converging to the desired output.",
                 text("7.1.3, L5382"),
                 f"rms deviation of the slider in trial cycle {TRIALS} over that in the first, with the series of the "
                 "deviation taken off the stored motion after each",
@@ -232,8 +230,8 @@ def compute() -> StudyResult:
                 ),
             ),
             Statement(
-                "Of these and other methods, the simplest and the most widely used is the mechanically coupled "
-                "arrangement of type (7.1.1).",
+                "Of these and other methods, the simplest and the most widely used is the mechanically coupled arrangement "
+                "of type (7.1.1).",
                 text("7.1.3, L5389"),
                 why="no survey of mechanisms is given",
             ),
@@ -244,18 +242,18 @@ def compute() -> StudyResult:
                 why="no example is given; the trial cycles above do the same by harmonics, without a search",
             ),
             Statement(
-                "The second input could be a slider as discussed in this chapter or could be another link resulting "
-                "in a five bar loop.",
+                "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
+                "five bar loop.",
                 text("7.4, L6013"),
-                why="no example is given; `linkwork slider-motion` with a `[strategy]` follows the steps: a four-bar, "
-                "a slider, a fifth link",
+                why="no example is given; `linkwork slider-motion` with a `[strategy]` follows the steps: a four-bar, a "
+                "slider, a fifth link",
             ),
             Statement(
                 "The computer program shown in Appendix 5, can cope with the above defined strategy producing optimum "
                 "results in each case.",
                 text("7.4, L6026"),
-                "stated error of the two series that are printed over the least that we find with as many harmonics "
-                "and the same links",
+                "stated error of the two series that are printed over the least that we find with as many harmonics and the "
+                "same links",
                 f"at most {1.0 + SMALL:g}, the rule for *small*",
                 (
                     at_most(

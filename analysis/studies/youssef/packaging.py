@@ -93,31 +93,30 @@ def compute() -> StudyResult:
     return StudyResult(
         number=NUMBER,
         claim=(
-            "A four-bar pushes packages along a straight line within 120 degrees of crank rotation and returns within "
-            "a region: nineteen desired points, 72 actual ones."
+            "A four-bar pushes packages along a straight line within 120 degrees of crank rotation and returns within a "
+            "region: nineteen desired points, 72 actual ones."
         ),
         assignment=(
-            "Region and points are lost. The points are our choice: the ten of the program in appendix 5 (L9021) and "
-            "the middles of all sides but the one of 4 cm. The region drawn is the narrowest that our linkage keeps "
-            "to."
+            "Region and points are lost. The points are our choice: the ten of the program in appendix 5 (L9021) and the "
+            "middles of all sides but the one of 4 cm. The region drawn is the narrowest that our linkage keeps to."
         ),
         columns=padded(columns),
         statements=(
             Statement(
-                "A packaging machine in the form of a four bar is required to generate a path which is acceptable "
-                "anywhere within the region bound by the dashed lines shown in Fig. (6.11a).",
+                "A packaging machine in the form of a four bar is required to generate a path which is acceptable anywhere "
+                "within the region bound by the dashed lines shown in Fig. (6.11a).",
                 text("6.4.3, L5097"),
                 why="the bounds of the region are lost",
             ),
             Statement(
-                "The constraints are (1) the straight line travel AB should be achieved within the first 120° "
-                "rotation of the crank and (2) the crank shaft should be below the line of travel of the package.",
+                "The constraints are (1) the straight line travel AB should be achieved within the first 120° rotation of "
+                "the crank and (2) the crank shaft should be below the line of travel of the package.",
                 text("6.4.3, L5103"),
-                "straightest travel of the printed linkage within 120 deg of crank rotation that is at least as long "
-                "as AB, 154 cm between the program's points: how far it is off straight, relative to its length; "
-                "height of the crank shaft",
-                "1 %, our choice, and not the rule for what looks *straight* on a graph: packages are pushed along "
-                f"it, and {off}; below {line:g} cm",
+                "straightest travel of the printed linkage within 120 deg of crank rotation that is at least as long as AB, "
+                "154 cm between the program's points: how far it is off straight, relative to its length; height of the "
+                "crank shaft",
+                "1 %, our choice, and not the rule for what looks *straight* on a graph: packages are pushed along it, and "
+                f"{off}; below {line:g} cm",
                 (
                     at_most(
                         f"off straight, on {CM_PER_METRE * printed.travel:.0f} cm",
@@ -132,8 +131,8 @@ def compute() -> StudyResult:
                 "Optimisation is then performed to find the optimum linkage from which 72 actual output points are "
                 "calculated.",
                 text("6.4.3, L5113"),
-                "quality function with the nineteen points, printed linkage over ours; area between the curve and the "
-                "ten points of the program, the same",
+                "quality function with the nineteen points, printed linkage over ours; area between the curve and the ten "
+                "points of the program, the same",
                 f"{1.0 + ALIKE:g}, the rule for *the same*",
                 (
                     at_most("nineteen points", 1.0 + ALIKE, areas["printed"] / areas["ours"], why=better),

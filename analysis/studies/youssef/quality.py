@@ -135,8 +135,8 @@ def compute() -> StudyResult:
                 "It does, however, impose the unnecessary condition that the mechanism pass the desired points at the "
                 "specified times.",
                 text("6.2.2, L4207"),
-                "area between curve and ellipse (a) of the linkage that is best in time over that of the linkage that "
-                "is best without",
+                "area between curve and ellipse (a) of the linkage that is best in time over that of the linkage that is "
+                "best without",
                 f"above {1.0 + ALIKE:g}",
                 (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
             ),
@@ -144,15 +144,15 @@ def compute() -> StudyResult:
                 "An approximation to the desired output may, therefore, be obtained by taking both function and path "
                 "generation into consideration.",
                 text("6.2.2, L4243"),
-                "error in time and area of the linkage that is best for their sum, over those of the printed "
-                "linkages, each found for one of them",
+                "error in time and area of the linkage that is best for their sum, over those of the printed linkages, each "
+                "found for one of them",
                 "below 1",
                 (
                     at_most("error in time", 1.0, found.timed / printed_in_time),
                     at_most("area", 1.0, found.area / printed_path),
                 ),
-                f"its error in time is {found.timed / timed.timed:.1f} times, its area {found.area / path.area:.1f} "
-                "times the least possible",
+                f"its error in time is {found.timed / timed.timed:.1f} times, its area {found.area / path.area:.1f} times "
+                "the least possible",
             ),
             Statement(
                 "The minimum occurs when either Coswt = [+-1] whichever yields the least value [...].",
@@ -162,8 +162,8 @@ def compute() -> StudyResult:
                 (near("least elsewhere", 0.0, least_away_from_ends(), 0.0),),
             ),
             Statement(
-                "It is clear that when (a) is used time may be wasted in solving the system equations if the "
-                "constraints are violated at later stages in the crank cycle.",
+                "It is clear that when (a) is used time may be wasted in solving the system equations if the constraints "
+                "are violated at later stages in the crank cycle.",
                 text("6.3.2, L4541"),
                 "share of the four-bars among them that close at first and not at a later of 72 crank angles",
                 "above 0",
@@ -178,8 +178,13 @@ def compute() -> StudyResult:
                 tuple(at_most(name, 1.0 + ALIKE, ratio, why="no minimum") for name, ratio in ratios.items()),
             ),
             Statement(
-                "The compilation time of the program is about 17 seconds and the running time depends on the form of "
-                "the desired output and the quality of the initial guess of linkage parameters.",
+                "It can be made to follow a logical process in the choice of the type of linkage until it finds a satisfactory result.",
+                text("6.5, L5140"),
+                why="no example is given; `linkwork slider-motion` with a `[strategy]` does so",
+            ),
+            Statement(
+                "The compilation time of the program is about 17 seconds and the running time depends on the form of the "
+                "desired output and the quality of the initial guess of linkage parameters.",
                 text("6.5, L5158"),
                 why="it is the time of a machine that is not named",
             ),

@@ -87,13 +87,12 @@ def compute_rig_1() -> StudyResult:
     why = f"{reached['B'][0]:.2f} cm there, {reached['B'][1]:.2f} cm near half the natural frequency"
     return StudyResult(
         number="rig-1-resonance",
-        claim="With spring A there is one motion at each speed; with spring B resonance leans over, and two exist at "
-        "a time.",
+        claim="With spring A there is one motion at each speed; with spring B resonance leans over, and two exist at a time.",
         columns=padded(columns),
         statements=(
             Statement(
-                "Due to practical difficulties, namely the large amplitudes of oscillations near the natural "
-                "frequencies, resonance curves could not be obtained using this apparatus.",
+                "Due to practical difficulties, namely the large amplitudes of oscillations near the natural frequencies, "
+                "resonance curves could not be obtained using this apparatus.",
                 text("8.4.1.2, L6543"),
                 "amplitude near the natural frequency over that at the greatest speed that was run: with spring A the "
                 "greatest of all, with spring B on the upper branch at 1000 rpm",
@@ -101,11 +100,11 @@ def compute_rig_1() -> StudyResult:
                 tuple(at_least(f"spring {s}", 1.0, CM_PER_METRE * greatest[s] / there[s]) for s in "AB"),
             ),
             Statement(
-                "However when the speed was increased to 500 RPM with spring A and 800 RPM with spring B the "
-                "amplitude of slider oscillations was so large that the slider guide could not accommodate it.",
+                "However when the speed was increased to 500 RPM with spring A and 800 RPM with spring B the amplitude of "
+                "slider oscillations was so large that the slider guide could not accommodate it.",
                 text("8.4.1.2, L6555"),
-                "greatest displacement at this speed over that at all lower speeds of the figures, which the guide "
-                "did accommodate",
+                "greatest displacement at this speed over that at all lower speeds of the figures, which the guide did "
+                "accommodate",
                 "at least 1",
                 tuple(at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, a / b, why=why) for s, (a, b) in reached.items()),
             ),
@@ -214,11 +213,11 @@ def compute_friction() -> StudyResult:
         columns=padded(columns),
         statements=(
             Statement(
-                "This may be explained by the fact that the frictional forces opposing the slider motion are "
-                "considered solely viscous in the theory.",
+                "This may be explained by the fact that the frictional forces opposing the slider motion are considered "
+                "solely viscous in the theory.",
                 text("8.4.1.1, L6486"),
-                "what friction in the guide, by a coefficient of its force, takes off the amplitude with spring A at "
-                "390, 420 and 450 rpm, the most, and by how much it shifts the motion",
+                "what friction in the guide, by a coefficient of its force, takes off the amplitude with spring A at 390, "
+                "420 and 450 rpm, the most, and by how much it shifts the motion",
                 f"{ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*; {ABOUT_DEG:g} deg, the rule for *almost*",
                 (
                     near("taken off", 0.5 * (ALIKE + SLIGHTLY), taken["A", SLIGHT].max(), 0.5 * (SLIGHTLY - ALIKE)),
@@ -227,8 +226,8 @@ def compute_friction() -> StudyResult:
                 strong,
             ),
             Statement(
-                "However in practice these frictional forces are a combination of viscous and Coloumb friction "
-                "forces, although in this experiment the viscous forces are dominant.",
+                "However in practice these frictional forces are a combination of viscous and Coloumb friction forces, "
+                "although in this experiment the viscous forces are dominant.",
                 text("8.4.1.1, L6490"),
                 f"work of Coulomb's friction over the damper's in a turn, spring A, {SHOWN['A']:g} rpm",
                 "at most 1",
@@ -236,14 +235,13 @@ def compute_friction() -> StudyResult:
                 f"with a coefficient of {STRONG:g} it would be {lost_to_friction(SHOWN['A'], STRONG):.2g}",
             ),
             Statement(
-                "Because a Coloumb friction force varies with the normal force and since in this experiment this "
-                "normal force, which is the vertical force in the rocker-slider joint, varies with crank speed and "
-                "also within a crank cycle, this explains the difference in amplitude between the theoretical and "
-                "experimental motions with variation of crank speed and also within one crank cycle.",
+                "Because a Coloumb friction force varies with the normal force and since in this experiment this normal "
+                "force, which is the vertical force in the rocker-slider joint, varies with crank speed and also within a "
+                "crank cycle, this explains the difference in amplitude between the theoretical and experimental motions "
+                "with variation of crank speed and also within one crank cycle.",
                 text("8.4.1.1, L6496"),
-                f"force of the guide at {SHOWN['A']:g} rpm, spring A: its greatest value over its mean; the same at "
-                "450 over 390 rpm; its greatest difference from the vertical force in the joint, relative to its "
-                "greatest value",
+                f"force of the guide at {SHOWN['A']:g} rpm, spring A: its greatest value over its mean; the same at 450 "
+                "over 390 rpm; its greatest difference from the vertical force in the joint, relative to its greatest value",
                 f"more than {1.0 + ALIKE:g}, and at most {ALIKE:g}: the rule for *the same*",
                 (
                     at_least("within a cycle", 1.0 + ALIKE, force[420.0].max() / force[420.0].mean()),
@@ -252,19 +250,19 @@ def compute_friction() -> StudyResult:
                 ),
             ),
             Statement(
-                "Other factors contributing to the difference are (a) only an average estimation of the damping "
-                "coefficient is considered in the theory and (b) the friction in the pin joints of the linkage is "
-                "also ignored in the theory.",
+                "Other factors contributing to the difference are (a) only an average estimation of the damping coefficient "
+                "is considered in the theory and (b) the friction in the pin joints of the linkage is also ignored in the "
+                "theory.",
                 text("8.4.1.1, L6508"),
-                why="neither the scatter of the coefficient nor a size of the bearings is given; 10 % more damping "
-                f"takes {damper:.1%} off the amplitude with spring A, a friction radius of {1e3 * PIN_RADIUS:g} mm in "
-                f"the pins {pins:.1%}",
+                why="neither the scatter of the coefficient nor a size of the bearings is given; 10 % more damping takes "
+                f"{damper:.1%} off the amplitude with spring A, a friction radius of {1e3 * PIN_RADIUS:g} mm in the pins "
+                f"{pins:.1%}",
             ),
             Statement(
                 "The differences may be attributed to the same factors as previously described with spring A.",
                 text("8.4.1.1, L6528"),
-                "what friction takes off the amplitude, mean of the three speeds of Fig 8.11 to 8.13 with spring B "
-                "over that of Fig 8.8 to 8.10 with spring A",
+                "what friction takes off the amplitude, mean of the three speeds of Fig 8.11 to 8.13 with spring B over "
+                "that of Fig 8.8 to 8.10 with spring A",
                 "at least 1, since the agreement with spring B is *not as good*",
                 tuple(
                     at_least(f"coefficient {c:g}", 1.0, taken["B", c].mean() / taken["A", c].mean(), why=why)

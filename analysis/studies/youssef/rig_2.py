@@ -106,14 +106,14 @@ def _resonance() -> tuple[Statement, ...]:
             why=LOST,
         ),
         Statement(
-            "However the width of the resonance region and the amplitude of vibration beyond resonance obtained from "
-            "the theory is smaller than that of the experiment but, nevertheless, a reasonable agreement is evident.",
+            "However the width of the resonance region and the amplitude of vibration beyond resonance obtained from the "
+            "theory is smaller than that of the experiment but, nevertheless, a reasonable agreement is evident.",
             text(f"{section}, L6841"),
             why=LOST,
         ),
         Statement(
-            "These differences may however be attributed to the fact that quantities involving the second and higher "
-            "orders of [theta3', theta4' and their derivatives] are ignored in the theory.",
+            "These differences may however be attributed to the fact that quantities involving the second and higher orders "
+            "of [theta3', theta4' and their derivatives] are ignored in the theory.",
             text(f"{section}, L6847"),
             f"amplitude at {BEYOND:g} rpm by the full equations over that by the linear one",
             lost,
@@ -121,12 +121,11 @@ def _resonance() -> tuple[Statement, ...]:
         ),
         Statement(
             "Other factors contributing to the differences may, as before, be attributed to the presence of Coloumb "
-            "friction in the guide and pin joints and to the fact that only an average value of the damping is "
-            "considered in the theory.",
+            "friction in the guide and pin joints and to the fact that only an average value of the damping is considered "
+            "in the theory.",
             text(f"{section}, L6853"),
-            f"amplitude at {BEYOND:g} rpm with friction by {SLIGHT:g} of the guide's force, and with a damper "
-            f"{STRONGER:g} times as strong, over that without; width of the resonance with this damper over that "
-            "without",
+            f"amplitude at {BEYOND:g} rpm with friction by {SLIGHT:g} of the guide's force, and with a damper {STRONGER:g} "
+            "times as strong, over that without; width of the resonance with this damper over that without",
             lost,
             (
                 *(at_least(f"spring {s}, amplitude with friction", 1.0, rough[s], why=lowered) for s in "CD"),
@@ -136,8 +135,8 @@ def _resonance() -> tuple[Statement, ...]:
             "what widens the resonance lowers the amplitude beyond it",
         ),
         Statement(
-            "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the "
-            "region of 825 RPM with spring D.",
+            "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the region "
+            "of 825 RPM with spring D.",
             text(f"{section}, L6861"),
             "speed of the greatest amplitude",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
@@ -147,8 +146,8 @@ def _resonance() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage "
-            "which are 582 and 829 for springs C and D respectively.",
+            "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
+            "are 582 and 829 for springs C and D respectively.",
             text(f"{section}, L6865"),
             "natural frequency by the mean effective mass, and that of the sentence before over it",
             f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, the rule for *the same*",
@@ -171,9 +170,9 @@ def _resonance() -> tuple[Statement, ...]:
             "the same links with a spring twice as strong vibrate faster by the root of 2",
         ),
         Statement(
-            "[The] theoretical and experimental resonance curves are in good agreement indicating that the assumption "
-            "in the theory that the second and higher orders of [theta3' and theta4'] and their derivatives are "
-            "negligible is a reasonable assumption.",
+            "[The] theoretical and experimental resonance curves are in good agreement indicating that the assumption in "
+            "the theory that the second and higher orders of [theta3' and theta4'] and their derivatives are negligible is "
+            "a reasonable assumption.",
             text(f"{section}, L6974"),
             f"error of the amplitude by the linear equation, the most from {RANGE[0]:g} to {RANGE[-1]:g} rpm, relative",
             f"{SMALL:g}, the rule for *negligible*",
@@ -242,18 +241,18 @@ def compute_harmonics() -> StudyResult:
         columns=padded(columns),
         statements=(
             Statement(
-                "There were no experimentally observable changes in the amplitude of oscillations at quarter, third "
-                "and half the natural frequency, which again indicated a slider motion based on the first harmonic.",
+                "There were no experimentally observable changes in the amplitude of oscillations at quarter, third and "
+                "half the natural frequency, which again indicated a slider motion based on the first harmonic.",
                 text("8.4.2.2, L6871"),
                 "rise of the amplitude at the maximum there over the next minimum, relative",
                 f"{NOTICED:g}, what one notices on a graph",
                 tuple(cases),
-                f"with friction by {SLIGHT:g} of the guide's force, more than linear bearings have, "
-                f"{' and '.join(left)} are left at half",
+                f"with friction by {SLIGHT:g} of the guide's force, more than linear bearings have, {' and '.join(left)} "
+                "are left at half",
             ),
             Statement(
-                "These are smaller than those corresponding to the first harmonic by a factor in magnitude of 50 and "
-                "hence are in agreement with the experiment.",
+                "These are smaller than those corresponding to the first harmonic by a factor in magnitude of 50 and hence "
+                "are in agreement with the experiment.",
                 text("8.4.2.2, L6881"),
                 "greatest first harmonic over greatest second one, each at its own speed",
                 f"{100 * ABOUT:g} %, the rule for *about*, as no digit after 50 is given",
@@ -323,8 +322,7 @@ def compute_forces() -> StudyResult:
             columns[f"greatest force in pin {pin}; {name} [N]"] = table[f"greatest force in pin {pin} [N]"]
     return StudyResult(
         number="rig-2-forces",
-        claim="Every force of this horizontal machine grows with the square of the speed; resonance adds most to pin "
-        "D.",
+        claim="Every force of this horizontal machine grows with the square of the speed; resonance adds most to pin D.",
         columns=padded(columns),
     )
 

@@ -164,8 +164,7 @@ def moved_rocker() -> StudyResult:
     )
     return StudyResult(
         number="7.11",
-        claim="The slider moved by two harmonics brings the weighted error of the rocker function from 35.0 to 4.8 "
-        "deg2.",
+        claim="The slider moved by two harmonics brings the weighted error of the rocker function from 35.0 to 4.8 deg2.",
         columns=columns,
         statements=(
             Statement(
@@ -179,8 +178,8 @@ def moved_rocker() -> StudyResult:
             Statement(
                 "The figure shows that the weighted portion is generated very closely.",
                 text("7.3.2, L5963"),
-                why="the figure is lost, and with the printed series the links cannot be joined over the turn; the "
-                f"best series of two harmonics leaves an error of {in_window:.2f} deg (rms) there",
+                why="the figure is lost, and with the printed series the links cannot be joined over the turn; the best "
+                f"series of two harmonics leaves an error of {in_window:.2f} deg (rms) there",
             ),
             Statement(
                 "In fact the error involved is 4.8 degrees2 as compared with 35.0 degrees2 in chapter 2.",
@@ -193,8 +192,8 @@ def moved_rocker() -> StudyResult:
                         "4.8",
                         min(readings(ROCKER)),
                         unit="deg2",
-                        why=f"the best series of two harmonics has {errors[2]:.2f} deg2, so that 4.8 is possible, but "
-                        "not with this one",
+                        why=f"the best series of two harmonics has {errors[2]:.2f} deg2, so that 4.8 is possible, but not "
+                        "with this one",
                     ),
                 ),
                 "chapter 2 stands for chapter 6, where the 35.0 is judged",
@@ -309,16 +308,16 @@ def moved_path() -> StudyResult:
                     ),
                     near("A0 = 0.31, angle from the horizontal", "4.3", error_of(PATH, mended()), unit="cm2"),
                 ),
-                f"with the links as printed two harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and "
-                f"five {errors[5]:.2f}",
+                f"with the links as printed two harmonics can reach {errors[2]:.2f} cm2, three {errors[3]:.2f} and five "
+                f"{errors[5]:.2f}",
             ),
             Statement(
-                "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus "
-                "be achieved anywhere within this envelope, thereby permitting a closer approximation to a desired "
-                "path by suitable control of U than could otherwise be obtained.",
+                "Subject to the constraint that [theta2] increases at a constant rate, a coupler-point path may thus be "
+                "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
+                "suitable control of U than could otherwise be obtained.",
                 text("7.0, L5248"),
-                "area between the path and the curve with two harmonics over that with the pivot fixed, the printed "
-                "links kept",
+                "area between the path and the curve with two harmonics over that with the pivot fixed, the printed links "
+                "kept",
                 f"below {1.0 - ALIKE:g}, as a fall that is seen",
                 tuple(at_most(name, 1.0 - ALIKE, share) for name, share in paths.items()),
             ),
