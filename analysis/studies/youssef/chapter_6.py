@@ -127,10 +127,10 @@ def rounded(name: str, cm: float, deg: float, task: Task | None = None) -> tuple
     return tuple(map(p.convert, (evaluate(task, p.linkage).error, min(errors), max(errors))))  # type: ignore[return-value]
 
 
-def as_stated(label: str, stated: str, found: tuple[float, float, float], name: str) -> Case:
+def as_stated(label: str, stated: str, found: tuple[float, float, float], name: str, where: str = "") -> Case:
     """Judge whether a stated error is in the range of `rounded`."""
     computed, least, greatest = found
-    best_error = f"{our_error(name):.2f} {PROBLEMS[name].unit}"
+    best_error = f"{our_error(name):.2f} {PROBLEMS[name].unit}{where}"
     return Case(
         label=label,
         stated=stated,
@@ -211,7 +211,9 @@ def _rocker() -> tuple[Statement, ...]:
         found = {n: rounded(name, cm, 0.005, rocker_function(n, weighted=weighted)) for n in NUMBERS}
         nearest = min(found, key=lambda n: abs(found[n][0] - float(stated)))
         kind = "weighted, over the weight" if weighted else "unweighted"
-        cases.append(as_stated(f"{kind}; {nearest} crank angles", stated, found[nearest], name))
+        usual = len(PROBLEMS[name].task.rotation)  # type: ignore[arg-type, union-attr]
+        where = f" at {usual} crank angles, where it has {found[usual][0]:.2f}"
+        cases.append(as_stated(f"{kind}; {nearest} crank angles", stated, found[nearest], name, where))
     return (
         Statement(
             "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "

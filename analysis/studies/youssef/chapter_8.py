@@ -51,11 +51,11 @@ III, rig 2 (horizontal, a crank of a twentieth of the links, springs C and D) th
 measured curves are lost with the figures, so that no sentence which compares a measured curve with theory can be judged.
 What can be judged is what the theory gives for the printed masses, springs and dampers at the stated speeds.
 
-*What stands.* The motion repeats itself after one turn of the crank at every speed that was run, and tends to nothing else.
-With spring A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies lie in the regions
-stated. Rig 2 is in resonance at 586 and 828 rpm (585 and 825), moves as a damped mass on a spring does, and the linear
-equation is within half a per cent of the full ones there. Friction in the guide by a coefficient of 0.05 changes the
-amplitudes with spring A slightly, and the phase by 3 deg, as the thesis says.
+*What stands.* The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
+A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies lie in the regions stated. Rig 2 is
+in resonance at 586 and 828 rpm (585 and 825), moves as a damped mass on a spring does, and the linear equation is within
+half a per cent of the full ones there. Friction in the guide by a coefficient of 0.05 changes the amplitudes with spring A
+slightly, and the phase by 3 deg, as the thesis says.
 
 *What does not.* The amplitude of rig 1 is greatest near half the natural frequency, at 296 and 564 rpm, where the thesis
 has 290 and 580: its two natural frequencies are as 2 to 1, but springs of 3 and 11 on the same links make them 592 and 1133
