@@ -34,24 +34,24 @@ from .runs import (
 )
 
 FINDINGS = """\
-**Claims.** Chapter II and section 3.1 write the mechanism with Lagrange's multipliers, say that these are the pin forces, and
-advise to integrate all second derivatives, so that the closure of the loop checks the integration. Sections 3.2 and 3.3 run
-Table 3.1: without a spring, with three springs, launched by a torque, and left to itself.
+**Claims.** Chapter II and section 3.1 write the mechanism with Lagrange's multipliers, say that these are the pin
+forces, and advise to integrate all second derivatives, so that the closure of the loop checks the integration.
+Sections 3.2 and 3.3 run Table 3.1: without a spring, with three springs, launched by a torque, and left to itself.
 
-**What stands.** The equations (3.8) and (3.10) are right to the last sign; the multipliers are the force at C and the crank
-torque; and the failure of closure does tell the error, being some five to fifteen times that of the slider. The program of
-appendix 1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The torque reverses near
-0 deg and hardly depends on the spring; launches, the decay by the damper, the phase planes, and the resonance of the second
-harmonic at half the natural frequency are as described.
+**What stands.** The equations (3.8) and (3.10) are right to the last sign; the multipliers are the force at C and the
+crank torque; and the failure of closure does tell the error, being some five to fifteen times that of the slider. The
+program of appendix 1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The
+torque reverses near 0 deg and hardly depends on the spring; launches, the decay by the damper, the phase planes, and
+the resonance of the second harmonic at half the natural frequency are as described.
 
-**What does not.** Without a spring the slider does not drift along a line: gravity and the mean of the inertia forces push it towards
-the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look straight. Gravity
-holds the drift back: without it, M is greater by a quarter in size, and so not slightly reduced. With the softer springs the
-transient outlasts the first cycle. With the stiffest the least position comes at 5 deg, not at 0; a spring stiffer still does not
-make the slope constant. The torque varies with the spring at its extremes, but not because the slider's accelerations differ: they
-make 3 % of the difference at the least torque. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. The
-second harmonic near 27 rad/s goes on growing as the speed falls further. And Milne's method, which the thesis takes for as stable as
-Hamming's, is weakly unstable."""
+**What does not.** Without a spring the slider does not drift along a line: gravity and the mean of the inertia forces
+push it towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look
+straight. Gravity holds the drift back: without it, M is greater by a quarter in size, and so not slightly reduced.
+With the softer springs the transient outlasts the first cycle. With the stiffest the least position comes at 5 deg,
+not at 0; a spring stiffer still does not make the slope constant. The torque varies with the spring at its extremes,
+but not because the slider's accelerations differ: they make 3 % of the difference at the least torque. T0 is not
+hyperbolic in the time of a launch; T0 t^2 is nearly constant. The second harmonic near 27 rad/s goes on growing as
+the speed falls further. And Milne's method, which the thesis takes for as stable as Hamming's, is weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
