@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from analysis.studies.youssef import chapter_4 as study
 from analysis.studies.youssef import linearised
-from analysis.youssef import Form, Variant, nonlinear_harmonic_balance, resonance, slider_equation
+from analysis.youssef import Variant, nonlinear_harmonic_balance, resonance, slider_equation
 from linkwork.five_bar.published import chapter_4
 from tests import published
 
@@ -69,17 +68,3 @@ class TestLinearised:
         assert found["H1, stiffness"] == pytest.approx(3.0, abs=1e-3)
         right = slider_equation(linearised.with_crank(1e-4), 1.0).stiffness.cos[1]
         assert right == pytest.approx(1e-4 * published.P45 / 4.5, rel=1e-3)
-
-    def test_expansion_lacks_the_second_order_of_the_mean(self) -> None:
-        """By (4.23) itself: half of the product of the harmonics of S less k0 I with those of I, over I0^2."""
-        sigma2 = 1e-3
-        raw = slider_equation(linearised.with_crank(sigma2), 1.0, variant=Variant.PRINTED, form=Form.QUOTIENT)
-        mass, spring = raw.mass, raw.spring_factor
-        k0 = spring.mean / mass.mean
-        left = (
-            0.5
-            * sum((k0 * m[1] - s[1]) * m[1] for m, s in ((mass.cos, spring.cos), (mass.sin, spring.sin)))
-            / mass.mean**2
-        )
-        assert linearised.expansion(sigma2)[0] == pytest.approx(abs(left), rel=1e-2)
-        assert np.all(linearised.expansion(sigma2)[1:] < 1e-2 * abs(left))

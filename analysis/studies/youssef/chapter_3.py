@@ -184,7 +184,7 @@ def drift_result() -> StudyResult:
                 tuple(shapes),
             ),
             Statement(
-                "The drift is linear with crank angle and may be described by the equation u = M[.θ2 + u0].",
+                "The drift is linear with crank angle and may be described by the equation u = M[.theta2 + u0].",
                 text("3.2.1, L1911-1915"),
                 f"greatest distance of u at the ends of the first {DRAWN_TURNS} cycles, or of those before the links "
                 "are "
@@ -344,7 +344,8 @@ def _steady_statements() -> list[Statement]:
             (at_most("greatest", 1.0, greatest_ratio(np.array(list(means.values())))),),
         ),
         Statement(
-            "The minimum value of the oscillation for the case of k=5[x 10^5] dyne/cm occurs at crank angle [θ2 = 22 "
+            "The minimum value of the oscillation for the case of k=5[x 10^5] dyne/cm occurs at crank angle [theta2 = "
+            "22 "
             "deg].",
             text("3.2.1, L1958-1962"),
             "crank angle of the least u",
@@ -523,7 +524,8 @@ def torque_result() -> StudyResult:
         columns=columns,
         statements=(
             Statement(
-                "The striking feature of the figure is the sudden reversal in torque in the region of [θ2 = 0 deg].",
+                "The striking feature of the figure is the sudden reversal in torque in the region of [theta2 = 0 "
+                "deg].",
                 text("3.2.1, L1989-1993"),
                 "crank angle at which the torque passes zero between its greatest and least value, "
                 f"{low_at + 360 - high_at:.0f} deg apart",

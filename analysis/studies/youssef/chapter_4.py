@@ -160,11 +160,12 @@ def compute_first() -> StudyResult:
         columns=undamped_columns(1),
         statements=(
             Statement(
-                "The figures show that resonance for the first harmonic occurs in the region of ([ωk] - d) < [ω] < "
-                "[ωk] where "
+                "The figures show that resonance for the first harmonic occurs in the region of ([omega_k] - d) < "
+                "[omega] < "
+                "[omega_k] where "
                 "d = 1 rad./sec.",
                 text("4.5.1, L3137-3143"),
-                "distance of the resonance, the lower root, below ωk = 31.623 rad/s",
+                "distance of the resonance, the lower root, below omega_k = 31.623 rad/s",
                 f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*",
                 tuple(
                     Case(
@@ -196,7 +197,7 @@ def compute_first() -> StudyResult:
                 "listing, run to the letter, and by the right equation",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude",
                 listed_cases(),
-                "M' ζ' is missing, and every term in the crank's length is halved",
+                "M' zeta' is missing, and every term in the crank's length is halved",
             ),
         ),
     )
@@ -215,7 +216,8 @@ def compute_second() -> StudyResult:
         columns=columns,
         statements=(
             Statement(
-                "Resonance occurs below the value of w = [ωk] and w = [ωk/2]. How much below depends on the value of "
+                "Resonance occurs below the value of w = [omega_k] and w = [omega_k/2]. How much below depends on the "
+                "value of "
                 "I4.",
                 text("4.5.3 a, L3188-3195"),
                 "upper root of the determinant at the three I4, which falls with I4",
@@ -241,7 +243,8 @@ def compute_second() -> StudyResult:
                     at_most(f"{low:g} to {high:g} rad/s", SMALL, shares[(low <= SPEEDS) & (high >= SPEEDS)].max())
                     for low, high in ranges
                 ),
-                "it is small near the resonance of the first harmonic alone, and near ωk/2, where it has its own, it "
+                "it is small near the resonance of the first harmonic alone, and near omega_k/2, where it has its "
+                "own, it "
                 "is the greater",
             ),
         ),

@@ -210,7 +210,8 @@ def compute() -> StudyResult:
                 "arithmetical checks, "
                 "only if used in conjunction with the first approach.",
                 text("3.1, L1748-1757"),
-                "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, "
+                "greatest error of u by the second approach, which integrates u alone and closes the loop by its "
+                "kinematics, "
                 "relative to its failure of closure",
                 "more than 100: the check shows nothing of the error",
                 tuple(at_least(label, 100.0, run.errors[1] / run.unseen) for label, run in found.items()),
@@ -227,7 +228,8 @@ def compute() -> StudyResult:
                 ),
             ),
             Statement(
-                "One of their most attractive qualities is that they require only two evaluations of the function [Φ] "
+                "One of their most attractive qualities is that they require only two evaluations of the function "
+                "[Phi] "
                 "per step "
                 "of integration.",
                 text("2.4, L1389-1393"),

@@ -277,7 +277,7 @@ def launch_speeds() -> StudyResult:
             _rise({label: accelerated(torque) for label, torque in zip(runs, TORQUES)}),
         ),
         Statement(
-            "The behaviour of the crank speed beyond [θ2] = 1 rad. in Fig. (3.6) is governed by the free motion "
+            "The behaviour of the crank speed beyond [theta2] = 1 rad. in Fig. (3.6) is governed by the free motion "
             "equations of "
             "motion. However, it is oscillatory and decaying.",
             text("3.2.2, L2142-2147"),

@@ -213,7 +213,7 @@ def compute() -> StudyResult:
                 "of sigma2, from "
                 f"sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
                 "2, the first order that is neglected in (4.4), to 0.05",
-                tuple(near(name, 2.0, x, 0.05) for name, x in zip(("ξ3", "ξ4"), orders)),
+                tuple(near(name, 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
             ),
             Statement(
                 "then by application of the Lagrangian multiplier method stated in equation (2.5) the following "
@@ -231,7 +231,7 @@ def compute() -> StudyResult:
                 text("4.2.1, eq (4.21), L2620-2794"),
                 "coefficients over A1 + B1 cos + C1 sin, relative to the right ones, at I4 = 1 and sigma2 = "
                 f"{SHORT[1]:g}, about their own datum, "
-                "massless coupler and centre of mass of the rocker on the slider; the factor of ζ' without a damper "
+                "massless coupler and centre of mass of the rocker on the slider; the factor of zeta' without a damper "
                 "relative to M'",
                 f"{LIMIT:g}, more than the terms of second order",
                 (
@@ -241,7 +241,7 @@ def compute() -> StudyResult:
                         else near(name, 1.0, x, LIMIT, why="three times too large")
                         for name, x in coefficients(SHORT[1]).items()
                     ),
-                    near("ζ' without a damper", 1.0, 0.0, LIMIT, why="M' ζ' is missing"),
+                    near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
                 ),
             ),
             Statement(
@@ -252,7 +252,8 @@ def compute() -> StudyResult:
                 why="the factor cannot be read",
             ),
             Statement(
-                "[W]hich, if terms in the order of third and higher powers of [ε] are ignored, may be written [(4.23)]",
+                "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
+                "[(4.23)]",
                 text("4.3, eqs (4.22) to (4.29), L2853-2930"),
                 "order of what (4.23) and (4.24) leave out of the quotient of the printed coefficients, from sigma2 "
                 f"= {SHORT[0]:g} to "
@@ -264,7 +265,8 @@ def compute() -> StudyResult:
                 ),
             ),
             Statement(
-                "Equating constant terms and coefficients of Cos[θ], Sin[θ], Cos2[θ] and Sin2[θ] on both sides of "
+                "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
+                "both sides of "
                 "equation (4.31) we "
                 "obtain the following recurrence relationships.",
                 text("4.4.1, 4.4.2, eqs (4.30) to (4.35), L2988-3103"),
@@ -275,7 +277,10 @@ def compute() -> StudyResult:
                 (
                     at_most("without a damper, (4.32)", ROUNDING, balanced(0.0)),
                     at_most(
-                        "omega_c = 1.2 1/s", ROUNDING, balanced(1.2), why="2 λc and 4 λc stand for 2 λc k0 and 4 λc k0"
+                        "omega_c = 1.2 1/s",
+                        ROUNDING,
+                        balanced(1.2),
+                        why="2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
                     ),
                 ),
             ),
