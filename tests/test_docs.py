@@ -91,7 +91,7 @@ def test_plots_of_the_theses():
 
 @pytest.mark.parametrize(("name", "last"), [("rahman.md", 9), ("youssef.md", 20)])
 def test_every_erratum_has_its_test(name, last):
-    """Each row of the table ends with the tests that show it, as file::name; a verdict on Rahman's studies fails because of it."""
+    """Each row of the table ends with the tests that show it, as file::name; in Rahman's studies a verdict names it."""
     page = (ROOT / "docs" / name).read_text()
     rows = re.findall(r"^\| (\d+) (\| .*`) \|$", page, flags=re.MULTILINE)
     assert [number for number, _ in rows] == [str(n + 1) for n in range(last)]

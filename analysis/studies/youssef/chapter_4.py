@@ -161,9 +161,7 @@ def compute_first() -> StudyResult:
         statements=(
             Statement(
                 "The figures show that resonance for the first harmonic occurs in the region of ([omega_k] - d) < "
-                "[omega] < "
-                "[omega_k] where "
-                "d = 1 rad./sec.",
+                "[omega] < [omega_k] where d = 1 rad./sec.",
                 text("4.5.1, L3137-3143"),
                 "distance of the resonance, the lower root, below omega_k = 31.623 rad/s",
                 f"above 0, and {100 * ABOUT:g} % of d, the rule for *in the region of*",
@@ -182,8 +180,7 @@ def compute_first() -> StudyResult:
             ),
             Statement(
                 "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of I4 "
-                "and that as "
-                "I4 increases it widens the region of resonance.",
+                "and that as I4 increases it widens the region of resonance.",
                 text("4.5.1, L3156-3162; the same in L3197-3201"),
                 "amplitude and width relative to those at the next smaller I4",
                 SIGN,
@@ -192,9 +189,8 @@ def compute_first() -> StudyResult:
             Statement(
                 "THIS PROG. INV[E]STIG[A]TES RESONANCE IN PRES[EN]CE OF DAMPING",
                 listing("appendix 2, L8398"),
-                "both speeds at which the determinant of (4.33) vanishes without a damper, and the second harmonic at "
-                "its resonance: by the "
-                "listing, run to the letter, and by the right equation",
+                "both speeds at which the determinant of (4.33) vanishes without a damper, and the second harmonic "
+                "at its resonance: by the listing, run to the letter, and by the right equation",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude",
                 listed_cases(),
                 "M' zeta' is missing, and every term in the crank's length is halved",
@@ -216,9 +212,8 @@ def compute_second() -> StudyResult:
         columns=columns,
         statements=(
             Statement(
-                "Resonance occurs below the value of w = [omega_k] and w = [omega_k/2]. How much below depends on the "
-                "value of "
-                "I4.",
+                "Resonance occurs below the value of w = [omega_k] and w = [omega_k/2]. How much below depends on "
+                "the value of I4.",
                 text("4.5.3 a, L3188-3195"),
                 "upper root of the determinant at the three I4, which falls with I4",
                 SIGN,
@@ -233,8 +228,7 @@ def compute_second() -> StudyResult:
             ),
             Statement(
                 "It is also clear by comparing the amplitude values in both figures that the first harmonic of the "
-                "solution is "
-                "dominant and the second harmonic may be neglected in comparison.",
+                "solution is dominant and the second harmonic may be neglected in comparison.",
                 text("4.5.1, L3162-3168; the same in L3210-3214"),
                 "second harmonic relative to the first at the same speed, greatest of the three I4 over a range of "
                 "speeds",
@@ -244,8 +238,7 @@ def compute_second() -> StudyResult:
                     for low, high in ranges
                 ),
                 "it is small near the resonance of the first harmonic alone, and near omega_k/2, where it has its "
-                "own, it "
-                "is the greater",
+                "own, it is the greater",
             ),
         ),
     )
@@ -300,13 +293,11 @@ def compute_deviation() -> StudyResult:
         columns=columns,
         statements=(
             Statement(
-                "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio I4 "
-                "and becomes "
-                "zero when I4=0.",
+                "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
+                "I4 and becomes zero when I4=0.",
                 text("4.5.1, L3146-3150"),
                 "greatest distance of the deviation from a straight line through zero, of the greatest deviation, up "
-                "to I4 = 1.5; "
-                "deviation at I4 = 0",
+                "to I4 = 1.5; deviation at I4 = 0",
                 f"{ALIKE_WORDS}; rounding",
                 (
                     at_most("distance from the line", ALIKE, bent),
@@ -315,8 +306,7 @@ def compute_deviation() -> StudyResult:
             ),
             Statement(
                 "In fact for the case I4=0 the equation of motion of the slider reduces to a second order linear "
-                "differential "
-                "equation describing an idealised spring-mass system.",
+                "differential equation describing an idealised spring-mass system.",
                 text("4.5.1, L3152-3156"),
                 "greatest coefficient of the right equation beyond a mass on a spring",
                 "rounding",
@@ -400,8 +390,8 @@ def compute_damped(number: str, inertia_ratio: float) -> StudyResult:
     return StudyResult(
         number=number,
         claim=f"First harmonic over the crank speed with dampers, I4 = {inertia_ratio:g}.",
-        assignment="The dampers are those of the listing of appendix 2; that the amplitude is the first harmonic's is "
-        "ours.",
+        assignment="The dampers are those of the listing of appendix 2; that the amplitude is the first harmonic's "
+        "is ours.",
         columns=columns,
         statements=_curves() if number == "4.6" else _dampers(),
     )
@@ -415,8 +405,7 @@ def _curves() -> tuple[Statement, ...]:
             "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
             text("4.5.2, L3176-3178; the same in L3203-3204"),
             f"change of the amplitude by omega_c = {STRONGEST:g} 1/s farther than {OUTSIDE:g} rad/s from the "
-            "resonance, relative to "
-            f"the peak at {DAMPERS[0]:g} 1/s",
+            f"resonance, relative to the peak at {DAMPERS[0]:g} 1/s",
             ALIKE_WORDS,
             tuple(at_most(label, ALIKE, found["outside"]) for label, found in both.items()),
         ),
@@ -424,8 +413,7 @@ def _curves() -> tuple[Statement, ...]:
             "The resonance curves are similar to a second order linear system",
             text("4.5.3 d, L3206-3208"),
             "greatest distance from the amplitude of one mass on a spring, with the means of M and K and the first "
-            "harmonic of F, relative to "
-            f"the peak; omega_c = {DAMPERS[0]:g} 1/s, 27 to 35 rad/s",
+            f"harmonic of F, relative to the peak; omega_c = {DAMPERS[0]:g} 1/s, 27 to 35 rad/s",
             ALIKE_WORDS,
             tuple(at_most(label, ALIKE, found["one mass"]) for label, found in both.items()),
         ),
@@ -441,8 +429,7 @@ def _dampers() -> tuple[Statement, ...]:
             "The natural frequency decreases slightly with increase of damping.",
             text("4.5.2, L3178-3180"),
             f"change of the frequency from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s: of the free motion, by its "
-            "multipliers, and of the "
-            "peak of the curves, which the figures show",
+            "multipliers, and of the peak of the curves, which the figures show",
             f"{SIGN}; both are far too small to be read from a graph",
             tuple(
                 at_most(

@@ -60,7 +60,7 @@ region up to I4 = 1.5 is 0.167 1/s, where the listing needs 0.459. The second re
 first order largely cancel in the first, so that it is of like width. The axes of Fig 5.2 and 5.3, 1.968 and 1.96,
 belong to I4 = 0.5, which the listing has, and not to the 1 and 2 of the text. Fig 5.3 varies the coupler with the
 angles held, to which another ground link belongs at each length; on one ground link the region is narrowest at equal
-links. The zeroth boundary does not part two stable regions: beyond it, above 900 to 1600 rad/s, the slider falls
+links. The zeroth boundary does not part two stable regions: beyond it, at a thousand rad/s or so, the slider falls
 away, and no damper stops it."""
 
 #: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
@@ -161,9 +161,9 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     zeroth = boundary_stiffnesses(exact, 1, count=1)[0].real
     listed = []
     for ratio in COMPARED:
-        by_listing, ways = appendix_3(chapter_4(ratio)), {"linear equation": hill, "true orbit": right}
-        for way, of in ways.items():
-            region = of(chapter_4(ratio))
+        by_listing = appendix_3(chapter_4(ratio))
+        for way in ("linear equation", "true orbit"):
+            region = WAYS[way](chapter_4(ratio))
             listed += [
                 near(f"{side}; I4 = {ratio:g}; {way}", f"{x:.6f}", y, unit="")
                 for side, x, y in zip(("lower", "upper"), (by_listing.low, by_listing.high), (region.low, region.high))
@@ -182,9 +182,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         ),
         Statement(
             "The region in [lambda_k^2] as a band also increases linearly with I4 indicating that instability occurs "
-            "when "
-            "[omega]=A.[omega_k] with "
-            "A=2 when I4=0 and decreasing with increase of I4.",
+            "when [omega]=A.[omega_k] with A=2 when I4=0 and decreasing with increase of I4.",
             text("5.3.1, L3764-3770; the same in L3944-3950"),
             "distance of the middle of the region from a straight line through 1/4 at I4 = 0, of the line's rise; "
             "axis A in the middle",
@@ -207,9 +205,8 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "[T]he second region of instability may now be defined by [(5.26)]",
             text("5.1.1, eqs (5.13), (5.16), (5.26), L3406, L3446-3464, L3555-3575"),
-            "boundaries by the formulas less those by the determinant (5.35), for the printed equation (4.29) at I4 = "
-            "1, relative to the width "
-            "of its first region",
+            "boundaries by the formulas less those by the determinant (5.35), for the printed equation (4.29) at I4 "
+            "= 1, relative to the width of its first region",
             f"{SMALL:g}, the rule for *small*: the next order",
             formulas(),
         ),
@@ -217,8 +214,7 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "THIS PROG. INV[E]STIG[A]TES STABILITY IN ABSENCE [O]F DAMPING",
             listing("appendix 3, L8638"),
             "boundaries in lambda_k^2: by the listing, run, by the right linear equation, which the thesis is about, "
-            "and by the true "
-            "periodic motion",
+            "and by the true periodic motion",
             "half a unit of the sixth digit, which the listing prints (L8686)",
             tuple(listed),
             "M' zeta' is missing, first-order terms are halved, and (5.16) has lost 1/k0",
@@ -253,9 +249,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
         ),
         Statement(
             "However the region diverges about an axis approximately given by [omega]=A.[omega_k] where A=1.968 when "
-            "[sigma2] = "
-            "0.01 and "
-            "increasing very slightly with increase of [sigma2].",
+            "[sigma2] = 0.01 and increasing very slightly with increase of [sigma2].",
             text("5.3.1, L3876-3882"),
             "axis A of the right linear equation at sigma2 = 0.01, and its growth up to 0.1",
             f"half a unit of the last digit; {SIGN}",
@@ -322,9 +316,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         ),
         Statement(
             "It also converges about an axis given by [omega]=A.[omega_k] where A=1.96 when [sigma3] = 0.8 and stays "
-            "approximately "
-            "constant with "
-            "increase of [sigma3].",
+            "approximately constant with increase of [sigma3].",
             text("5.3.1, L3892-3898"),
             "axis A at sigma3 = 0.8; its range over sigma3 relative to it",
             f"half a unit of the last digit; {ALIKE_WORDS}",
@@ -347,12 +339,10 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         ),
         Statement(
             "In all the above examples the second region of instability was so small within the values of [sigma2], "
-            "[sigma3] "
-            "and I4 it was "
-            "negligible.",
+            "[sigma3] and I4 it was negligible.",
             text("5.3.1, L3902-3906"),
-            "width of the second region relative to that of the first, by the right linear equation, greatest of each "
-            "figure",
+            "width of the second region relative to that of the first, by the right linear equation, greatest of "
+            "each figure",
             f"{SMALL:g}, the rule for *negligible*",
             tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
             "the terms of first order largely cancel in the width of the first",
@@ -391,8 +381,8 @@ SWEEPS = {
             claim="The first region of instability in lambda_k^2 over sigma3; sigma2 = 0.05, I4 = 2.",
             judge=judge_coupler,
             assignment=(
-                "The thesis keeps the angles of coupler and rocker, to which another ground link and an inclined guide "
-                "belong at every sigma3; the mechanism with the same ground link is ours."
+                "The thesis keeps the angles of coupler and rocker, to which another ground link and an inclined "
+                "guide belong at every sigma3; the mechanism with the same ground link is ours."
             ),
             further={SAME_GROUND: closed},
         ),
@@ -492,15 +482,12 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
     return (
         Statement(
             "It is clearly seen that regions of instability of the above system will resemble those obtained for the "
-            "case of no damping "
-            "but shifted by a small amount represented by the second order quantity of 1/4 [lambda_c^2 k0^2] in "
-            "(5[.]30).",
+            "case of no damping but shifted by a small amount represented by the second order quantity of 1/4 "
+            "[lambda_c^2 k0^2] in (5[.]30).",
             text("5.2.1, L3628-3635"),
             f"middle and width of the first region of (5.29), from the right equation, with omega_c = {STATED:g} 1/s: "
-            "shift of lambda_k^2 k0 relative to the "
-            "stated quantity, and width relative to that without a damper; zeta has besides the factor of (5.28), by "
-            "which its own region does not "
-            "shift but narrows",
+            "shift of lambda_k^2 k0 relative to the stated quantity, and width relative to that without a damper; "
+            "zeta has besides the factor of (5.28), by which its own region does not shift but narrows",
             ALIKE_WORDS,
             shifts(),
         ),
@@ -513,12 +500,10 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
         ),
         Statement(
             "It is also shifted to the right with increase of [omega_c] and is completely eliminated anywhere within "
-            "I4 = "
-            "[0] to 1.5 for the "
-            "value of [omega_c] = 0.45.",
+            "I4 = [0] to 1.5 for the value of [omega_c] = 0.45.",
             text("5.3.2, L3917-3921"),
-            "growth with omega_c of the I4 at which the region begins, least; omega_c that removes it up to I4 = 1.5, "
-            "by the true periodic motion",
+            "growth with omega_c of the I4 at which the region begins, least; omega_c that removes it up to I4 = "
+            "1.5, by the true periodic motion",
             SIGN,
             (
                 at_least("growth", 0.0, np.diff(tips).min()),
@@ -526,9 +511,8 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values of "
-            "[omega_c] = 0.45 anywhere "
-            "within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
+            "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
+            "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
             text("5.3.2, L3923-3929"),
             "greatest omega_c that removes the region of the right linear equation, by its width",
             SIGN,
@@ -545,13 +529,11 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping making "
-            "the linkage under "
-            "study completely stable for all ranges of speeds.",
+            "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping "
+            "making the linkage under study completely stable for all ranges of speeds.",
             text("5.3.3 c, L3952-3958"),
             "omega_c that removes regions 1 to 4 at I4 = 1.5, by their widths; greatest multiplier with 0.45 1/s "
-            "beyond the zeroth boundary, "
-            f"at {crank_speed(0.5 * zeroth):.0f} rad/s",
+            f"beyond the zeroth boundary, at {crank_speed(0.5 * zeroth):.0f} rad/s",
             "none, stability decides",
             (
                 at_most("omega_c", "0.45", max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)), "1/s"),
@@ -565,8 +547,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
         ),
         Statement(
             "The computer orientated method gave results which are in good agreement with the perturbation method; "
-            "see the outer boundary of "
-            "fig. (5.4) and fig. (5.1).",
+            "see the outer boundary of fig. (5.4) and fig. (5.1).",
             text("5.3.3 e, L3964-3968"),
             "lower boundary by (5.35) less that by (5.16), right coefficients, of the width; greatest of three I4",
             ALIKE_WORDS,

@@ -52,7 +52,8 @@ def datum(sigma2: float) -> Datum:
         gap = sigma2 * np.exp(1j * x[0]) - 1.0 - np.exp(1j * middle) + np.exp(1j * x[1])
         return [gap.real / sigma2, gap.imag / sigma2]
 
-    return Datum(*fsolve(closure, [DATUM.crank, pi - middle], xtol=1e-11), middle)
+    crank, coupler = fsolve(closure, [DATUM.crank, pi - middle], xtol=1e-11).tolist()
+    return Datum(crank, coupler, middle)
 
 
 def deviations(sigma2: float) -> tuple[float, float]:
@@ -185,8 +186,7 @@ def compute() -> StudyResult:
         columns |= {f"{name}; {way} [1]": parts[i](TURN) for way, parts in ways.items()}
     return StudyResult(
         number="4.2",
-        claim="The equations (4.1) to (4.35), one by one: the right ones lead from the plant to the slider's linear "
-        "equation.",
+        claim="The equations (4.1) to (4.35), one by one, each against the plant or the equations before it.",
         columns=columns,
         statements=(
             Statement(
@@ -209,20 +209,17 @@ def compute() -> StudyResult:
             Statement(
                 "Substituting equations (4.6) into equations (4.5) we obtain: (4.7) and hence (4.8)",
                 text("4.1, eqs (4.2) to (4.8), L2421-2477"),
-                "order in the crank's length of the error of (4.8) against the closed linkage, the slider off by half "
-                "of sigma2, from "
-                f"sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
+                "order in the crank's length of the error of (4.8) against the closed linkage, the slider off by "
+                f"half of sigma2, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
                 "2, the first order that is neglected in (4.4), to 0.05",
                 tuple(near(name, 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
             ),
             Statement(
-                "then by application of the Lagrangian multiplier method stated in equation (2.5) the following "
-                "equations are "
-                "obtained.",
+                "[T]hen by application of the Lagrangian multiplier method stated in equation (2.5) the following "
+                "equations are obtained.",
                 text("4.2.1, eqs (4.9) to (4.20), L2501-2613"),
                 "residual in a motion of the plant without gravity, with the pin force at C for the multipliers, "
-                "relative to the greatest "
-                "term",
+                "relative to the greatest term",
                 f"{ROUNDING:g}, above rounding errors",
                 tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
             ),
@@ -230,9 +227,8 @@ def compute() -> StudyResult:
                 "[T]he following linearised equation of motion of the slider may be obtained. [(4.21)]",
                 text("4.2.1, eq (4.21), L2620-2794"),
                 "coefficients over A1 + B1 cos + C1 sin, relative to the right ones, at I4 = 1 and sigma2 = "
-                f"{SHORT[1]:g}, about their own datum, "
-                "massless coupler and centre of mass of the rocker on the slider; the factor of zeta' without a damper "
-                "relative to M'",
+                f"{SHORT[1]:g}, about their own datum, massless coupler and centre of mass of the rocker on the "
+                "slider; the factor of zeta' without a damper relative to M'",
                 f"{LIMIT:g}, more than the terms of second order",
                 (
                     *(
@@ -246,8 +242,7 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
-                "least a "
-                "factor [...] in the worst cases.",
+                "least a factor [...] in the worst cases.",
                 text("4.3, L2797-2801"),
                 why="the factor cannot be read",
             ),
@@ -256,8 +251,7 @@ def compute() -> StudyResult:
                 "[(4.23)]",
                 text("4.3, eqs (4.22) to (4.29), L2853-2930"),
                 "order of what (4.23) and (4.24) leave out of the quotient of the printed coefficients, from sigma2 "
-                f"= {SHORT[0]:g} to "
-                f"{SHORT[1]:g}; I4 = 1",
+                f"= {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1",
                 "3, to 0.05",
                 tuple(
                     at_least(name, 2.95, x, why="the mean has a part of second order too")
@@ -266,13 +260,10 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
-                "both sides of "
-                "equation (4.31) we "
-                "obtain the following recurrence relationships.",
+                "both sides of equation (4.31) we obtain the following recurrence relationships.",
                 text("4.4.1, 4.4.2, eqs (4.30) to (4.35), L2988-3103"),
                 "solution of (4.33) with (4.34) and (4.35) against the balance of two harmonics of (4.29), relative "
-                "to its greatest "
-                "coefficient, at 25 rad/s and I4 = 1",
+                "to its greatest coefficient, at 25 rad/s and I4 = 1",
                 f"{ROUNDING:g}, above rounding errors",
                 (
                     at_most("without a damper, (4.32)", ROUNDING, balanced(0.0)),
@@ -305,7 +296,7 @@ def draw(result: StudyResult) -> Figure:
     angle, *names = result.columns
     panels = []
     for name in dict.fromkeys(column.partition(";")[0] for column in names):
-        chosen = {c: c.partition("; ")[2].partition(" [")[0] for c in names if c.startswith(name)}
+        chosen = {c: "" if panels else c.partition("; ")[2].partition(" [")[0] for c in names if c.startswith(name)}
         curves = [replace(curve, line=line) for curve, line in zip(curves_of(result, angle, chosen), ("-", "--", ":"))]
         panels.append(
             Panel(
