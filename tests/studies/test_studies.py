@@ -25,7 +25,7 @@ def test_there_is_a_study_of_every_figure() -> None:
     ]
     ours = ["quality", "control", "rig-1-resonance", "rig-1-friction", "rig-2-forces", "linkage"]
     assert list(studies.YOUSSEF) == [*asked, *ours]
-    words = [f"rahman-{word}" for word in ("constant", "closure", "rates", "forces")]
+    words = [f"rahman-{word}" for word in ("constant", "closure", "rates", "forces", "conclusions")]
     assert list(studies.RAHMAN) == [f"R{n}" for n in range(5, 39)] + words
     assert list(studies.STUDIES) == [*studies.YOUSSEF, *studies.RAHMAN]
     for number in studies.STUDIES:
