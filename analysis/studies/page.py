@@ -48,7 +48,7 @@ def figures(numbers: Iterable[str], folder: Path) -> str:
             lines += [f"![{result.heading}]({plot})", ""]
         lines += [f"`linkwork figures {number}`", ""]
         if result.see:
-            lines += [f"The statements on it are judged at Fig {result.see}.", ""]
+            lines += [f"Statements that concern it are judged at Fig {result.see}.", ""]
         for statement in result.statements:
             lines += block(statement)
         lines += table(result.verdicts)

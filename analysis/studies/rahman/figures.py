@@ -14,12 +14,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, POUND_FORCE, POUND_INCH, parameters
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
@@ -29,6 +30,7 @@ from ..rules import ABOUT, ABOUT_DEG
 from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
+from ..variation import cache, vary
 from .table import (
     COMPONENTS,
     CONSTANT,
@@ -84,11 +86,16 @@ _COUNTS = {"no": 0, "one": 1, "two": 2}
 _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
 
 
+def mechanism(case: Case) -> SliderCrankParameters:
+    """Return the mechanism of a case, with what the reader varies."""
+    return vary(parameters(case.offset_in, case.twist_deg))
+
+
 @cache
 def turn(case: Case, given: str = "torque", angles_deg: tuple[float, ...] = tuple(ANGLES_DEG.tolist())) -> ForceTurn:
     """Compute a turn of the crank with a given ``torque`` and unknown slider force, or without ``load`` on the slider."""
     return force_turn(
-        parameters(case.offset_in, case.twist_deg),
+        mechanism(case),
         crank_speed=CRANK_SPEED,
         shift=ConstantShift(case.shift_in * INCH),
         angles=np.radians(angles_deg),
@@ -209,8 +216,7 @@ def _name(case: Case) -> str:
 
 def _stroke(case: Case) -> float:
     """Return the stroke (in) of a mechanism of section 3.1 at its shift."""
-    mechanism = parameters(case.offset_in, case.twist_deg)
-    (whole,) = ranges(mechanism, constant_shift(case.shift_in * INCH))
+    (whole,) = ranges(mechanism(case), constant_shift(case.shift_in * INCH))
     return whole.stroke / INCH
 
 
@@ -407,7 +413,7 @@ def _constant() -> tuple[Statement, ...]:
 
 def sinusoidal_axial_force(ratio: float) -> float:
     """Return the greatest difference (lb) of 1F1k from m1 S1'' at a4 = 10 in with the shift 3.5 in sin(alpha theta1)."""
-    p, shift = parameters(OFFSETS[0].offset_in), GrooveShift(3.5 * INCH, ratio)
+    p, shift = mechanism(OFFSETS[0]), GrooveShift(3.5 * INCH, ratio)
     found = force_turn(p, crank_speed=CRANK_SPEED, shift=shift, angles=np.radians(ANGLES_DEG), torque=CRANK_TORQUE)
     beyond = found.axial_force - p.crank_mass * found.shift_acceleration
     return float(np.abs(beyond[found.clear(CLEAR_DEG)]).max()) / POUND_FORCE
@@ -517,4 +523,6 @@ def draw(result: StudyResult) -> Figure:
 
 
 #: The studies by the figure's number with an R before it.
-STUDIES = {number: Study(number, partial(compute, number), draw) for number in FIGURES}
+STUDIES = {
+    number: Study(number, partial(compute, number), draw, sweeps=("guide.offset", "guide.twist")) for number in FIGURES
+}

@@ -6,7 +6,6 @@ the plant. The errata are numbered as in docs/rahman.md.
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import pairwise
 from typing import cast
 
@@ -25,6 +24,7 @@ from ..rules import ABOUT_DEG, SMALL
 from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
+from ..variation import cache, unvaried
 from .figures import (
     ALL,
     ANGLE,
@@ -216,8 +216,9 @@ def _detected() -> tuple[float, float]:
         angles, each = (x.ravel() for x in np.meshgrid(np.radians(GRID_DEG[::6]), shifts))
         found = settle(p, angles, each, rows="printed", max_steps=MAX_STEPS)
         settled = found.settled.reshape(shifts.size, -1).all(-1)
-        missed += (~settled).tolist()
-        wrong += (settled & (np.degrees(found.rotation_residual).reshape(shifts.size, -1).max(-1) > 1.0)).tolist()
+        is_open = found.rotation_residual.reshape(shifts.size, -1).max(-1) > np.radians(1.0)
+        missed += np.logical_not(settled).tolist()
+        wrong += np.logical_and(settled, is_open).tolist()
     return float(np.mean(missed)), float(np.mean(wrong))
 
 
@@ -1050,9 +1051,9 @@ def draw(result: StudyResult) -> Figure:
 STUDIES = {
     study.number: study
     for study in (
-        Study("rahman-closure", closure, draw),
-        Study("rahman-rates", rates, draw),
-        Study("rahman-forces", forces, draw),
-        Study("rahman-conclusions", conclusions),
+        Study("rahman-closure", unvaried(closure), draw),
+        Study("rahman-rates", unvaried(rates), draw),
+        Study("rahman-forces", unvaried(forces), draw),
+        Study("rahman-conclusions", unvaried(conclusions)),
     )
 }

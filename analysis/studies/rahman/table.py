@@ -131,7 +131,8 @@ def _figures() -> Iterator[Figure]:
             what = "Slider displacement" if symbol == "S4" else f"Joint {kind}"
             shown = () if symbol == "S4" else (symbol,)
             title = f"{what} {symbol}; {FAMILIES[family].title}"
-            yield Figure(family, shown, title, f"section 3.2, L1111-1113{caption}")
+            judged = "L1125" + ("; L1119, L1127" if kind == "torque" else "")
+            yield Figure(family, shown, title, f"section 3.2, L1111-1113{caption}; statements, {judged}")
             number += 1
 
 
