@@ -331,9 +331,8 @@ def closure() -> StudyResult:
             "what the combination, as we read it, leaves of the rotation round the loop and of S4, greatest of the turn",
             f"{ROUNDING}; the closure with true ball joints leaves less",
             tuple(combined),
-            "the thesis prints the Newton-Raphson half alone (eqs 7 to 26). The other half takes the iteration to "
-            "the least error, and beyond the limits of section 3.2, but outside the plane the loop of eqs 2 and 3 "
-            "has none that closes (erratum 1)",
+            "the thesis prints the Newton-Raphson half alone (eqs 7 to 26). The other half goes on to the "
+            "least sum of squares of eq 25, but outside the plane the loop of eqs 2 and 3 cannot close (erratum 1)",
         ),
         Statement(
             "[Delta = (A'A)^-1 A'V] which is exactly same as [Delta = A^-1 V].",
