@@ -13,7 +13,7 @@ from . import ENTRIES, STUDIES, file_stem, load
 from .rows import rows, table
 from .statements import FAILS, HOLDS, IN_PART, LISTING, OUTCOMES, TEXT, UNJUDGED, Statement
 
-#: Folder of the plots beside the page, width of one with a single panel (in, px), and most bytes.
+#: Folder of the plots beside the page, their width (in, px) and most bytes.
 PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
 #: What a page has of a statement: its quote, kind of source and place, measure and tolerance, verdict.
 _STATEMENT = re.compile(
@@ -48,7 +48,7 @@ def figures(numbers: Iterable[str], folder: Path) -> str:
             lines += [f"![{result.heading}]({plot})", ""]
         lines += [f"`linkwork figures {number}`", ""]
         if result.see:
-            lines += [f"The statements on it are judged at Fig {result.see}.", ""]
+            lines += [f"Statements that concern it are judged at Fig {result.see}.", ""]
         for statement in result.statements:
             lines += block(statement)
         lines += table(result.verdicts)
@@ -79,11 +79,12 @@ def _escaped(text: str) -> str:
 
 
 def save_small(figure: Figure, path: Path) -> None:
-    """Write a plot in the quality that keeps it below `MOST_BYTES`; one of `WIDTH_IN` has `WIDTH_PX`, a wider one more.
-
-    The figure keeps its size, since it is laid out for it.
-    """
+    """Write a plot of `WIDTH_PX`, in the quality that keeps it below `MOST_BYTES`."""
     path.parent.mkdir(exist_ok=True)
+    width, height = figure.get_size_inches()
+    figure.set_layout_engine("constrained")
+    # panels beside each other need more height for their labels
+    figure.set_size_inches(WIDTH_IN, height * WIDTH_IN / width * (1.15 if width > 8.0 else 1.0))
     for quality in (80, 60, 40, 20):
         figure.savefig(path, dpi=WIDTH_PX / WIDTH_IN, format="webp", pil_kwargs={"quality": quality, "method": 6})
         if path.stat().st_size <= MOST_BYTES:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import NamedTuple
+from typing import NamedTuple, SupportsFloat
 
 import numpy as np
 
@@ -102,7 +102,13 @@ class Case:
 
 
 def near(
-    label: str, stated: str | float, computed: float, tolerance: float | None = None, unit: str = "", *, why: str = ""
+    label: str,
+    stated: str | float,
+    computed: SupportsFloat,
+    tolerance: float | None = None,
+    unit: str = "",
+    *,
+    why: str = "",
 ) -> Case:
     """Judge a value: a number as printed (a text), by default to half a unit of its last digit, or one said in words."""
     value = float(stated)
@@ -111,17 +117,17 @@ def near(
     return _case(label, stated, computed, unit, why, lower=value - tolerance, upper=value + tolerance)
 
 
-def at_least(label: str, stated: str | float, computed: float, unit: str = "", *, why: str = "") -> Case:
+def at_least(label: str, stated: str | float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
     """Judge a lower bound: a number as printed (a text), or one that is said in words."""
     return _case(label, stated, computed, unit, why, lower=float(stated))
 
 
-def at_most(label: str, stated: str | float, computed: float, unit: str = "", *, why: str = "") -> Case:
+def at_most(label: str, stated: str | float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
     """Judge an upper bound: a number as printed (a text), or one that is said in words."""
     return _case(label, stated, computed, unit, why, upper=float(stated))
 
 
-def _case(label: str, stated: str | float, computed: float, unit: str, why: str, **bounds: float) -> Case:
+def _case(label: str, stated: str | float, computed: SupportsFloat, unit: str, why: str, **bounds: float) -> Case:
     printed = stated if isinstance(stated, str) else ""
     return Case(label=label, stated=printed, computed=float(computed), unit=unit, why=why, **bounds)
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from linkwork.errors import InputError
+
 from ..figures import Curve, Figure
-from ..files import save_figure, write_csv
+from ..files import save_figure, unknown_name, write_csv
 from . import STUDIES, file_stem, is_figure
 from .rows import OURS as OURS
 from .rows import Verdict as Verdict
@@ -23,6 +26,7 @@ from .statements import TEXT as TEXT
 from .statements import Statement
 from .statements import listing as listing
 from .statements import text as text
+from .variation import varied, words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,35 +63,63 @@ class StudyResult:
 
     @property
     def heading(self) -> str:
-        """Heading of the plot: the figure's number and title."""
-        return f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title
+        """Heading of the plot: the figure's number and title, and what its reader has changed."""
+        changes = f"; {words()}" if words() else ""
+        return (f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title) + changes
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Figure of a thesis, or statements without one: functions that compute, draw and, for some, animate it."""
+    """Figure of a thesis, or statements without one: functions that compute, draw and, for some, animate it.
+
+    ``sweeps`` are the parameters whose values the study compares, so that its reader cannot set them.
+    """
 
     number: str
     compute: Callable[[], StudyResult]
     draw: Callable[[StudyResult], Figure] | None = None
     animate: Callable[[StudyResult, Path], Path] | None = None
+    sweeps: tuple[str, ...] = ()
 
-    def make(self, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
+    def make(
+        self, out: str | Path = "out", changes: Mapping[str, Any] | None = None
+    ) -> tuple[StudyResult, tuple[Path, ...]]:
         """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths.
 
-        A study without a plot writes nothing.
+        A study without a plot writes nothing. ``changes`` are values of its mechanism's parameters by name, numbers in SI or
+        texts with their units; the names of its files then end in ``_varied``.
+
+        Raises
+        ------
+        InputError
+            If the study compares values of a changed parameter itself, or its mechanism has no such parameter.
         """
-        result = self.compute()
+        changes = changes or {}
+        for name in changes:
+            if name in self.sweeps:
+                raise InputError(f"figure {self.number} compares values of {name} itself: change another parameter")
+        with varied(changes) as known:
+            result = self.compute()
+            for name in changes:
+                if not known:
+                    raise InputError(
+                        f"figure {self.number} has no parameters that can be changed: {name} means nothing in it"
+                    )
+                if name not in known:
+                    raise unknown_name(name, sorted(known), f"parameter {name!r} of figure {self.number}")
+            return result, self._written(result, Path(out), "_varied" if changes else "")
+
+    def _written(self, result: StudyResult, out: Path, ending: str) -> tuple[Path, ...]:
         if self.draw is None:
-            return result, ()
-        stem = Path(out) / file_stem(self.number)
+            return ()
+        stem = out / f"{file_stem(self.number)}{ending}"
         paths = [
             save_figure(self.draw(result), stem.with_suffix(".png")),
             write_csv(stem.with_suffix(".csv"), result.columns),
         ]
         if self.animate:
             paths.append(self.animate(result, stem.with_suffix(".gif")))
-        return result, tuple(paths)
+        return tuple(paths)
 
 
 def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:

@@ -197,6 +197,12 @@ class TestFormulation:
         w = formulation.solved(*formulation.closed(0.0, 0.0, formulation.OMEGA, 0.0))
         assert w[0] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * published.DYN_CM, rel=1e-9)
 
+    def test_closure_shows_nothing_where_kinematics_close_the_loop(self) -> None:
+        run = formulation.integrated(4e-3)
+        assert run.errors[1] > 1e-3
+        assert run.unseen < 1e-12
+        assert run.gap.max() > run.errors[0]
+
     def test_milne_grows_where_hamming_decays(self) -> None:
         """Milne's corrector by steps on y' = -y from a start that is off by 1e-8."""
         h, y = 0.1, [1.0, np.exp(-0.1) + 1e-8]

@@ -12,7 +12,10 @@ from PIL import Image
 from analysis import studies
 from analysis.studies.page import block
 from analysis.studies.statements import FAILS, HOLDS, IN_PART, UNJUDGED, Case, Statement, at_least, at_most, near, text
+from analysis.studies.variation import cache, varied, vary
+from analysis.units import INCH
 from linkwork.errors import InputError
+from linkwork.slider_crank.published import parameters
 
 from .results import check
 
@@ -32,7 +35,7 @@ def test_there_is_a_study_of_every_figure() -> None:
     ]
     ours = ["quality", "control", "rig-1-resonance", "rig-1-friction", "rig-2-forces", "conclusions", "linkage"]
     assert list(studies.YOUSSEF) == [*asked, *ours]
-    words = [f"rahman-{word}" for word in ("constant", "closure", "rates", "forces")]
+    words = [f"rahman-{word}" for word in ("constant", "closure", "rates", "forces", "conclusions")]
     assert list(studies.RAHMAN) == [f"R{n}" for n in range(5, 39)] + words
     assert list(studies.STUDIES) == [*studies.YOUSSEF, *studies.RAHMAN]
     for number in studies.STUDIES:
@@ -61,6 +64,43 @@ def test_the_linkage_is_animated(tmp_path: Path) -> None:
     assert [path.name for path in paths] == ["linkage.png", "linkage.csv", "linkage.gif"]
     with Image.open(paths[2]) as image:
         assert image.n_frames == 72
+
+
+class TestVariation:
+    """Parameters of a study that its reader varies."""
+
+    def test_the_curves_are_those_of_the_changed_mechanism(self, tmp_path: Path) -> None:
+        changed, paths = studies.make("R6", tmp_path, {"rod.length": "45 in"})
+        assert [path.name for path in paths] == ["fig_R6_varied.png", "fig_R6_varied.csv"]
+        assert changed.columns["S4; ideal [in]"][0] == pytest.approx((45.0**2 - 12.0**2) ** 0.5)
+        # and the next is the thesis's again
+        plain, _ = studies.make("R6", tmp_path)
+        assert plain.columns["S4; ideal [in]"][0] == pytest.approx((50.0**2 - 12.0**2) ** 0.5)
+
+    @pytest.mark.parametrize(
+        ("number", "name", "words"),
+        [
+            ("R6", "rod.lenght", "did you mean rod.length"),
+            ("R6", "guide.twist", "compares values of guide.twist itself"),
+            ("rahman-forces", "rod.length", "has no parameters that can be changed"),
+        ],
+    )
+    def test_a_parameter_without_meaning_is_refused(self, tmp_path: Path, number: str, name: str, words: str) -> None:
+        with pytest.raises(InputError, match=words):
+            studies.make(number, tmp_path, {name: 1.0})
+
+    def test_what_is_kept_is_kept_by_the_changes(self) -> None:
+        """A function that is called with the same arguments gives the changed mechanism's result, and tells its parameters."""
+
+        @cache
+        def rod() -> float:
+            return vary(parameters()).rod_length
+
+        for changes, length in (({}, 50.0 * INCH), ({"rod.length": 1.0}, 1.0), ({}, 50.0 * INCH)):
+            for _ in range(2):
+                with varied(changes) as known:
+                    assert rod() == pytest.approx(length)
+                assert "rod.length" in known
 
 
 class TestStatements:

@@ -34,24 +34,24 @@ from .runs import (
 )
 
 FINDINGS = """\
-**Claims.** Chapter II and section 3.1 write the mechanism with Lagrange's multipliers, say that these are the pin forces, and
-advise to integrate all second derivatives, so that the closure of the loop checks the integration. Sections 3.2 and 3.3 run
-Table 3.1: without a spring, with three springs, launched by a torque, and left to itself.
+**Claims.** Chapter II and section 3.1 write the mechanism with Lagrange's multipliers, say that these are the pin
+forces, and advise to integrate all second derivatives, so that the closure of the loop checks the integration.
+Sections 3.2 and 3.3 run Table 3.1: without a spring, with three springs, launched by a torque, and left to itself.
 
-**What stands.** The equations (3.8) and (3.10) are right to the last sign; the multipliers are the force at C and the crank
-torque; and the failure of closure does tell the error, being some five to fifteen times that of the slider. The program of
-appendix 1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The torque reverses near
-0 deg and hardly depends on the spring; launches, the decay by the damper, the phase planes, and the resonance of the second
-harmonic at half the natural frequency are as described.
+**What stands.** The equations (3.8) and (3.10) are right to the last sign; the multipliers are the force at C and the
+crank torque; and the failure of closure does tell the error, being some five to fifteen times that of the slider. The
+program of appendix 1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The
+torque reverses near 0 deg and hardly depends on the spring; launches, the decay by the damper, the phase planes, and
+the resonance of the second harmonic at half the natural frequency are as described.
 
-**What does not.** Without a spring the slider does not drift along a line: gravity and the mean of the inertia forces push it towards
-the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look straight. Gravity
-holds the drift back: without it, M is greater by a quarter in size, and so not slightly reduced. With the softer springs the
-transient outlasts the first cycle. With the stiffest the least position comes at 5 deg, not at 0; a spring stiffer still does not
-make the slope constant. The torque varies with the spring at its extremes, but not because the slider's accelerations differ: they
-make 3 % of the difference at the least torque. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. The
-second harmonic near 27 rad/s goes on growing as the speed falls further. And Milne's method, which the thesis takes for as stable as
-Hamming's, is weakly unstable."""
+**What does not.** Without a spring the slider does not drift along a line: gravity and the mean of the inertia forces
+push it towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look
+straight. Gravity holds the drift back: without it, M is greater by a quarter in size, and so not slightly reduced.
+With the softer springs the transient outlasts the first cycle. With the stiffest the least position comes at 5 deg,
+not at 0; a spring stiffer still does not make the slope constant. The torque varies with the spring at its extremes,
+but not because the slider's accelerations differ: they make 3 % of the difference at the least torque. T0 is not
+hyperbolic in the time of a launch; T0 t^2 is nearly constant. The second harmonic near 27 rad/s goes on growing as
+the speed falls further. And Milne's method, which the thesis takes for as stable as Hamming's, is weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
@@ -161,16 +161,14 @@ def drift_result() -> StudyResult:
     return StudyResult(
         number="3.2",
         claim="Without a spring the slider has a transient of two turns, then a steady motion about a linear drift; "
-        "the "
-        "weaker the damper, the sooner the links come collinear.",
+        "the weaker the damper, the sooner the links come collinear.",
         columns=padded(columns),
         statements=(
             Statement(
                 "The first of these is a transient region of duration approximately two cycles.",
                 text("3.2.1, L1905-1907"),
                 f"cycles in which the slider's free motion falls to {ALIKE:g}, with the weakest damper, whose "
-                "transient is the "
-                "longest of the figure",
+                "transient is the longest of the figure",
                 "half a cycle, since the text counts whole ones",
                 (near(_mu(DAMPINGS[0]), "2", settling, unit="cycles"),),
             ),
@@ -178,27 +176,25 @@ def drift_result() -> StudyResult:
                 "The second consists of a steady periodic motion superimposed upon a drift.",
                 text("3.2.1, L1907-1911"),
                 "change of the motion's shape from the third cycle to the fourth, relative to its range; with the "
-                "weakest damper "
-                "the links are collinear before",
+                "weakest damper the links are collinear before",
                 ALIKE_WORDS,
                 tuple(shapes),
             ),
             Statement(
-                "The drift is linear with crank angle and may be described by the equation u = M[.θ2 + u0].",
+                "The drift is linear with crank angle and may be described by the equation u = M[.theta2 + u0].",
                 text("3.2.1, L1911-1915"),
                 f"greatest distance of u at the ends of the first {DRAWN_TURNS} cycles, or of those before the links "
-                "are "
-                "collinear, from their best line, relative to the drift over them",
+                "are collinear, from their best line, relative to the drift over them",
                 ALIKE_WORDS,
                 tuple(bends),
             ),
             Statement(
-                "This indicates that for a small viscous force the linkage tends to collapse quickly into a collinear "
-                "configuration. However, as the viscous force is increased this tendency is counteracted.",
+                "This indicates that for a small viscous force the linkage tends to collapse quickly into a "
+                "collinear configuration. However, as the viscous force is increased this tendency is counteracted.",
                 text("3.2.1, L1917-1925"),
                 f"cycles until abs(sin(th4 - th3)) < {COLLINEAR_SINE:g}, "
-                f"{', '.join(f'{n:.1f}' for n in folds.values())} "
-                "and, with the strongest damper, more than 40, relative to those with the next stronger damper",
+                f"{', '.join(f'{n:.1f}' for n in folds.values())} and, with the strongest damper, more than 40, "
+                "relative to those with the next stronger damper",
                 SIGN,
                 tuple(sooner),
             ),
@@ -223,8 +219,7 @@ def weightless_result() -> StudyResult:
                 "equation (3.9) is slightly reduced.",
                 text("3.2.1, L1928-1932"),
                 "M over the first cycle without gravity relative to that with it, for the two dampers with which the "
-                "drift is nearly "
-                "linear",
+                "drift is nearly linear",
                 f"from {1 - SLIGHTLY:g} to {1 - ALIKE:g}, the rule for *slightly*",
                 tuple(
                     Case(label=_mu(mu), computed=x, lower=1.0 - SLIGHTLY, upper=1.0 - ALIKE) for mu, x in ratios.items()
@@ -290,8 +285,7 @@ def steady_result() -> StudyResult:
         number="3.4",
         assignment='The scan has "220" for the crank angle of the least position (L1962): read as 22 deg.',
         claim="After a turn of transient the slider swings steadily between its start and the crank shaft; a stiffer "
-        "spring "
-        "moves the mean position towards the start, and the least position to a smaller crank angle.",
+        "spring moves the mean position towards the start, and the least position to a smaller crank angle.",
         columns=padded(columns),
         statements=(*_steady_statements(), *_shape_statements()),
     )
@@ -311,22 +305,19 @@ def _steady_statements() -> list[Statement]:
     later = "the transient goes on"
     return [
         Statement(
-            "The figure shows that due to the initial condition assumptions that u and [u' = 0] a transient effect is "
-            "shown "
-            "over the first cycle.",
+            "The figure shows that due to the initial condition assumptions that u and [u' = 0] a transient effect "
+            "is shown over the first cycle.",
             text("3.2.1, L1944-1948"),
             "greatest distance of u from the steady motion in the second cycle, relative to its range",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x, why=later) for k, x in away.items()),
         ),
         Statement(
-            "The steady state motion is periodic and oscillates about a mean position between the initial position of "
-            "the "
-            "slider and the crank shaft.",
+            "The steady state motion is periodic and oscillates about a mean position between the initial position "
+            "of the slider and the crank shaft.",
             text("3.2.1, L1948-1954"),
             "change of u from one cycle to the next, relative to its range; mean of u, which is 0 at the start and "
-            f"{shaft:g} cm at "
-            "the shaft",
+            f"{shaft:g} cm at the shaft",
             ALIKE_WORDS,
             (
                 at_most("change, greatest of the springs", ALIKE, change),
@@ -344,8 +335,8 @@ def _steady_statements() -> list[Statement]:
             (at_most("greatest", 1.0, greatest_ratio(np.array(list(means.values())))),),
         ),
         Statement(
-            "The minimum value of the oscillation for the case of k=5[x 10^5] dyne/cm occurs at crank angle [θ2 = 22 "
-            "deg].",
+            "The minimum value of the oscillation for the case of k=5[x 10^5] dyne/cm occurs at crank angle [theta2 "
+            "= 22 deg].",
             text("3.2.1, L1958-1962"),
             "crank angle of the least u",
             f"{READ_DEG:g} deg, to which a graph can be read",
@@ -353,8 +344,7 @@ def _steady_statements() -> list[Statement]:
         ),
         Statement(
             "However, as k is increased this minimum oscillation occurs at smaller crank angle and eventually occurs "
-            "at zero "
-            "degrees for k=2[x 10^6 dyne/cm].",
+            "at zero degrees for k=2[x 10^6 dyne/cm].",
             text("3.2.1, L1962-1966"),
             "crank angle of the least u: its growth from spring to spring, and its value",
             f"{SIGN}; {READ_DEG:g} deg, to which a graph can be read",
@@ -382,8 +372,7 @@ def _shape_statements() -> list[Statement]:
     return [
         Statement(
             "The rate of change of the slider position is approximately the same for all the response curves between "
-            "the "
-            "minimum and maximum values.",
+            "the minimum and maximum values.",
             text("3.2.1, L1966-1972"),
             "mean slope of u between the two, greatest over least of the three springs",
             f"{ABOUT:g}, the rule for *approximately*",
@@ -394,28 +383,24 @@ def _shape_statements() -> list[Statement]:
         ),
         Statement(
             "However, as the spring stiffness is increased the spring force becomes dominant and the width of the "
-            "response "
-            "curve is decreased.",
+            "response curve is decreased.",
             text("3.2.1, L1972-1976"),
             "width, read as the crank angle from the least to the greatest u, relative to that with the next softer "
-            "spring; the "
-            f"height grows, by {100 * (ranges[-1] / ranges[0] - 1):.0f} % from the softest to the stiffest",
+            f"spring; the height grows, by {100 * (ranges[-1] / ranges[0] - 1):.0f} % from the softest to the "
+            "stiffest",
             SIGN,
             (at_most("greatest", 1.0, greatest_ratio(widths)),),
         ),
         Statement(
             "Eventually, although not shown on this figure, as k increases further the slope of the response curve "
-            "takes a "
-            "constant value between the maximum and minimum values of the oscillation on the portions of the curve "
-            "below the "
-            "zero degree crank angle positions.",
+            "takes a constant value between the maximum and minimum values of the oscillation on the portions of the "
+            "curve below the zero degree crank angle positions.",
             text("3.2.1, L1976-1986"),
             "range of the slope between the greatest and the least u, relative to its mean",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x) for k, x in varies.items()),
-            "the stiffer the spring, the more the slider swings on it, and the motion tends to the inertia force over "
-            "k, which is "
-            "no line",
+            "the stiffer the spring, the more the slider swings on it, and the motion tends to the inertia force "
+            "over k, which is no line",
         ),
     ]
 
@@ -518,12 +503,12 @@ def torque_result() -> StudyResult:
     return StudyResult(
         number="3.5",
         claim="The torque that holds the speed reverses suddenly about crank angle 0, and depends on the spring only "
-        "at its "
-        "extremes, where the slider's accelerations differ.",
+        "at its extremes, where the slider's accelerations differ.",
         columns=columns,
         statements=(
             Statement(
-                "The striking feature of the figure is the sudden reversal in torque in the region of [θ2 = 0 deg].",
+                "The striking feature of the figure is the sudden reversal in torque in the region of [theta2 = 0 "
+                "deg].",
                 text("3.2.1, L1989-1993"),
                 "crank angle at which the torque passes zero between its greatest and least value, "
                 f"{low_at + 360 - high_at:.0f} deg apart",
@@ -532,12 +517,11 @@ def torque_result() -> StudyResult:
             ),
             Statement(
                 "The other feature is that on the scale of the graph this torque is independent of the spring "
-                "stiffness k. The "
-                "exception is at the maximum and minimum values where a slight variation is recorded.",
+                "stiffness k. The exception is at the maximum and minimum values where a slight variation is "
+                "recorded.",
                 text("3.2.1, L1993-2001"),
                 "distance between the curves as it is seen, square to them, on a graph as wide as it is high, "
-                "relative to its "
-                "size; spread of the extremes between the springs, relative to the peak",
+                "relative to its size; spread of the extremes between the springs, relative to the peak",
                 f"{ALIKE_WORDS}; the spread of an extreme is more than that distance and at most {SLIGHTLY:g}, the "
                 "rule for *slight*",
                 (
@@ -560,16 +544,13 @@ def torque_result() -> StudyResult:
                 "the extremes",
                 "more than half",
                 tuple(at_least(f"{name} torque", 0.5, x) for name, (x, _) in shares.items()),
-                "at the least torque the acceleration makes hardly any of it, and at the greatest it acts against it: "
-                "the terms with the "
-                "squares of the velocities, at another position, make the difference",
+                "at the least torque the acceleration makes hardly any of it, and at the greatest it acts against "
+                "it: the terms with the squares of the velocities, at another position, make the difference",
             ),
             Statement(
                 "The independence of [the] torque of the stiffness k may be explained by the fact that the spring "
-                "presents no "
-                "external load on the mechanism. The only effect results from the slight change in the geometry which "
-                "leads to "
-                "changes in inertial loads.",
+                "presents no external load on the mechanism. The only effect results from the slight change in the "
+                "geometry which leads to changes in inertial loads.",
                 text("3.2.1, L2005-2013"),
                 "share of the inertial loads, all but the weight, in the same difference",
                 f"{ALIKE:g}, the rule for *the same*",

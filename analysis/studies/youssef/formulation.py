@@ -177,28 +177,24 @@ def compute() -> StudyResult:
     return StudyResult(
         number="3.1",
         claim="The multipliers are the pin forces; with all second derivatives integrated, the closure of the loop "
-        "tells the "
-        "error of the integration.",
+        "tells the error of the integration.",
         columns=columns,
         statements=(
             Statement(
                 "[T]he multipliers are equal to the internal forces components and the input torque.",
                 text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
                 "solution of (3.1) with the matrices (3.8) and (3.10) as printed, those of 3.2.2 for a torque, less "
-                "the plant's torque, "
-                "force of the rocker on the coupler and accelerations, relative to the greatest; Table 3.1, k = 1e6 "
-                "dyn/cm, 0.3 s",
+                "the plant's torque, force of the rocker on the coupler and accelerations, relative to the greatest; "
+                "Table 3.1, k = 1e6 dyn/cm, 0.3 s",
                 f"{ROUNDING:g}, above rounding errors",
                 multipliers(),
             ),
             Statement(
                 "The accuracy or even the debugging of the integration procedure may then be examined by simple "
-                "checks on loop "
-                "closure.",
+                "checks on loop closure.",
                 text("3.1, L1744-1748; the same in L1772-1782"),
                 "greatest failure of closure over 0.5 s relative to the greatest error of u, all second derivatives "
-                "integrated by Hamming's "
-                "method with a constant step",
+                "integrated by Hamming's method with a constant step",
                 "1 to 100: the check shows an error, and no more than a hundred times as large as it is",
                 tuple(
                     Case(label=label, computed=run.gap.max() / run.errors[0], lower=1.0, upper=100.0)
@@ -207,11 +203,10 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "It is important to recognise that a loop closure check is meaningful other than for trivial "
-                "arithmetical checks, "
-                "only if used in conjunction with the first approach.",
+                "arithmetical checks, only if used in conjunction with the first approach.",
                 text("3.1, L1748-1757"),
-                "greatest error of u by the second approach, which integrates u alone and closes the loop by its kinematics, "
-                "relative to its failure of closure",
+                "greatest error of u by the second approach, which integrates u alone and closes the loop by its "
+                "kinematics, relative to its failure of closure",
                 "more than 100: the check shows nothing of the error",
                 tuple(at_least(label, 100.0, run.errors[1] / run.unseen) for label, run in found.items()),
             ),
@@ -227,9 +222,8 @@ def compute() -> StudyResult:
                 ),
             ),
             Statement(
-                "One of their most attractive qualities is that they require only two evaluations of the function [Φ] "
-                "per step "
-                "of integration.",
+                "One of their most attractive qualities is that they require only two evaluations of the function "
+                "[Phi] per step of integration.",
                 text("2.4, L1389-1393"),
                 "evaluations that a further step of (2.28) to (2.31) takes",
                 "none, they are counted",

@@ -40,8 +40,7 @@ TIME = "time [s]"
 #: Our choices in the launches.
 UNSAID = (
     "The text gives neither the damper of the launches nor, with three torques, the spring: here the damper of Fig "
-    "3.4 and the "
-    "middle one of its springs."
+    "3.4 and the middle one of its springs."
 )
 
 
@@ -201,8 +200,7 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 #: How the rise of the crank speed is judged.
 RISE = (
     "greatest distance of the crank speed, up to its peak, from the nearest line, relative to the peak; crank angle "
-    "of the peak, which "
-    "the points at 1 rad follow"
+    "of the peak, which the points at 1 rad follow"
 )
 
 
@@ -240,8 +238,7 @@ def _undamped(runs: Mapping[str, Trajectory], start: float) -> tuple[Case, ...]:
 SWINGS = "range of the crank speed in a turn over its mean; its mean relative to that of the turn before; in all free motions"
 UNDAMPED = (
     "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, "
-    "once the damper is "
-    "taken away with the torque"
+    "once the damper is taken away with the torque"
 )
 
 
@@ -266,28 +263,25 @@ def launch_speeds() -> StudyResult:
         runs,
         CRANK_SPEED,
         Statement(
-            "It is clear from the figure that during the time in which the torque T is acting the crank speed behaves "
-            "in a "
-            "linear manner up to the stage when the input torque becomes less than the torque sufficient to "
-            "accelerate the "
-            "mechanism. This stage occurs when the points p1 and p2 are reached.",
+            "It is clear from the figure that during the time in which the torque T is acting the crank speed "
+            "behaves in a linear manner up to the stage when the input torque becomes less than the torque "
+            "sufficient to accelerate the mechanism. This stage occurs when the points p1 and p2 are reached.",
             text("3.2.2, L2124-2134"),
             RISE,
             ALIKE_WORDS,
             _rise({label: accelerated(torque) for label, torque in zip(runs, TORQUES)}),
         ),
         Statement(
-            "The behaviour of the crank speed beyond [θ2] = 1 rad. in Fig. (3.6) is governed by the free motion "
-            "equations of "
-            "motion. However, it is oscillatory and decaying.",
+            "The behaviour of the crank speed beyond [theta2] = 1 rad. in Fig. (3.6) is governed by the free motion "
+            "equations of motion. However, it is oscillatory and decaying.",
             text("3.2.2, L2142-2147"),
             SWINGS,
             f"{ALIKE:g}, below which it would be steady; {SIGN}",
             _swings(runs, 1.0),
         ),
         Statement(
-            "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the next "
-            "section.",
+            "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
+            "next section.",
             text("3.2.2, L2147-2151"),
             f"{UNDAMPED}; with 2e8 dyn.cm the links are collinear after four turns",
             ALIKE_WORDS,
@@ -311,9 +305,8 @@ def torque_over_time() -> StudyResult:
                 "It shows a hyperbolic relationship[ ]between T0 and T asymptotic to T0 = 0 and T = 0.",
                 text("3.2.2, L2138-2142"),
                 "exponent of T0 in the time, mean of the two between the three torques; least T0 that turns the "
-                "crank by 1 rad, below which "
-                f"it falls back, relative to {scale:.0e} dyn.cm; time at 1e12 dyn.cm relative to that at "
-                f"{plain(TORQUES[0])}",
+                f"crank by 1 rad, below which it falls back, relative to {scale:.0e} dyn.cm; time at 1e12 dyn.cm "
+                f"relative to that at {plain(TORQUES[0])}",
                 f"{ALIKE_WORDS}; asymptotes to {SMALL:g}, the rule for *small*",
                 (
                     near("exponent, -1 in a hyperbola", -1.0, slope, ALIKE, why="T0 t^2 is nearly constant, not T0 t"),
@@ -355,19 +348,16 @@ def launch_positions() -> StudyResult:
         SLIDER,
         Statement(
             "As would be expected the response for [T0 = 2 x 10^8] takes longer before it settles and then starts a "
-            "steady state "
-            "decay.",
+            "steady state decay.",
             text("3.2.2, L2155-2159"),
             "turns until the mean of u is farthest from the start, with T0 = 2e8 dyn.cm less the greater of the "
-            "others; mean of u "
-            "relative to the turn before, from then on",
+            "others; mean of u relative to the turn before, from then on",
             SIGN,
             (at_least("turns longer", 1.0, later), _decay(turns)),
         ),
         Statement(
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
-            "would be "
-            "expected the shift from its initial position is greatest in the highest input torque case.",
+            "would be expected the shift from its initial position is greatest in the highest input torque case.",
             text("3.2.2, L2159-2167"),
             "greatest u, of the range of the graph; mean of u with T0 = 2e8 relative to 1e8 dyn.cm",
             f"{ALIKE_WORDS}; {SIGN}",
@@ -399,17 +389,15 @@ def launch_speeds_by_spring() -> StudyResult:
         CRANK_SPEED,
         Statement(
             "The figure shows the crank speed increasing linearly up to the point when the torque input becomes "
-            "smaller than "
-            "the torque required to accelerate the mechanism.",
+            "smaller than the torque required to accelerate the mechanism.",
             text("3.2.2, L2175-2181"),
             RISE,
             ALIKE_WORDS,
             _rise(rises),
         ),
         Statement(
-            "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of energy "
-            "in the "
-            "slider guide.",
+            "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
+            "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
             f"{SWINGS}; {UNDAMPED}",
             f"{ALIKE_WORDS}; {SIGN}",
@@ -417,8 +405,7 @@ def launch_speeds_by_spring() -> StudyResult:
         ),
         Statement(
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
-            "similar "
-            "loads and movement of slider.",
+            "similar loads and movement of slider.",
             text("3.2.2, L2187-2191"),
             "spread of the crank speed between the springs while the torque acts, relative to its peak",
             ALIKE_WORDS,
@@ -438,8 +425,7 @@ def launch_positions_by_spring() -> StudyResult:
     return _launch_result(
         "3.10",
         "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends "
-        "on spring "
-        "and torque, and then a steady decay.",
+        "on spring and torque, and then a steady decay.",
         runs,
         SLIDER,
         Statement(
@@ -452,8 +438,7 @@ def launch_positions_by_spring() -> StudyResult:
         ),
         Statement(
             "Fig. (3.10) also shows that as the torque is [r]emoved a transient free motion response prevails after "
-            "which "
-            "occurs a free motion steady state decay which is studied in the next section.",
+            "which occurs a free motion steady state decay which is studied in the next section.",
             text("3.2.2, L2195-2201"),
             "turns until the mean of u is farthest from the start; mean of u relative to the turn before, from then on",
             SIGN,
@@ -493,9 +478,8 @@ def _coast_result(
         claim=claim,
         assignment=(
             "The text does not say at which crank angle the torque is taken away, nor how long the motion is "
-            "followed: here at "
-            f"0 from the steady motion, until the mean crank speed falls below {HARMONIC_SPEED:g} rad/s, which the "
-            "text names."
+            f"followed: here at 0 from the steady motion, until the mean crank speed falls below {HARMONIC_SPEED:g} "
+            "rad/s, which the text names."
         ),
         columns={name: values[: last + 1] for name, values in columns.items()},
         statements=statements,
@@ -522,8 +506,7 @@ def _free_swings() -> Statement:
     turns = {label: Turns.of(coast(k)) for label, k in BOTH.items()}
     return Statement(
         "Both figures show that (1) The crank speed behaviour is oscillatory (2) The amplitude of oscillations "
-        "decreases with "
-        "crank angle and (3) The mean position of oscillation reduces with crank angle.",
+        "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
         text("3.3, L2241-2251"),
         "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest",
         f"{ALIKE:g}, below which it would be steady; {SIGN}",
@@ -547,12 +530,10 @@ def _free_causes() -> Statement:
     ]
     return Statement(
         "The oscillatory behaviour of the speed is due to the non-linearities of the system and the reduction in "
-        "speed is due "
-        "to viscous dissipation of energy in the slider.",
+        "speed is due to viscous dissipation of energy in the slider.",
         text("3.3, L2253-2259"),
         "change of the mechanical energy in a turn relative to that of the crank speed squared, greatest: without it "
-        "the speed swings because "
-        f"the inertia changes with the position; {UNDAMPED}",
+        f"the speed swings because the inertia changes with the position; {UNDAMPED}",
         f"less than half; {ALIKE_WORDS}",
         (*swings, *_undamped({label: coast(k, 0.0) for label, k in BOTH.items()}, 0.0)),
     )
@@ -597,27 +578,23 @@ def soft_phase_plane() -> StudyResult:
         SOFT,
         Statement(
             "Due to sampling of output data straight-line segments appear on the curves. These segments should in "
-            "fact be smooth "
-            "curves following the line pattern of the curves.",
+            "fact be smooth curves following the line pattern of the curves.",
             text("3.3, L2266-2276"),
             why="it is said of the drawing, which we do not have",
         ),
         Statement(
             "Both figures show the tendency of the phase plane plot towards the region u=[0, u'=0]. In so doing the "
-            "amplitude "
-            "of the oscillation decreases and a superimposed shift on the slider position, in the form of a drift "
-            "towards "
-            "u=[0], is noticeable.",
+            "amplitude of the oscillation decreases and a superimposed shift on the slider position, in the form of "
+            "a drift towards u=[0], is noticeable.",
             text("3.3, L2276-2287"),
             "range and distance of the mean of u from 0 relative to the turn before, from the fourth turn on, since "
-            "the first are the "
-            "transient of the release; greatest",
+            "the first are the transient of the release; greatest",
             SIGN,
             tuple(tending),
         ),
         Statement(
-            "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position of "
-            "oscillation further away from u=[0].",
+            "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "
+            "of oscillation further away from u=[0].",
             text("3.3, L2287-2293"),
             "drift of the mean of u, and its distance from 0 at the start, relative to those with k = 2e6 dyn/cm",
             SIGN,
@@ -681,16 +658,14 @@ def stiff_phase_plane() -> StudyResult:
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
             "mean crank speed at which the second harmonic over the speed squared, to which its force is "
-            "proportional, is greatest, relative to half the "
-            "natural frequency with the mean mass",
+            "proportional, is greatest, relative to half the natural frequency with the mean mass",
             f"{lowered:.3f}, by which the damper of the thesis lowers the peak of an oscillator",
             (near("", 1.0, resonance / half, lowered),),
         ),
         Statement(
             "It is however appreciated that a natural frequency of the mechanism in study is not a sharply defined "
-            "value but "
-            "extends over a range. This is due to the variable mass and inertia of the mechanism experienced by the "
-            "slider.",
+            "value but extends over a range. This is due to the variable mass and inertia of the mechanism "
+            "experienced by the slider.",
             text("3.3, L2307-2317"),
             "natural frequency with the least over that with the greatest effective mass of a turn",
             f"more than {ALIKE:g}, the rule for *the same*",
