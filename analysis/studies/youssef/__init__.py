@@ -10,7 +10,7 @@ from ..contents import Entry
 #: Figures in the order of the thesis, and our own studies: number or name, module (empty where there is nothing to compute),
 #: place in the thesis, title.
 _ROWS = (
-    ("3.1", "", "3.2.1, L1804", "The linkage with its loads"),
+    ("3.1", "formulation", "II, 3.1, L554-1804", "The linkage with its loads: equations and integration"),
     (
         "3.2",
         "chapter_3",
@@ -30,7 +30,7 @@ _ROWS = (
     ("3.13", "chapter_3", "3.3, L2260", "Free motion: phase plane of the slider; Table 3.1, k = 5e5 dyn/cm"),
     ("3.14", "chapter_3", "3.3, L2260", "Free motion: phase plane of the slider; Table 3.1, k = 2e6 dyn/cm"),
     ("4.1", "", "4.1, L2395", "Datum and perturbed linkage (sketch)"),
-    ("4.2", "", "4.2, L2481", "Linkage with spring and damper (sketch)"),
+    ("4.2", "linearised", "4.1 to 4.4, L2387-3107", "Linkage with spring and damper: the linearised equations"),
     ("4.3", "chapter_4", "4.5.1, L3128-3168", "First harmonic over the speed, undamped; three inertia ratios"),
     ("4.4", "chapter_4", "4.5.1, L3128-3168", "Second harmonic over the speed, undamped; three inertia ratios"),
     ("4.5", "chapter_4", "4.5.1, L3146-3156", "Deviation of the resonance over the inertia ratio"),

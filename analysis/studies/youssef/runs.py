@@ -18,15 +18,14 @@ from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE, TABLE_3
 
 from ...run import Inputs, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..rules import ALIKE
 
 #: Crank speed of chapter III (rpm).
 SPEED = 420.0
 #: Springs of Fig 3.4 to 3.14 (dyn/cm).
 STIFFNESSES = (5e5, 1e6, 2e6)
-#: Share of the scale of a graph below which its reader sees no difference.
-ON_THE_GRAPH = 0.05
-#: Relative departure from a line up to which a quantity counts as linear.
-LINEAR = 0.1
+#: Tolerances in the words of statements.
+ALIKE_WORDS, SIGN = f"{ALIKE:g}, the rule for what is steady, linear or the same", "none, the sign decides"
 #: Time for a motion to become steady (s).
 SETTLING_TIME = 8.0
 
