@@ -41,8 +41,13 @@ _ROWS = (
     ("5.3", "chapter_5", "5.3.1, L3886-3900", "First region of instability over the coupler's length, undamped"),
     ("5.4", "chapter_5", "5.3.2, L3910-3921", "First region of instability over the inertia ratio, damped"),
     ("6.1", "", "6.3.2, L4446", "The four-bar with its coupler point"),
-    ("6.2", "", "6.3.3, L4555", "Flow chart of the search"),
-    ("6.3", "", "6.4.1, L4716, L4804", "Area between curves of many points (a); the two closures of a four-bar (b)"),
+    ("6.2", "search", "6.3.3, L4555", "The search, of which the figure has the flow chart"),
+    (
+        "6.3",
+        "search",
+        "6.4.1, L4716, L4804",
+        "Area between curves of many points (a); the two closures of a four-bar (b)",
+    ),
     ("6.4", "chapter_6", "6.4.2 A, L4848", "Ellipse (a), timed"),
     ("6.5", "chapter_6", "6.4.2 A, L4848", "Ellipse (b), timed"),
     ("6.6", "chapter_6", "6.4.2 A, L4903", "Ellipse (a), timed, with bounds on the lengths"),
@@ -66,7 +71,12 @@ _ROWS = (
     ("8.1", "", "8.2.1.1, L6118", "Rig 1, a side plate of the guide removed"),
     ("8.2", "", "8.2.1.1, L6124", "Rig 1 from above: coupling to the motor, slider and guide"),
     ("8.3", "", "8.2.1.1, L6126", "Rig 1: exploded views of linkage (a) and guide (b)"),
-    ("8.4", "", "8.2.1.2, L6248, L6281", "Circuits of photocell (a) and displacement transducer (b)"),
+    (
+        "8.4",
+        "chapter_8",
+        "8.2.1.2, L6248, L6281",
+        "Circuits of photocell and transducer: the crank speed by its pulses",
+    ),
     ("8.5", "", "8.2.2, L6291", "Rig 2"),
     ("8.6", "chapter_8", "8.3.3, L6393", "Impulse response of the disconnected slider: the logarithmic decrement"),
     ("8.7", "chapter_8", "8.4.1.1, L6441", "Steady motion of the slider; rig 1, spring A, 360 rpm"),
@@ -89,6 +99,7 @@ _ROWS = (
     ("rig-1-resonance", "chapter_8", "", "Rig 1 about resonance: amplitude over the speed, springs A and B"),
     ("rig-1-friction", "chapter_8", "", "What friction explains of the amplitudes; rig 1, springs A and B"),
     ("rig-2-forces", "chapter_8", "", "Crank torque and pin forces over the speed; rig 2"),
+    ("conclusions", "conclusions", "8.0, 9.1", "Conclusions of the thesis"),
     ("linkage", "linkage", "", "The five-bar slider of Table 3.1 at 420 rpm"),
 )
 
