@@ -51,7 +51,7 @@ FloatArray = NDArray[np.float64]
 FINDINGS = """**Findings.** The thesis closes the loop of a slider-crank with an offset, a shift and a twist by 3x3 dual
 matrices, and finds from it all velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Read as
 algebra, most of it is right: the operators, the accelerations, the momenta of crank and rod and their rates, the inertia
-forces, the rate of a sinusoidal shift; and in the plane, with two signs mended (errata 5 and 6), its forces agree with
+forces, the rate of a sinusoidal shift; and in the plane, with the signs of errata 5 and 6 mended, its forces agree with
 Newton and Euler.
 
 Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum 1):
@@ -397,7 +397,7 @@ def _constant() -> tuple[Statement, ...]:
         Statement(
             "There are sixteen unknowns, including both forces and torques and seventeen equations. Although one equation is "
             "redundant, all seventeen equations have been used to avoid sine or cosine functions in the denominator as much as "
-            "possible",
+            "possible ...",
             text("section 2.8, L961"),
             "unknowns, 1F1k among them: the components of joint forces and moments less the torque that is given; greatest "
             "residual of eq 62e with the right forces and 1F1k = 0, of all cases",

@@ -318,7 +318,7 @@ def closure() -> StudyResult:
             "erratum 1: eqs 2 and 3 give each ball joint two rotations",
         ),
         Statement(
-            "hence [the] partial differential operator [Q] can be written as",
+            "hence partial differential operator [Q_L eta_2] can be written as,",
             text("section 2.5, eqs 2a to 4a, L320-352"),
             "difference of the operators times the matrices from difference quotients of the matrices",
             f"{ROUGH:g}, the error of the quotients",
@@ -1011,7 +1011,7 @@ def conclusions() -> StudyResult:
 #: Labels of the axes by the unit of their columns.
 _SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "row 37f", "[lb]": "4F4k"}
 #: Columns drawn dashed, over the others.
-_DASHED = ("37f mended", "both mended", "all eighteen")
+_DASHED = ("37f mended", "both mended", "Davidon")
 
 
 def draw(result: StudyResult) -> Figure:
