@@ -21,13 +21,12 @@ from analysis import cli
 from analysis.mechanisms import PUBLISHED
 from analysis.studies import RAHMAN, YOUSSEF
 from analysis.studies.page import MOST_BYTES, quotes
-from analysis.studies.rows import FAILS, UNJUDGED
-from analysis.studies.statements import HOLDS, IN_PART
+from analysis.studies.statements import FAILS, HOLDS, IN_PART
 from analysis.studio import PAGE, case_of
 from linkwork import __version__
 
 from .scripts import script_of_docs
-from .studies.results import expected, stated
+from .studies.results import expected
 
 ROOT = Path(__file__).parents[1]
 
@@ -60,11 +59,6 @@ def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name,
         assert len(verdicts) == len(expected(number)), "run: make docs FIGURES=1"
         for beginning, outcome in expected(number).items():
             assert [found for quote, found in verdicts.items() if quote.startswith(beginning)] == [outcome]
-    for kind, outcome in (("refuted", FAILS), ("unjudged", UNJUDGED)):
-        for number, part in zip(parts[1::2], parts[2::2]):
-            rows = [x for x in part.splitlines() if x.endswith(f" **{outcome}** |") and x.count(" | ") == 5]
-            found = {line.split(" | ")[0].removeprefix("| ") for line in rows}
-            assert found == stated(kind, number), "run: make docs FIGURES=1"
 
 
 @pytest.mark.parametrize("name", ["youssef.md", "rahman.md"])

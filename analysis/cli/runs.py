@@ -533,5 +533,5 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
             console.print("  with changed parameters: the verdicts are on the changed mechanism, not on the thesis")
         if result.see:
             console.print(f"  statements that concern it are judged at {result.see}", highlight=False)
-        for statement in (*result.statements, *result.verdicts):
+        for statement in result.statements:
             console.print(indent(str(statement), "  "), highlight=False, markup=False, soft_wrap=True)

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from ..figures import Figure
 from . import ENTRIES, STUDIES, file_stem, load
-from .rows import rows, table
-from .statements import FAILS, HOLDS, IN_PART, LISTING, OUTCOMES, TEXT, UNJUDGED, Statement
+from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement
 
 #: Folder of the plots beside the page, their width (in, px) and most bytes.
 PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
@@ -51,7 +50,6 @@ def figures(numbers: Iterable[str], folder: Path) -> str:
             lines += [f"Statements that concern it are judged at Fig {result.see}.", ""]
         for statement in result.statements:
             lines += block(statement)
-        lines += table(result.verdicts)
     return "\n".join(lines)
 
 
@@ -98,10 +96,9 @@ def quotes(page: str) -> list[tuple[str, str]]:
 
 def count(page: str) -> str:
     """Return a sentence with the number of statements on a page by their verdicts."""
-    kinds = [LISTING if kind == "program" else TEXT for _, kind, _ in _STATEMENT.findall(page)]
-    found = [*zip(kinds, (outcome for _, outcome in quotes(page))), *rows(page)]
-    number = Counter(outcome for _, outcome in found)
-    listed = sum(kind == LISTING for kind, _ in found)
+    found = _STATEMENT.findall(page)
+    number = Counter(outcome.lower() for *_, outcome in found)
+    listed = sum(kind == "program" for _, kind, _ in found)
     return (
         f"Of {len(found)} statements of the thesis {number[HOLDS]} hold, {number[IN_PART]} hold in part, "
         f"{number[FAILS]} do not hold, and {number[UNJUDGED]} cannot be judged, each with the reason. {listed or 'None'} of "

@@ -15,17 +15,7 @@ from linkwork.errors import InputError
 from ..figures import Curve, Figure
 from ..files import save_figure, unknown_name, write_csv
 from . import STUDIES, file_stem, is_figure
-from .rows import OURS as OURS
-from .rows import Verdict as Verdict
-from .rows import at_least as at_least
-from .rows import at_most as at_most
-from .rows import near as near
-from .rows import unjudged as unjudged
-from .statements import LISTING as LISTING
-from .statements import TEXT as TEXT
 from .statements import Statement
-from .statements import listing as listing
-from .statements import text as text
 from .variation import varied, words
 
 
@@ -54,7 +44,6 @@ class StudyResult:
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     statements: tuple[Statement, ...] = ()
     see: str = ""
-    verdicts: tuple[Verdict, ...] = ()
 
     @property
     def title(self) -> str:

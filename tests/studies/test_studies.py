@@ -13,6 +13,7 @@ from analysis import studies
 from analysis.studies.page import block
 from analysis.studies.statements import FAILS, HOLDS, IN_PART, UNJUDGED, Case, Statement, at_least, at_most, near, text
 from analysis.studies.variation import cache, varied, vary
+from analysis.studies.youssef import linkage
 from analysis.units import INCH
 from linkwork.errors import InputError
 from linkwork.slider_crank.published import parameters
@@ -156,3 +157,4 @@ class TestStatements:
 @pytest.mark.slow
 def test_the_study_of_the_linkage() -> None:
     check("linkage")
+    assert linkage.run()["closure.residual"].max() < 1e-12
