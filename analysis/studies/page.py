@@ -79,7 +79,7 @@ def _escaped(text: str) -> str:
 
 
 def save_small(figure: Figure, path: Path) -> None:
-    """Write a plot of `WIDTH_PX`, laid out anew, in the quality that keeps it below `MOST_BYTES`."""
+    """Write a plot of `WIDTH_PX`, in the quality that keeps it below `MOST_BYTES`."""
     path.parent.mkdir(exist_ok=True)
     width, height = figure.get_size_inches()
     figure.set_layout_engine("constrained")

@@ -17,8 +17,8 @@ from analysis.studies.study import OURS, StudyResult
 VERDICTS = tomllib.loads(Path(__file__).with_name("verdicts.toml").read_text(encoding="utf-8"))
 #: Studies whose results take more than a second or two.
 LONG = {
-    *("3.2", "4.2", "4.3", "4.4", "4.6", "4.7", "5.1", "5.2", "5.3", "5.4", "6.2", "6.7", "6.8", "6.9", "6.10", "6.11"),
-    *("7.2", "7.5"),
+    *("3.2", "4.2", "4.3", "4.4", "4.6", "4.7", "5.1", "5.2", "5.3", "5.4"),
+    *("6.2", "6.7", "6.8", "6.9", "6.10", "6.11", "7.2", "7.5"),
     *(f"7.{n}" for n in range(6, 13)),
     *(f"8.{n}" for n in (*range(7, 12), *range(13, 22))),
     *("rig-1-resonance", "rig-1-friction", "rig-2-forces", "rahman-closure", "rahman-rates"),

@@ -615,7 +615,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
         Statement(
             "This indicates that the basic and dominant harmonic in the slider motion is the first; the second is very "
             "small in comparison and no evidence of the third and higher harmonics exists.",
-            text(f"{section}, L6814; again L6965"),
+            text(f"{section}, L6814; again L6968"),
             "second and third harmonic over the first, the most from 300 to 1000 rpm",
             f"{SMALL:g}, the rule for *small*",
             tuple(at_most(f"spring {s}, harmonic {n}", SMALL, most[s][n - 2], why=why) for s in "CD" for n in (2, 3)),

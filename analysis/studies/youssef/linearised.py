@@ -294,7 +294,7 @@ def _quotients(equation: SliderEquation) -> tuple[FourierSeries, ...]:
 def draw(result: StudyResult) -> Figure:
     """Draw M, K and F over the crank angle."""
     angle, *names = result.columns
-    panels = []
+    panels: list[Panel] = []
     for name in dict.fromkeys(column.partition(";")[0] for column in names):
         chosen = {c: "" if panels else c.partition("; ")[2].partition(" [")[0] for c in names if c.startswith(name)}
         curves = [replace(curve, line=line) for curve, line in zip(curves_of(result, angle, chosen), ("-", "--", ":"))]
@@ -303,7 +303,7 @@ def draw(result: StudyResult) -> Figure:
                 x_label=angle, y_label=f"{name}, I4 = 1", curves=curves, x_range=(0.0, 360.0), x_ticks=range(0, 361, 90)
             )
         )
-    return plot_curves(panels, title=result.heading, columns=3, size=(3.4, 3.2))
+    return plot_curves(panels, title=result.heading, columns=2, size=(3.9, 2.9))
 
 
 #: The studies by number.

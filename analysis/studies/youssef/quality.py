@@ -178,7 +178,8 @@ def compute() -> StudyResult:
                 tuple(at_most(name, 1.0 + ALIKE, ratio, why="no minimum") for name, ratio in ratios.items()),
             ),
             Statement(
-                "It can be made to follow a logical process in the choice of the type of linkage until it finds a satisfactory result.",
+                "It can be made to follow a logical process in the choice of the type of linkage until it finds a "
+                "satisfactory result.",
                 text("6.5, L5140"),
                 why="no example is given; `linkwork slider-motion` with a `[strategy]` does so",
             ),
