@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +11,7 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT_DEG, ALIKE, SLIGHTLY
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, curves_of, padded
+from ..variation import cache
 from .rigs import (
     FASTEST,
     GRID,

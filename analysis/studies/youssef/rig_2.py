@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from math import sqrt
 
 import numpy as np
@@ -15,6 +15,7 @@ from ...youssef import HarmonicMotion, Variant, slider_equation, two_harmonics
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
+from ..variation import cache
 from .rigs import (
     FASTEST,
     LOST,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +30,7 @@ from ...periodic import (
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ALIKE
 from ..study import StudyResult
+from ..variation import cache, vary
 
 LOST = "the measured curve is lost with the figure"
 #: Relative rise of the amplitude that no one notices on a graph.
@@ -57,9 +57,9 @@ FINE, COARSE = 5e-3, 2e-2
 
 @cache
 def rig(spring: str, **changes: float) -> FiveBarParameters:
-    """Return the rig of a spring, with changes of its parameters."""
+    """Return the rig of a spring, with changes of its parameters and the reader's."""
     parameters: FiveBarParameters = replace(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters, **changes)
-    return parameters
+    return vary(parameters)
 
 
 def natural_speed(spring: str) -> float:
