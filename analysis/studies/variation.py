@@ -60,6 +60,13 @@ def vary(parameters: T) -> T:
     return replace(parameters, **values) if values else parameters  # type: ignore[type-var]
 
 
+def compared(name: str, values: tuple[float, ...], unit: str, per: float) -> tuple[float, ...]:
+    """Return the values of a parameter that a study compares, or the reader's alone, ``per`` of whose units are one in SI."""
+    return next(
+        ((per * quantity(value, unit, name),) for changed, value in _current().changes if changed == name), values
+    )
+
+
 def words() -> str:
     """Return the reader's changes in words; empty if there are none."""
     return ", ".join(f"{name} = {value}" for name, value in _current().changes)

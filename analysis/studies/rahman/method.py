@@ -281,12 +281,10 @@ def closure() -> StudyResult:
         if case != plane:
             columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
             columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
-            columns[f"rotation left with Davidon, Fletcher, Powell; {case.name} [deg]"] = np.interp(
+            columns[f"rotation left with Davidon Fletcher Powell; {case.name} [deg]"] = np.interp(
                 GRID_DEG, sparse, rotation
             )
-            columns[f"error of S4 with Davidon, Fletcher, Powell; {case.name} [in]"] = np.interp(
-                GRID_DEG, sparse, error
-            )
+            columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(GRID_DEG, sparse, error)
     singular, unmet = np.transpose([_conditions(case) for case in OPEN])
     missed, wrong = _detected()
     close_by = np.concatenate([found.steps for found in _ended(20.0)])

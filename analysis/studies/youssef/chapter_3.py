@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 from math import asin, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
+
+from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import mean_effective_mass
@@ -17,6 +18,7 @@ from ...youssef import balance
 from ..rules import ABOUT, ABOUT_DEG, ALIKE, READ_DEG, SLIGHTLY
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, curves_of, padded
+from ..variation import cache, compared
 from . import free_crank
 from .runs import (
     ALIKE_WORDS,
@@ -273,13 +275,18 @@ def _steady(stiffness: float) -> SteadyTurn:
     return steady_turn(table_3_1(stiffness), SPEED)
 
 
+def springs() -> tuple[float, ...]:
+    """Return the stiffnesses that Fig 3.4 compares, or the reader's (dyn/cm)."""
+    return compared("slider.stiffness", STIFFNESSES, "N/m", DYN_PER_CM_PER_NEWTON_PER_METRE)
+
+
 def steady_result() -> StudyResult:
     """Compute the motion from rest and the steady turn with each spring."""
-    turns = {k: _steady(k) for k in STIFFNESSES}
-    columns = {ANGLE: turns[1e6].angle_deg}
+    turns = {k: _steady(k) for k in springs()}
+    columns = {ANGLE: next(iter(turns.values())).angle_deg}
     columns |= {f"slider position u; {_k(k)} [cm]": turn.slider_cm for k, turn in turns.items()}
-    starts = {k: from_rest(k) for k in STIFFNESSES}
-    columns[TURNS] = np.linspace(0.0, 3.0, len(starts[1e6]))
+    starts = {k: from_rest(k) for k in turns}
+    columns[TURNS] = np.linspace(0.0, 3.0, len(next(iter(starts.values()))))
     columns |= {f"u from the start; {_k(k)} [cm]": CM_PER_METRE * run["slider.position"] for k, run in starts.items()}
     return StudyResult(
         number="3.4",
@@ -287,7 +294,8 @@ def steady_result() -> StudyResult:
         claim="After a turn of transient the slider swings steadily between its start and the crank shaft; a stiffer "
         "spring moves the mean position towards the start, and the least position to a smaller crank angle.",
         columns=padded(columns),
-        statements=(*_steady_statements(), *_shape_statements()),
+        # the statements compare the three springs
+        statements=(*_steady_statements(), *_shape_statements()) if springs() == STIFFNESSES else (),
     )
 
 
@@ -408,8 +416,8 @@ def _shape_statements() -> list[Statement]:
 def draw_steady(result: StudyResult) -> Figure:
     """Draw the motion from the start over three turns, and the steady turns with a cross at each least position."""
     columns = result.columns
-    from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in STIFFNESSES}
-    names = [f"slider position u; {_k(k)} [cm]" for k in STIFFNESSES]
+    from_start = {f"u from the start; {_k(k)} [cm]": scientific(k) for k in springs()}
+    names = [f"slider position u; {_k(k)} [cm]" for k in springs()]
     crosses = []
     for colour, name in zip(COLOURS, names):
         place, value = least(columns[ANGLE][:1441], columns[name][:1441])
@@ -578,10 +586,10 @@ def draw_torque(result: StudyResult) -> Figure:
 STUDIES = {
     study.number: study
     for study in (
-        Study("3.2", drift_result, draw_drift),
-        Study("3.3", weightless_result, draw_drift),
+        Study("3.2", drift_result, draw_drift, sweeps=("slider.damping",)),
+        Study("3.3", weightless_result, draw_drift, sweeps=("slider.damping", "gravity")),
         Study("3.4", steady_result, draw_steady),
-        Study("3.5", torque_result, draw_torque),
+        Study("3.5", torque_result, draw_torque, sweeps=("slider.stiffness",)),
         *free_crank.STUDIES,
     )
 }

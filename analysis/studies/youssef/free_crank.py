@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from math import pi
 
 import numpy as np
@@ -21,6 +21,7 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
+from ..variation import cache
 from .runs import ALIKE_WORDS, SIGN, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
 
 #: Torques of Fig 3.6 to 3.8, and those of the curve of 3.7 (dyn.cm).
@@ -695,8 +696,8 @@ STUDIES = (
     Study("3.6", launch_speeds, _by_torques),
     Study("3.7", torque_over_time, draw_torque_over_time),
     Study("3.8", launch_positions, _by_torques),
-    Study("3.9", launch_speeds_by_spring, _by_springs),
-    Study("3.10", launch_positions_by_spring, _by_springs),
+    Study("3.9", launch_speeds_by_spring, _by_springs, sweeps=("slider.stiffness",)),
+    Study("3.10", launch_positions_by_spring, _by_springs, sweeps=("slider.stiffness",)),
     Study("3.11", partial(free_speed, "3.11", SOFT), draw_free_speed),
     Study("3.12", partial(free_speed, "3.12", STIFF), draw_free_speed),
     Study("3.13", soft_phase_plane, draw_phase_plane),

@@ -57,7 +57,7 @@ FINE, COARSE = 5e-3, 2e-2
 
 @cache
 def rig(spring: str, **changes: float) -> FiveBarParameters:
-    """Return the rig of a spring, with changes of its parameters."""
+    """Return the rig of a spring, with the reader's changes of its parameters, and then these."""
     parameters: FiveBarParameters = replace(
         vary(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters), **changes
     )
