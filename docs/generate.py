@@ -78,21 +78,28 @@ def symbols(of: str, page: str) -> str:
 
 
 def figures(of: str, page: str) -> str:
-    """Compute the studies of one of `CHAPTERS` and return them with their verdicts."""
+    """Compute the studies of one of `CHAPTERS`, draw their plots, and return them with their verdicts."""
     from analysis.studies import ENTRIES, is_figure
     from analysis.studies.page import figures
 
     def part(number: str) -> str:
         return "R" if number.startswith(("R", "rahman-")) else number[0] if is_figure(number) else "ours"
 
-    return figures(number for number in ENTRIES if part(number) == of)
+    return figures((number for number in ENTRIES if part(number) == of), HERE)
 
 
 def count(of: str, page: str) -> str:
-    """Return a sentence with the number of verdicts on the page that hold."""
+    """Return a sentence with the number of statements on the page by their verdicts."""
     from analysis.studies.page import count
 
     return count(page)
+
+
+def rule(of: str, page: str) -> str:
+    """Return the rule for the theses' words of degree."""
+    from analysis.studies.rules import RULE
+
+    return RULE
 
 
 def probe(of: str, page: str) -> str:
@@ -151,7 +158,7 @@ def masters(of: str, page: str) -> str:
 CHAPTERS = (*"345678", "R", "ours")
 #: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
-    "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
+    "symbols": symbols, "figures": figures, "count": count, "rule": rule, "probe": probe, "race": race,
     "crossing": crossing, "accuracy": accuracy, "masters": masters,
 }  # fmt: skip
 

@@ -8,14 +8,9 @@ and degrees, as printed; the factors to SI are at the top. Nothing here is the o
 
 from __future__ import annotations
 
-from analysis.studies.rahman.table import (  # noqa: F401
-    DEAD_CENTRES_DEG,
-    GREATEST_SHIFTS_IN,
-    SPOTS,
-    STROKES_BY_TWIST_IN,
-    STROKES_IN,
-    Spot,
-)
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 # One of the unit, in SI
 INCH = 0.0254
@@ -32,3 +27,43 @@ CRANK_RADIUS_IN, ROD_RADIUS_IN, SLIDER_SIDE_IN = 1.5, 1.0, 3.0
 DENSITY_LB_IN3, GRAVITY_IN_S2 = 0.28, 386.4
 SPEED_RPM = 50.0
 TORQUE_LB_IN = 100.0
+
+
+# From the independent derivation
+
+
+class Spot(NamedTuple):
+    """Values at theta1 = 30 deg, 50 rpm, branch +.
+
+    The last two are the slider force along -k4 at a torque of 100 lb.in, and the torque without a slider force.
+    """
+
+    offset_in: float
+    shift_in: float
+    twist_deg: float
+    position_in: float
+    velocity_in_s: float
+    acceleration_in_s2: float
+    slider_force_lb: float
+    torque_lb_in: float
+
+
+SPOTS = (
+    Spot(10.0, 3.5, 270.0, 51.518171, 68.488429, -62.88695, -15.328251, -100.49853),
+    Spot(20.0, 0.0, 310.0, 44.111244, 62.432803, 36.61340, -8.206263, 2.15027),
+)
+#: Dead centres at S1 = 0 and 270 deg, by the offset in inches.
+DEAD_CENTRES_DEG: Mapping[float, tuple[float, float]] = MappingProxyType(
+    {10.0: (99.28, 285.26), 20.0: (108.82, 301.76), 30.0: (118.94, 322.14)}
+)
+#: Strokes (in) at S1 = 0 and 270 deg, by the offset in inches.
+STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935})
+#: Strokes at a4 = 20 in and S1 = 0, by the twist in degrees.
+STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
+#: Greatest shifts at which the crank turns fully at 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2).
+GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})
+#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). We read it as the
+#: greatest more than 10 deg from a dead centre, since it is unbounded there.
+AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = MappingProxyType(
+    {(10.0, 3.5, 270.0): (4.1, 0.05), (20.0, 0.0, 310.0): (27.0, 0.5)}
+)

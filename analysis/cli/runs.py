@@ -36,6 +36,7 @@ from .common import (
     print_written,
     quantity,
     say,
+    set_option,
     show_table,
     tolerance_option,
     unknown,
@@ -494,32 +495,43 @@ def _print_fmu(path: Path) -> None:
 @click.command()
 @click.argument("numbers", nargs=-1)
 @out_option("out/figures", help="Folder.")
-@click.option("--list", "listing", is_flag=True, help="Only list the figures.")
+@set_option("rod.length='45 in'; bare numbers are in SI. The verdicts are then on the changed mechanism")
+@click.option("--list", "listing", is_flag=True, help="Only list the figures, with the places of their statements.")
 @handled
-def figures(numbers: Sequence[str], out: str, listing: bool) -> None:
-    """Make the theses' figures, a still and an animation of the linkage: plots and CSV. NUMBERS such as 3.2 (Youssef) or R5
-    (Rahman's figure 5); all by default.
+def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
+    """Make the theses' figures, a still and an animation of the linkage: plots, CSV, and each statement with its verdict.
+    NUMBERS such as 3.2 (Youssef) or R5 (Rahman's figure 5); all by default.
 
     \b
     Examples:
       linkwork figures --list
       linkwork figures 3.2 3.4 7.2 R5
+      linkwork figures R5 R36 --set rod.length='45 in'
       linkwork figures --out figures
     """
-    from ..studies import STUDIES, make
+    from textwrap import indent
+
+    from ..studies import ENTRIES, STUDIES, make
 
     if listing:
         for number, study in STUDIES.items():
-            console.print(f"{number:>8}  {study}", highlight=False)
+            place = ENTRIES[number].place
+            console.print(f"{number:>8}  {study}{place and f' ({place})'}", highlight=False, soft_wrap=True)
         return
+    values = changes(settings, number_or_text, "rod.length='45 in'")
+    if values and not numbers:
+        raise click.UsageError("name the figures whose mechanism --set changes, such as linkwork figures R5 --set ...")
     for number in numbers:
         if number not in STUDIES:
             raise unknown(number, STUDIES, f"figure {number}")
     for number in numbers or STUDIES:
         with console.status(f"figure {number}"):
-            result, paths = make(number, Path(out))
-        console.print(
-            f"[bold]{number}[/bold]  {result.title}: wrote {', '.join(p.name for p in paths)}", highlight=False
-        )
-        for verdict in result.verdicts:
-            console.print(f"        {verdict}", highlight=False, markup=False, soft_wrap=True)
+            result, paths = make(number, Path(out), values)
+        wrote = f": wrote {', '.join(p.name for p in paths)}" if paths else ""
+        console.print(f"[bold]{number}[/bold]  {result.title}{wrote}", highlight=False)
+        if values:
+            console.print("  with changed parameters: the verdicts are on the changed mechanism, not on the thesis")
+        if result.see:
+            console.print(f"  statements that concern it are judged at {result.see}", highlight=False)
+        for statement in result.statements:
+            console.print(indent(str(statement), "  "), highlight=False, markup=False, soft_wrap=True)

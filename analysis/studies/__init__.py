@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..files import unknown_name
 from .contents import Entry
@@ -59,6 +59,11 @@ def load(number: str) -> Study:
     return study
 
 
-def make(number: str, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
-    """Run a study and write its plot and table, and an animation if it has one, into a folder; returns result and paths."""
-    return load(number).make(out)
+def make(
+    number: str, out: str | Path = "out", changes: Mapping[str, Any] | None = None
+) -> tuple[StudyResult, tuple[Path, ...]]:
+    """Run a study and write its plot and table, and an animation if it has one, into a folder; returns result and paths.
+
+    ``changes`` are values of its mechanism's parameters by name, numbers in SI or texts with their units.
+    """
+    return load(number).make(out, changes)

@@ -1,57 +1,106 @@
-"""Markdown page of a thesis: each figure, a table of its verdicts, and a count of them at the head."""
+"""Markdown page of a thesis: each figure with its plot and its statements, findings of each chapter, a count at the head."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+from pathlib import Path
 
-from . import ENTRIES, STUDIES, load
-from .study import FAILS, HOLDS, LISTING, OURS, TEXT, UNJUDGED
+from ..figures import Figure
+from . import ENTRIES, STUDIES, file_stem, load
+from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement
 
-_HEADINGS = "| statement | source | where | stated | computed | verdict |\n| --- | --- | --- | --- | --- | --- |"
-#: A row of a table of verdicts: its source and its verdict.
-_ROW = re.compile(
-    rf"^\| .* \| ({TEXT}|{LISTING}|{OURS.kind}) \| .* \| \**({HOLDS}|{FAILS}|{UNJUDGED})\** \|$", flags=re.MULTILINE
+#: Folder of the plots beside the page, their width (in, px) and most bytes.
+PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
+#: What a page has of a statement: its quote, kind of source and place, measure and tolerance, verdict.
+_STATEMENT = re.compile(
+    rf"^> (.*)\n> \((text|program), .*\)\n\n(?:Measured: .*\n\n)?\*\*({'|'.join(OUTCOMES)})\*\*",
+    flags=re.MULTILINE | re.IGNORECASE,
 )
 
 
-def figures(numbers: Iterable[str]) -> str:
-    """Compute the figures of these numbers and return them in Markdown.
+def figures(numbers: Iterable[str], folder: Path) -> str:
+    """Compute the figures of these numbers and return them in Markdown; the plots go into ``folder``.
 
-    A figure that only shows a mechanism or an apparatus has its title alone. An assignment shared by several figures is
-    printed with the first.
+    A chapter's findings come before its first figure. A figure that only shows a mechanism or an apparatus has its title
+    alone. An assignment shared by several figures is printed with the first.
     """
-    lines: list[str] = []
+    numbers = tuple(numbers)
+    modules = dict.fromkeys(f"{__package__}.{ENTRIES[n].module}" for n in numbers if n in STUDIES)
+    lines = [f"{findings}\n" for name in modules if (findings := getattr(import_module(name), "FINDINGS", ""))]
     for number in numbers:
         entry = ENTRIES[number]
         if number not in STUDIES:
             lines += [f"### Fig {number}  {entry.title}", "", f"Nothing to compute ({entry.place}).", ""]
             continue
-        result = load(number).compute()
+        study = load(number)
+        result = study.compute()
         where = f" ({entry.place})" if entry.place else ""
         lines += [f"### {result.heading}", "", f"{result.claim}{where}", ""]
         if result.assignment and f"*{result.assignment}*" not in lines:
             lines += [f"*{result.assignment}*", ""]
-        lines += [f"`linkwork figures {number}`", "", _HEADINGS]
-        for v in result.verdicts:
-            computed = "; ".join(part for part in (v.found, v.why) if part)
-            outcome = v.outcome if v.holds else f"**{v.outcome}**"
-            lines.append(
-                f"| {v.statement} | {v.source.kind} | {v.source.place} | {v.expected} | {computed} | {outcome} |"
-            )
-        lines.append("")
+        if study.draw:
+            plot = f"{PLOTS}/{file_stem(number).removeprefix('fig_')}.webp"
+            save_small(study.draw(result), folder / plot)
+            lines += [f"![{result.heading}]({plot})", ""]
+        lines += [f"`linkwork figures {number}`", ""]
+        if result.see:
+            lines += [f"Statements that concern it are judged at Fig {result.see}.", ""]
+        for statement in result.statements:
+            lines += block(statement)
     return "\n".join(lines)
 
 
+def block(statement: Statement) -> Iterator[str]:
+    """Yield the lines of a statement: quote and place, measure and tolerance, verdict, and its cases if there are several."""
+    source, cases = statement.source, statement.cases
+    kind = "text" if source.kind == TEXT else "program"
+    yield from (f"> {statement.quote}", f"> ({kind}, {source.place})", "")
+    if cases:
+        yield from (f"Measured: {statement.measure}. Tolerance: {statement.tolerance}.", "")
+    reason = f": {statement.reason}" if statement.reason else ""
+    yield from (f"**{statement.outcome.capitalize()}**{reason}.", "")
+    if len(cases) > 1:
+        yield "| case | stated | allowed | computed | |\n| --- | --- | --- | --- | --- |"
+        for case in cases:
+            why = f": {case.why}" if statement.reasons_differ and not case.holds and case.why else ""
+            outcome = case.outcome if case.holds else f"**{case.outcome}**{why}"
+            yield f"| {' | '.join(map(_escaped, (case.label, case.expected, case.allowed, case.found, outcome)))} |"
+        yield ""
+
+
+def _escaped(text: str) -> str:
+    """Escape the bars of a text, which would end a cell of a table."""
+    return text.replace("|", "\\|")
+
+
+def save_small(figure: Figure, path: Path) -> None:
+    """Write a plot of `WIDTH_PX`, laid out anew, in the quality that keeps it below `MOST_BYTES`."""
+    path.parent.mkdir(exist_ok=True)
+    width, height = figure.get_size_inches()
+    figure.set_layout_engine("constrained")
+    # panels beside each other need more height for their labels
+    figure.set_size_inches(WIDTH_IN, height * WIDTH_IN / width * (1.15 if width > 8.0 else 1.0))
+    for quality in (80, 60, 40, 20):
+        figure.savefig(path, dpi=WIDTH_PX / WIDTH_IN, format="webp", pil_kwargs={"quality": quality, "method": 6})
+        if path.stat().st_size <= MOST_BYTES:
+            return
+
+
+def quotes(page: str) -> list[tuple[str, str]]:
+    """Return quote and verdict of each statement on a page."""
+    return [(quote, outcome.lower()) for quote, _, outcome in _STATEMENT.findall(page)]
+
+
 def count(page: str) -> str:
-    """Return a sentence with the number of statements on a page that hold, fail or cannot be judged, and of our checks."""
-    found = Counter(_ROW.findall(page))
-    thesis = {outcome: found[TEXT, outcome] + found[LISTING, outcome] for outcome in (HOLDS, FAILS, UNJUDGED)}
-    listing = sum(number for (source, _), number in found.items() if source == LISTING)
-    ours = sum(number for (source, _), number in found.items() if source == OURS.kind)
+    """Return a sentence with the number of statements on a page by their verdicts."""
+    found = _STATEMENT.findall(page)
+    number = Counter(outcome.lower() for *_, outcome in found)
+    listed = sum(kind == "program" for _, kind, _ in found)
     return (
-        f"Of {sum(thesis.values())} statements of the thesis {thesis[HOLDS]} hold, {thesis[FAILS]} do not, and "
-        f"{thesis[UNJUDGED]} cannot be judged, each with the reason. {listing} of them come from its program when it is run, "
-        f"the others from its text. Of {ours} checks of ours {found[OURS.kind, HOLDS]} hold."
+        f"Of {len(found)} statements of the thesis {number[HOLDS]} hold, {number[IN_PART]} hold in part, "
+        f"{number[FAILS]} do not hold, and {number[UNJUDGED]} cannot be judged, each with the reason. {listed or 'None'} of "
+        "them come from its program when it is run, the others from its text."
     )

@@ -2,148 +2,26 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from linkwork.errors import InputError
+
 from ..figures import Curve, Figure
-from ..files import save_figure, write_csv
+from ..files import save_figure, unknown_name, write_csv
 from . import STUDIES, file_stem, is_figure
-
-#: Kinds of sources: the thesis's text, and its program when run.
-TEXT, LISTING = "text", "listing"
-#: What a verdict may be.
-HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
-
-
-class Source(NamedTuple):
-    """Source of a statement: its kind, and its place in the thesis (section, lines L of the scanned text)."""
-
-    kind: str
-    place: str = ""
-
-    @property
-    def words(self) -> str:
-        """The source as a reader without the documentation understands it."""
-        kinds = {TEXT: "the thesis", LISTING: "the thesis's program"}
-        place = re.sub(r"\bL(?=\d)", "line ", self.place)
-        return ", ".join(part for part in (kinds.get(self.kind, "our own check"), place) if part)
-
-
-#: Our own derivations and checks.
-OURS = Source("ours")
-
-
-def text(place: str) -> Source:
-    """Return a place in the thesis's text as a source."""
-    return Source(TEXT, place)
-
-
-def listing(place: str) -> Source:
-    """Return the thesis's program when run as a source."""
-    return Source(LISTING, place)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """Stated result beside the computed one; it holds if ``computed`` lies from ``lower`` to ``upper``.
-
-    Attributes
-    ----------
-    statement : str
-        The statement in words, without its number.
-    source : Source
-    stated, computed : float or None
-        The two values in ``unit``; None where the statement cannot be judged.
-    lower, upper : float
-        Range that the source supports.
-    why : str
-        Reason why the statement cannot be judged, or why it fails.
-    """
-
-    statement: str
-    source: Source
-    stated: float | None = None
-    computed: float | None = None
-    lower: float = -np.inf
-    upper: float = np.inf
-    unit: str = ""
-    why: str = ""
-
-    def __str__(self) -> str:
-        source = self.source.words
-        if self.computed is None:
-            return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
-        outcome = HOLDS if self.holds else f"{FAILS.upper()}{self.why and f': {self.why}'}"
-        return f"{self.statement}: {self.expected} ({source}), computed {self.found}: {outcome}"
-
-    @property
-    def expected(self) -> str:
-        """The stated value with its unit, and whether it is a bound; empty where there is none."""
-        if self.stated is None:
-            return ""
-        bound = "at most " if np.isneginf(self.lower) else "at least " if np.isposinf(self.upper) else ""
-        return f"{bound}{self.stated:.6g} {self.unit}".rstrip()
-
-    @property
-    def found(self) -> str:
-        """The computed value with its unit; empty where there is none."""
-        return "" if self.computed is None else f"{self.computed:.6g} {self.unit}".rstrip()
-
-    @property
-    def holds(self) -> bool:
-        """Whether the computed value is in the range."""
-        return self.computed is not None and bool(self.lower <= self.computed <= self.upper)
-
-    @property
-    def outcome(self) -> str:
-        """`HOLDS`, `FAILS` or `UNJUDGED`."""
-        return UNJUDGED if self.computed is None else HOLDS if self.holds else FAILS
-
-
-def near(
-    statement: str, source: Source, stated: float, computed: float, tolerance: float, unit: str = "", *, why: str = ""
-) -> Verdict:
-    """Judge a value that is stated to within a tolerance."""
-    bounds = {"lower": stated - tolerance, "upper": stated + tolerance}
-    return _judged(statement, source, stated, computed, unit, why, **bounds)
-
-
-def at_least(
-    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
-) -> Verdict:
-    """Judge a value that is stated as a lower bound."""
-    return _judged(statement, source, stated, computed, unit, why, lower=stated)
-
-
-def at_most(
-    statement: str, source: Source, stated: float, computed: float, unit: str = "", *, why: str = ""
-) -> Verdict:
-    """Judge a value that is stated as an upper bound."""
-    return _judged(statement, source, stated, computed, unit, why, upper=stated)
-
-
-def _judged(
-    statement: str, source: Source, stated: float, computed: float, unit: str, why: str, **bounds: float
-) -> Verdict:
-    return Verdict(
-        statement=statement, source=source, stated=stated, computed=float(computed), unit=unit, why=why, **bounds
-    )
-
-
-def unjudged(statement: str, source: Source, why: str) -> Verdict:
-    """Record a statement that cannot be judged, with the reason."""
-    return Verdict(statement=statement, source=source, why=why)
+from .statements import Statement
+from .variation import varied, words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyResult:
-    """Result of a study: what is claimed, the data of the plot, and the verdicts.
+    """Result of a study: what is claimed, the data of the plot, and the statements with their verdicts.
 
     Attributes
     ----------
@@ -154,15 +32,18 @@ class StudyResult:
     assignment : str
         Our choices in the figure, because the caption is lost; empty if there are none.
     columns : mapping
-        Data of the plot by name with unit; all of one length, padded with NaN.
-    verdicts : tuple of Verdict
+        Data of the plot by name with unit; all of one length, padded with NaN. Empty where there is no plot.
+    statements : tuple of Statement
+    see : str
+        Number of the figure whose statements are about this one too; empty if there are none.
     """
 
     number: str
     claim: str
     assignment: str = ""
-    columns: Mapping[str, NDArray[np.float64]]
-    verdicts: tuple[Verdict, ...]
+    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    statements: tuple[Statement, ...] = ()
+    see: str = ""
 
     @property
     def title(self) -> str:
@@ -171,30 +52,63 @@ class StudyResult:
 
     @property
     def heading(self) -> str:
-        """Heading of the plot: the figure's number and title."""
-        return f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title
+        """Heading of the plot: the figure's number and title, and what its reader has changed."""
+        changes = f"; {words()}" if words() else ""
+        return (f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title) + changes
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Figure of a thesis: functions that compute, draw and, for some, animate it."""
+    """Figure of a thesis, or statements without one: functions that compute, draw and, for some, animate it.
+
+    ``sweeps`` are the parameters whose values the study compares, so that its reader cannot set them.
+    """
 
     number: str
     compute: Callable[[], StudyResult]
-    draw: Callable[[StudyResult], Figure]
+    draw: Callable[[StudyResult], Figure] | None = None
     animate: Callable[[StudyResult, Path], Path] | None = None
+    sweeps: tuple[str, ...] = ()
 
-    def make(self, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
-        """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths."""
-        result = self.compute()
-        stem = Path(out) / file_stem(self.number)
+    def make(
+        self, out: str | Path = "out", changes: Mapping[str, Any] | None = None
+    ) -> tuple[StudyResult, tuple[Path, ...]]:
+        """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths.
+
+        A study without a plot writes nothing. ``changes`` are values of its mechanism's parameters by name, numbers in SI or
+        texts with their units; the names of its files then end in ``_varied``.
+
+        Raises
+        ------
+        InputError
+            If the study compares values of a changed parameter itself, or its mechanism has no such parameter.
+        """
+        changes = changes or {}
+        for name in changes:
+            if name in self.sweeps:
+                raise InputError(f"figure {self.number} compares values of {name} itself: change another parameter")
+        with varied(changes) as known:
+            result = self.compute()
+            for name in changes:
+                if not known:
+                    raise InputError(
+                        f"figure {self.number} has no parameters that can be changed: {name} means nothing in it"
+                    )
+                if name not in known:
+                    raise unknown_name(name, sorted(known), f"parameter {name!r} of figure {self.number}")
+            return result, self._written(result, Path(out), "_varied" if changes else "")
+
+    def _written(self, result: StudyResult, out: Path, ending: str) -> tuple[Path, ...]:
+        if self.draw is None:
+            return ()
+        stem = out / f"{file_stem(self.number)}{ending}"
         paths = [
             save_figure(self.draw(result), stem.with_suffix(".png")),
             write_csv(stem.with_suffix(".csv"), result.columns),
         ]
         if self.animate:
             paths.append(self.animate(result, stem.with_suffix(".gif")))
-        return result, tuple(paths)
+        return tuple(paths)
 
 
 def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:

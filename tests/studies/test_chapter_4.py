@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.studies.study import LISTING
+from analysis.studies.youssef import chapter_4 as study
+from analysis.studies.youssef import linearised
+from analysis.youssef import Variant, nonlinear_harmonic_balance, resonance, slider_equation
+from linkwork.five_bar.published import chapter_4
 from tests import published
 
-from .results import check, computed, every
+from .results import check, every, statement
 
 
 @every("4.")
@@ -16,8 +19,52 @@ def test_verdicts_plot_and_data(number: str) -> None:
 
 
 @pytest.mark.slow
-def test_published_numbers() -> None:
+def test_published_resonances() -> None:
+    """Both roots of the listing are compared with the right ones of the same side."""
+    cases = {case.label: case for case in statement("4.3", "THIS PROG").cases}
     for ratio, values in published.RESONANCE.items():
-        found = computed("4.3", f"resonance by the listing as transcribed; I4 = {ratio:g}")
-        assert found == pytest.approx(values.thesis, abs=5.1e-5)
-        assert computed("4.3", f"resonance; I4 = {ratio:g}", LISTING) == pytest.approx(values.right, abs=5.1e-5)
+        case = cases[f"lower root; I4 = {ratio:g}"]
+        assert float(case.stated) == pytest.approx(values.thesis, abs=5.1e-5)
+        assert case.computed == pytest.approx(values.right, abs=5.1e-5)
+    upper = cases["upper root; I4 = 1.5"]
+    assert float(upper.stated) == pytest.approx(published.UPPER_RESONANCE_THESIS, abs=5.1e-5)
+    assert upper.computed == pytest.approx(resonance(chapter_4(1.5))[1], abs=1e-9)
+
+
+def test_second_harmonic_is_the_plants() -> None:
+    speed, right = study.peak(2, 1.0, study.COMPARED_AT)
+    plant = nonlinear_harmonic_balance(chapter_4(1.0, study.COMPARED_AT), speed)
+    assert right == pytest.approx(plant.harmonic(2) / chapter_4(1.0).rocker_length, rel=0.005)
+
+
+@pytest.mark.parametrize(("inertia_ratio", "near"), [(1.0, 0.03), (0.5, 0.01)])
+def test_peaks(inertia_ratio: float, near: float) -> None:
+    """The weakest damper's is F1/lambda_c, the strongest's that of the plant."""
+    at, height = study.peak(1, inertia_ratio, study.DAMPERS[0])
+    force = study.equation(inertia_ratio, Variant.EXACT).force.amplitudes[1]
+    assert height == pytest.approx(force * at / study.DAMPERS[0], rel=0.02)
+    at, height = study.peak(1, inertia_ratio, study.STRONGEST)
+    mechanism = chapter_4(inertia_ratio, study.STRONGEST)
+    plant = nonlinear_harmonic_balance(mechanism, at).harmonic(1) / mechanism.rocker_length
+    assert plant == pytest.approx(height, rel=near)
+
+
+class TestLinearised:
+    """The equations of 4.1 to 4.4."""
+
+    def test_the_mended_recurrence_is_the_balance(self) -> None:
+        """With 2 lambda_c k0 in place of 2 lambda_c (4.34) is the balance of (4.29); as printed it is not."""
+        assert linearised.balanced(1.2, as_printed=False) < 1e-12
+        assert linearised.balanced(1.2) > 1e-3
+
+    def test_the_motion_of_the_plant_meets_all_equations_of_motion(self) -> None:
+        met = linearised.residuals()
+        assert set(met) == {"(4.10), (4.15)", "(4.11), (4.16)", "(4.12), (4.17)", "(4.13), (4.18)", "(4.19)", "(4.20)"}
+        assert max(met.values()) < 1e-12
+
+    def test_stiffness_as_printed(self) -> None:
+        """H1 is three times the right one: p45 I4 sigma2 cos^2 alpha4 sin(2 alpha3) / sin^3 is right at 60 and 120 deg."""
+        found = linearised.coefficients(1e-4)
+        assert found["H1, stiffness"] == pytest.approx(3.0, abs=1e-3)
+        right = slider_equation(linearised.with_crank(1e-4), 1.0).stiffness.cos[1]
+        assert right == pytest.approx(1e-4 * published.P45 / 4.5, rel=1e-3)

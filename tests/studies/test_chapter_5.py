@@ -5,13 +5,27 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, with_crank
-from analysis.studies.youssef.regions import appendix_3, first_order, hill, removing_estimate, right
-from analysis.youssef import Variant
+from analysis.periodic import Drive, Stability, confirm
+from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, removing, without_factor
+from analysis.studies.youssef.linearised import with_crank
+from analysis.studies.youssef.regions import (
+    appendix_3,
+    axis,
+    crank_speed,
+    equation,
+    first_order,
+    hill,
+    removing_estimate,
+    right,
+)
+from analysis.youssef import Form, Variant, boundary_stiffnesses, monodromy, perturbed_region, slider_equation
 from linkwork.five_bar.published import chapter_4
 from tests import published
 
-from .results import check, every, result
+from .results import check, every, result, statement
+
+#: Long runs at I4 = 1.5: omega_c (1/s) and lambda_k^2.
+LONG_DAMPED = ((0.1, 0.2761), (0.1, 0.2785), (0.2, 0.2761))
 
 
 @every("5.")
@@ -57,8 +71,106 @@ def test_width_of_a_region_starts_with_its_power_of_the_crank(number: int, power
     assert np.polyfit(np.log(cranks), np.log(widths), 1)[0] == pytest.approx(power, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("sigma2", "inertia_ratio", "by_listing", "known"),
+    [(0.01, 1.0, False, 1.936), (0.01, 0.5, False, 1.9674), (0.01, 0.5, True, 1.9638)],
+)
+def test_axis_of_a_short_crank(sigma2: float, inertia_ratio: float, by_listing: bool, known: float) -> None:
+    of = appendix_3 if by_listing else right
+    assert axis(of(with_crank(sigma2, inertia_ratio))) == pytest.approx(known, abs=5e-4 if known == 1.936 else 5e-5)
+
+
+@pytest.mark.parametrize(("inertia_ratio", "known"), [(2.0, 1.87), (0.5, 1.965)])
+def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, known: float) -> None:
+    assert axis(appendix_3(held(0.8, inertia_ratio))) == pytest.approx(
+        known, abs=0.005 if inertia_ratio == 2.0 else 1e-3
+    )
+
+
+def test_held_angles_need_another_ground_link() -> None:
+    assert held(1.2).ground_length > 1.05 * closed(1.2).ground_length
+
+
+def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
+    one, other = hill(chapter_4(1.0)), right(chapter_4(1.0))
+    assert (one.low, one.high) == pytest.approx((0.266630, 0.268436), abs=5.1e-7)
+    assert (other.low, other.high) == pytest.approx((0.266540, 0.268367), abs=5.1e-7)
+
+
+def test_formulas_of_the_perturbation_to_the_letter() -> None:
+    """(5.16) and (5.24) to (5.26) with the coefficients of (4.29), whose h0 is 0."""
+    e = slider_equation(chapter_4(1.0), 60.0, variant=Variant.PRINTED, form=Form.SERIES)
+    s, k = e.spring_factor, e.stiffness.to_order(2)
+    k0 = s.mean
+
+    def amplitudes(n: int, at: float) -> tuple[float, float]:
+        return at * s.cos[n] / k0 + k.cos[n], at * s.sin[n] / k0 + k.sin[n]
+
+    half = 0.5 * np.hypot(*amplitudes(1, 0.25))
+    region = perturbed_region(e.homogeneous(), 1, order=1)
+    assert region is not None
+    assert (region.low, region.high) == pytest.approx(((0.25 - half) / k0, (0.25 + half) / k0), abs=1e-9)
+    (n1, n2), (m1, m2) = (amplitudes(n, 1.0) for n in (1, 2))
+    p, r = (n2**2 - 5.0 * n1**2) / 12.0 + m1 / 2.0, (n1**2 - 5.0 * n2**2) / 12.0 - m1 / 2.0
+    q = m2 / 2.0 - n1 * n2 / 2.0
+    middle, half = 1.0 - 0.5 * (p + r), 0.5 * np.sqrt((p - r) ** 2 + 4.0 * q**2)
+    region = perturbed_region(e.homogeneous(), 2)
+    assert region is not None
+    # the next order
+    assert (region.low, region.high) == pytest.approx(((middle - half) / k0, (middle + half) / k0), abs=1e-5)
+
+
+def test_cut_after_the_ninth_term() -> None:
+    """(5.35) as the thesis cuts it, less Hill's determinant."""
+    for ratio in (0.5, 1.0, 1.5):
+        nine = boundary_stiffnesses(equation(chapter_4(ratio)), -1, count=2, order=2).real
+        whole = hill(chapter_4(ratio))
+        assert nine == pytest.approx([whole.low, whole.high], abs=1e-6)
+
+
+def test_equation_without_the_factor_has_the_same_multipliers_but_for_the_factor() -> None:
+    found = slider_equation(chapter_4(1.5, 0.45), crank_speed(0.27))
+    whole = monodromy(found.homogeneous().stiffened(found.spring))
+    bare = monodromy(without_factor(1.5, found.damping).stiffened(found.spring))
+    # (5.28): the determinant of the one is that of the factor, squared
+    factor = np.sqrt(np.linalg.det(whole))
+    assert np.sort_complex(np.linalg.eigvals(whole)) == pytest.approx(
+        np.sort_complex(factor * np.linalg.eigvals(bare)), rel=1e-7
+    )
+
+
 @pytest.mark.slow
-def test_removing_damping_by_its_width() -> None:
-    assert result("5.4").columns["removing omega_c; true orbit [1/s]"][5] == pytest.approx(
+@pytest.mark.parametrize(
+    ("inertia_ratio", "omega_c", "lambda_k2"),
+    [(1.0, 0.0, 0.2662), (1.0, 0.0, 0.26745), (1.0, 0.0, 0.2695), *((1.5, c, x) for c, x in LONG_DAMPED)],
+)
+def test_long_runs(inertia_ratio: float, omega_c: float, lambda_k2: float) -> None:
+    """The nonlinear mechanism from close to its periodic motion: growth by the multiplier, or bounded."""
+    run = confirm(chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2)), turns=2000)
+    if run.verdict.stability is Stability.MARGINAL:
+        assert run.deviations.max() < 2.0
+    else:
+        assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_removing_damping() -> None:
+    """By the true orbit, as by the width; at the tip of a boundary it is the boundary's."""
+    (by_listing,) = statement("5.4", "THIS PROG.").cases
+    assert float(by_listing.stated) == pytest.approx(published.REMOVING_DAMPING_THESIS, abs=5e-4)
+    assert by_listing.computed == pytest.approx(published.REMOVING_DAMPING, abs=5e-4)
+    columns = result("5.4").columns
+    assert columns["removing omega_c; true orbit [1/s]"][5] == pytest.approx(
         removing_estimate(chapter_4(1.5)), rel=0.03
     )
+    for omega_c in (0.05, 0.1, 0.15):
+        tip = float(np.nanmin(columns[f"I4; omega_c = {omega_c:g} 1/s; boundary 1 [1]"]))
+        assert removing("true orbit", tip).damping == pytest.approx(omega_c, abs=1e-5)
+
+
+def test_zeroth_boundary_parts_a_stable_region_from_falling_away() -> None:
+    exact = equation(chapter_4(1.0))
+    zeroth = boundary_stiffnesses(exact, 1, count=1)[0].real
+    below, above = (np.abs(np.linalg.eigvals(monodromy(exact.stiffened(x * zeroth)))).max() for x in (0.5, 1.5))
+    assert below == pytest.approx(1.13041, abs=1e-5)
+    assert above == pytest.approx(1.0, abs=1e-9)

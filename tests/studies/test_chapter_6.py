@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from analysis.studies.youssef.chapter_6 import pairing_area
+from analysis.studies.youssef import search
+from analysis.studies.youssef.chapter_6 import best, pairing_area, rounded, straight_error
 from analysis.studies.youssef.packaging import nineteen_points
 from analysis.studies.youssef.problems import PROBLEMS, packaging_path
-from analysis.studies.youssef.quality import both, linkages
-from analysis.synthesis import distance_to
+from analysis.studies.youssef.quality import arguments, both, linkages
+from analysis.synthesis import Linkage, distance_to, evaluate, turn
+from tests import published
 
 from .results import check, every
 
@@ -26,6 +30,8 @@ def test_the_combined_quality_function() -> None:
     found = linkages()["ours; combined"]
     assert found.largest_link <= longest
     assert both(found).combined == sum(both(found))
+    for other in ("ours; timed", "ours; path"):
+        assert both(found).combined < both(linkages()[other]).combined
 
 
 def circle(radius: float, n: int) -> np.ndarray:
@@ -56,3 +62,69 @@ def test_nineteen_points_on_the_desired_path() -> None:
     points = nineteen_points()
     assert len(points) == 19
     assert distance_to(packaging_path().points, points).max() < 1e-12
+
+
+def test_error_over_the_rounding_of_printed_digits() -> None:
+    error, *over_rounding = rounded("ellipse-a", 0.005, 0.005)
+    assert error == pytest.approx(published.CHAPTER_6_ERRORS["ellipse-a"].true, abs=5e-3)
+    assert over_rounding == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
+
+
+@pytest.mark.slow
+def test_a_line_by_weights() -> None:
+    assert straight_error() < 0.1
+
+
+def test_the_argument_of_the_root_is_that_of_assembly() -> None:
+    """Negative where the distance from B to D is greater than l3 + l4, or less than their difference."""
+    l1, l2, l3, l4 = np.random.default_rng(64).uniform(0.1, 1.0, (4, 10_000, 1))[:, :200]
+    reach = np.abs(l1 - l2 * np.exp(1j * turn(72)))
+    closes = (reach <= l3 + l4) & (reach >= np.abs(l3 - l4))
+    assert np.array_equal(arguments()[:200] >= 0.0, closes)
+
+
+class TestSearch:
+    """The program's simplex, and what it starts from."""
+
+    @staticmethod
+    def vector(linkage: Linkage) -> np.ndarray:
+        """Its parameters in cm and rad, angles within half a turn."""
+        v = linkage.vector * np.array([100.0] * 7 + [1.0] * 3)
+        v[7:] = (v[7:] + np.pi) % (2.0 * np.pi) - np.pi
+        return v
+
+    def test_its_error_is_that_of_the_package(self) -> None:
+        p = PROBLEMS[search.PROBLEM]
+        for linkage in (p.linkage, best(search.PROBLEM).linkage):
+            sides = [p.convert(evaluate(p.task, replace(linkage, branch=branch)).error) for branch in (1, -1)]
+            for away, expected in zip(search.residuals(self.vector(linkage)), sides):
+                assert away @ away == pytest.approx(expected, rel=1e-9)
+            assert search.error(self.vector(linkage)) == pytest.approx(min(sides), rel=1e-9)
+
+    def test_sets_are_within_their_bounds_and_close(self) -> None:
+        sets = search.starting_sets(np.random.default_rng(1), [])
+        assert sets.shape == (11, 10)
+        assert (np.clip(sets, search.LOW, search.HIGH) == sets).all()
+        assert all(search.closes(v) for v in sets)
+        assert len(np.unique(sets, axis=0)) == 11
+
+    def test_a_quarter_of_the_way_back(self) -> None:
+        printed = self.vector(PROBLEMS[search.PROBLEM].linkage)
+        open_links = printed.copy()
+        open_links[3:6] = 10.0, 10.0, 10.0
+        assert not search.closes(open_links)
+        found, steps = search.admitted(open_links, printed), open_links
+        while not search.closes(steps):
+            steps = 0.75 * steps + 0.25 * printed
+        np.testing.assert_allclose(found, steps, rtol=1e-12)
+
+    def test_the_simplex_finds_the_bottom_of_a_bowl(self) -> None:
+        middle = self.vector(PROBLEMS[search.PROBLEM].linkage)
+        sets = search.starting_sets(np.random.default_rng(2), [middle * 1.05])
+        found = search.downhill(lambda v: 1.0 + float(((v - middle) / 10.0) @ ((v - middle) / 10.0)), sets)
+        assert found.error == pytest.approx(1.0, abs=0.05)
+        assert found.evaluations < search.MOST
+
+    def test_the_bottom_next_to_the_best_linkage_is_its_error(self) -> None:
+        v = self.vector(best(search.PROBLEM).linkage)
+        assert search.bottom(search.Found(v, 0.0, 0)) == pytest.approx(search.error(v), rel=1e-3)

@@ -8,11 +8,16 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
+from analysis.numerics.fourier import FourierSeries
+from analysis.slider import best_spring, inverse_dynamics
 from analysis.studies.youssef import chapter_7 as series_1
+from analysis.studies.youssef import control
 from analysis.studies.youssef.problems import PROBLEMS
 from analysis.studies.youssef.series_2 import (
     PATH,
+    PATH_SEARCHES,
     ROCKER,
+    error_of,
     mended,
     out_of_reach,
     path_motion,
@@ -22,9 +27,10 @@ from analysis.studies.youssef.series_2 import (
     slider,
 )
 from analysis.synthesis import Linkage, SliderMotion
+from analysis.youssef import accessible_area
 from linkwork.five_bar import kinematics
 
-from .results import check, computed, every
+from .results import check, every
 
 
 @every("7.")
@@ -35,6 +41,36 @@ def test_verdicts_plot_and_data(number: str) -> None:
 @pytest.mark.slow
 def test_methods_of_control() -> None:
     check("control")
+
+
+@pytest.mark.slow
+class TestControl:
+    """The machine that the methods of control drive."""
+
+    def test_forces(self) -> None:
+        m = control.machine()
+        bare = inverse_dynamics(m.model, m.motion, control.SPEED).rms_force
+        sprung = best_spring(m.model, m.motion, control.SPEED).parameters
+        assert inverse_dynamics(sprung, m.motion, control.SPEED).rms_force < bare / 1.5
+        assert inverse_dynamics(m.model, m.motion, 2.0 * control.SPEED).rms_force > bare
+
+    @pytest.mark.parametrize("harmonics", control.HARMONICS)
+    def test_no_trial_cycle_is_worse_than_the_one_before(self, harmonics: int) -> None:
+        errors = [control.rms(deviation) for deviation in control.trials(harmonics)]
+        assert (np.diff(errors) < 0.0).all()
+
+
+def test_cam() -> None:
+    """Pressure angle and curvature of its pitch curve by finite differences."""
+    found = control.cam(FourierSeries(np.array([0.0, 0.02, -0.004]), np.array([0.0, 0.01, 0.003])))
+    z = found.curve[:-1]
+    tangent = np.roll(z, -1) - np.roll(z, 1)
+    # the follower moves along the radius, and the cam presses along the normal
+    angle = np.abs(np.angle(tangent / (1j * z)))
+    assert np.degrees(angle.max()) == pytest.approx(30.0, abs=0.01)
+    turned = np.angle(np.roll(tangent, -1) / np.roll(tangent, 1)) / (2.0 * np.abs(0.5 * tangent))
+    assert found.curvature == pytest.approx(1.0 / turned.max(), rel=1e-3)
+    assert found.base == pytest.approx(np.abs(z).min())
 
 
 # Goals: sums of squared errors at N = 24 over the weight (deg2), areas (cm2), by the number of harmonics, the printed links
@@ -86,7 +122,7 @@ class TestGoals:
     """What is to be reached with the printed links kept."""
 
     def test_the_angle_with_two_harmonics(self) -> None:
-        error = computed("7.11", "error with two harmonics")
+        error = error_of(ROCKER, rocker_motion(2).linkage)
         assert error <= ROCKER_GOAL[2]
         assert weighted_error(rocker_motion(2).linkage) == pytest.approx(error, rel=1e-9)
 
@@ -94,9 +130,17 @@ class TestGoals:
     def test_the_angle_is_the_best_known(self, harmonics: int) -> None:
         assert weighted_error(rocker_motion(harmonics).linkage) <= ROCKER_BEST[harmonics]
 
-    @pytest.mark.parametrize(("word", "harmonics"), [("two", 2), ("three", 3), ("five", 5)])
-    def test_the_path(self, word: str, harmonics: int) -> None:
-        error = computed("7.12", f"area with {word} harmonics")
+    def test_defects_and_strokes(self) -> None:
+        motions = [rocker_motion(n) for n in (1, 2, 3)] + [path_motion(n) for n in PATH_SEARCHES]
+        assert all(s.verdicts.sound for s in motions)
+        assert min(s.linkage.least_transmission for s in motions[:3]) > np.radians(20.0)
+        for n, (_, stroke) in PATH_SEARCHES.items():
+            assert slider(path_motion(n).linkage).stroke <= 1.001 * stroke
+        assert slider(path_motion(2).linkage).stroke < 0.036
+
+    @pytest.mark.parametrize("harmonics", PATH_GOAL)
+    def test_the_path(self, harmonics: int) -> None:
+        error = error_of(PATH, path_motion(harmonics).linkage)
         assert error <= PATH_GOAL[harmonics]
         # the study's curve is a 360-gon, this one a 720-gon
         assert area(path_motion(harmonics).linkage) == pytest.approx(error, abs=0.03)
@@ -160,6 +204,54 @@ class TestSeries1:
         assert np.abs(u - 1.0 - near_by[:, [1]]).min(axis=1).max() < 1e-9
         errors = np.array([np.abs(series_1.point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)])
         assert np.abs(errors[2] - errors[0]).max() / 2e-6 < 1e-5
+
+    def test_isochronous_curves_are_circles_about_the_crank_pin(self) -> None:
+        for phi in np.radians(series_1.ISOCHRONES).tolist():
+            arc = series_1.point(np.full(9, phi), np.linspace(-0.4, 0.4, 9))
+            assert np.abs(arc - 0.5 * np.exp(1j * phi)) == pytest.approx(0.5, abs=1e-12)
+
+    def test_area_that_is_reached(self) -> None:
+        """Against random configurations, and a sum over small squares by the kinematics of the point."""
+        area = accessible_area(series_1.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
+        random = np.random.default_rng(72)
+        z = series_1.point(random.uniform(0.0, 2.0 * pi, 5000), random.uniform(-0.4, 0.4, 5000))
+        rings = np.concatenate([*area.outer, *area.holes]) @ np.array([1.0, 1j])
+        inside = area.contains(z.real, z.imag)
+        assert max((np.abs(rings - p).min() for p in z[~inside]), default=0.0) < 2e-3
+        h = 4e-3
+        phi, u = np.meshgrid(np.linspace(0.0, 2.0 * pi, 4001), np.linspace(-0.4, 0.4, 801))
+        z = series_1.point(phi.ravel(), u.ravel())
+        squares = np.unique(np.floor(np.column_stack([z.real, z.imag]) / h), axis=0)
+        # squares on the edge count whole
+        assert h * h * len(squares) == pytest.approx(area.area, rel=0.04)
+
+    def test_enclosed_area_is_what_is_reached_and_the_hole(self) -> None:
+        area = accessible_area(series_1.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
+        holes = 0.0
+        for ring in area.holes:
+            w = ring @ np.array([1.0, 1j])
+            holes += abs(0.5 * (w.conj() * np.roll(w, -1)).imag.sum())
+        assert series_1.enclosed(0.6, 1.4) == pytest.approx(area.area + holes, rel=2e-3)
+
+    def test_no_motion_is_nearer_than_the_variational_one(self) -> None:
+        least = series_1.variational().error
+        assert (least <= series_1.direct().evaluation.errors + 1e-9).all()
+        for k in (0, 20, 41):
+            found = series_1.nearest(float(series_1.ROTATION[k]), complex(series_1.desired()[k]))
+            assert least[k] == pytest.approx(found, abs=1e-3)
+
+    @pytest.mark.slow
+    def test_more_terms_come_nearer_to_it(self) -> None:
+        least = series_1.variational().squared_error
+        eleven, many = (series_1.direct(harmonics).error for harmonics in (5, 20))
+        assert least < many < 1.01 * least < eleven
+        assert min(series_1.ends_of_simplex()) == pytest.approx(eleven, rel=1e-3)
+
+    @pytest.mark.slow
+    def test_a_weight_moves_error_out_of_p1_p2(self) -> None:
+        (inside, outside), (even, rest) = map(series_1.squared_errors, (series_1.direct(inside=5.0), series_1.direct()))
+        assert inside < even
+        assert outside > rest
 
     def test_weights_are_those_of_p1_p2(self) -> None:
         assert series_1.WITHIN.sum() == 13

@@ -16,9 +16,11 @@ from scipy.integrate import solve_ivp
 
 from analysis import Inputs, simulate
 from analysis.cli import main
-from analysis.periodic import Crossing, natural_frequency
+from analysis.numerics.decay import fit_decay
+from analysis.periodic import Crossing, mean_effective_mass, natural_frequency
 from analysis.studies.youssef import chapter_8, rig_1, rig_2, rigs
 from analysis.studies.youssef.runs import SteadyTurn, steady_turn
+from analysis.youssef import nonlinear_harmonic_balance
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS
 from tests import published
@@ -29,6 +31,47 @@ from .results import check, every
 @every("8.", "rig-")
 def test_verdicts_plot_and_data(number: str) -> None:
     check(number)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spring", "speed"),
+    [("A", 240.0), ("A", 420.0), ("A", 500.0), ("B", 500.0), ("B", 780.0), ("C", 586.0), ("D", 1300.0)],
+)
+def test_runs_from_rest_end_in_the_orbits(spring: str, speed: float) -> None:
+    run = steady_turn(rigs.rig(spring), speed)
+    assert run.change < 1e-4
+    assert np.abs(run.slider_cm - rigs.slider(rigs.turn(spring, speed))).max() < 1e-4
+
+
+class TestPulses:
+    """Speed of the crank by the times between the holes of its disc."""
+
+    @pytest.mark.parametrize("order", [1, 2, 8])
+    def test_a_harmonic_is_averaged_over_the_pitch(self, order: int) -> None:
+        angle = np.linspace(0.0, 2.0 * np.pi, 14401)
+        pulses = chapter_8.speed_by_pulses(44.0 * (1.0 + 1e-3 * np.cos(order * angle)))
+        # sin(x)/x of half the pitch
+        found = 2.0 * np.abs(np.fft.rfft(pulses)[order]) / len(pulses)
+        assert found == pytest.approx(0.044 * np.sinc(order / 60.0), rel=1e-3)
+
+    def test_speed_by_the_energy(self) -> None:
+        """Kinetic energy gained from the least to the greatest speed is the work of the torques in between."""
+        inertia = 2e-2
+        speed, torque = chapter_8.speed_of_crank(inertia), rigs.turn("A", chapter_8.PULSED)["drive.applied_torque"]
+        low, high = int(speed[:-1].argmin()), int(speed[:-1].argmax())
+        between = np.arange(low, high if high > low else high + len(torque)) % len(torque)
+        work = (torque.mean() - torque[between]).sum() * 2.0 * np.pi / len(torque)
+        assert 0.5 * inertia * (speed[high] ** 2 - speed[low] ** 2) == pytest.approx(work, rel=0.02)
+
+
+@pytest.mark.parametrize(("rig", "spring", "damping"), [(1, "A", 9.0), (2, "C", 5.5)])
+def test_dry_friction_is_told_from_damping(rig: int, spring: str, damping: float) -> None:
+    assert chapter_8.FOUND[rig] == (damping, spring)
+    time = np.linspace(0.0, chapter_8.LENGTH, 4001)
+    rubbed, mass = chapter_8.impulse_response(spring, time, chapter_8.DRY), rigs.rig(spring).slider_mass
+    assert fit_decay(time, rubbed, friction=True).damping(mass)[0] == pytest.approx(damping, rel=0.01)
+    assert fit_decay(time, rubbed).damping(mass)[0] > damping + 1.0
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "rig-2.md"
@@ -83,6 +126,19 @@ class TestRig1:
         """With spring B: 0.4189 cm at 378 rpm and 0.2890 at 426, read off runs from rest."""
         top, low = (steady_turn(rigs.rig("B"), speed).amplitude for speed in (378.1, 426.2))
         assert rigs.rise_at("B", 3) == pytest.approx(top / low - 1.0, rel=1e-3)
+
+    def test_motions_of_spring_a_do_not_depend_on_the_history(self) -> None:
+        up, down = (rig_1.swept("A", rising).amplitude for rising in (True, False))
+        np.testing.assert_allclose(up, down[::-1], atol=1e-6)
+        assert rigs.largest_multiplier("A", rigs.SLOWEST, rigs.FASTEST["A"]) < 1.0
+
+    def test_sweeps_jump_at_the_fold_and_double_at_the_doubling(self) -> None:
+        (fold,), doublings = rig_1.speeds_of(Crossing.FOLD), rig_1.speeds_of(Crossing.PERIOD_DOUBLING)
+        (jump,) = (jump.speed / published.RPM for jump in rig_1.swept("B", True).jumps)
+        falling = rig_1.swept("B", False)
+        doubled = max(s for s, turns in zip(falling.speed / published.RPM, falling.turns) if turns == 2)
+        assert jump == pytest.approx(fold, abs=rig_1.STEP)
+        assert doubled == pytest.approx(max(doublings), abs=rig_1.STEP)
 
     def test_runs_from_rest_jump_at_the_fold_of_spring_b(self) -> None:
         (fold,) = rig_1.speeds_of(Crossing.FOLD)
@@ -193,11 +249,54 @@ class TestRig2:
             of_run, of_orbit = (np.hypot(x[f"pin.{pin}.fx"], x[f"pin.{pin}.fy"]).max() for x in (run, found.turn()))
             assert of_orbit == pytest.approx(of_run, rel=1e-7)
 
+    @staticmethod
+    def added(spring: str, pin: str) -> tuple[np.ndarray, np.ndarray]:
+        """Speed over the natural one, and the greatest force over one that grows with the square of the speed."""
+        branch = rigs.motions(spring).branches[0]
+        force = branch.columns()[f"greatest force in pin {pin} [N]"]
+        law = force[0] * (branch.parameter / branch.parameter[0]) ** 2
+        return rigs.rpm(branch) / rigs.natural_speed(spring), force / law
+
     @pytest.mark.parametrize("pin", "ACD")
     def test_forces_at_low_speed_grow_with_its_square(self, pin: str) -> None:
-        branch = rigs.motions("D").branches[0]
-        added = rig_2.amplification(branch, branch.columns()[f"greatest force in pin {pin} [N]"])
-        assert added[rigs.rpm(branch) < 200.0] == pytest.approx(1.0, abs=0.015)
+        ratio, added = self.added("D", pin)
+        assert added[ratio < 0.24] == pytest.approx(1.0, abs=0.015)
+
+    @pytest.mark.parametrize("spring", "CD")
+    def test_resonance_adds_most_to_pin_d(self, spring: str) -> None:
+        top = {}
+        for pin in "ACD":
+            ratio, added = self.added(spring, pin)
+            top[pin] = added[np.abs(ratio - 1.0) < 0.1].max()
+        assert top["D"] > max(top["A"], top["C"], 2.0)
+        assert self.added(spring, "D")[1][-1] < 1.0
+
+    @pytest.mark.parametrize("spring", "CD")
+    def test_the_crank_supplies_what_the_damper_takes(self, spring: str) -> None:
+        branch = rigs.motions(spring).branches[0]
+        for speed, motion in list(zip(branch.parameter, branch.orbits))[::20]:
+            of = motion.turn()
+            taken = branch.family.parameters.slider_damping * np.mean(of["slider.velocity"] ** 2)
+            torque = of["drive.applied_torque"]
+            assert abs(torque.mean() - taken / speed) < 1e-8 * np.abs(torque).max()
+
+    @pytest.mark.parametrize(("spring", "speed"), [("C", 295.0), ("C", 586.0), ("D", 415.0), ("D", 1300.0)])
+    def test_orbits_against_the_nonlinear_harmonic_balance(self, spring: str, speed: float) -> None:
+        p = rigs.rig(spring)
+        balance = nonlinear_harmonic_balance(p, speed * published.RPM)
+        assert rigs.orbit(p, speed).amplitude == pytest.approx(balance.amplitude, abs=1e-6)
+
+    @pytest.mark.parametrize("spring", "CD")
+    def test_second_harmonic_of_the_linear_equation(self, spring: str) -> None:
+        for speed in (200.0, 400.0, 700.0, 1000.0):
+            full = rigs.harmonic(rigs.turn(spring, speed), 2) / rig_2.length(spring)
+            assert rig_2.linear_motion(spring, speed).harmonic(2) == pytest.approx(full, rel=0.1)
+
+    def test_a_damper_widens_the_resonance_in_proportion(self) -> None:
+        """That of a lightly damped mass on a spring is mu / m."""
+        p = rigs.rig("C")
+        expected = p.slider_damping / mean_effective_mass(p) / published.RPM
+        assert rig_2.width("C") == pytest.approx(expected, abs=2.0)
 
 
 def test_the_parts_of_a_branch_meet() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from functools import cache
 from pathlib import Path
 
@@ -14,15 +13,34 @@ from numpy.typing import NDArray
 
 from analysis import studies
 from analysis.cli import main
+from analysis.slider_crank import JointLoads, close, follow, joint_loads
+from analysis.slider_crank.closure import Rows
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import figures as rahman
-from analysis.studies.rahman.table import CAPTIONS, COMPONENTS, CONSTANT, FAMILIES, FIGURES, IDEAL, Case
-from analysis.studies.study import OURS, TEXT, Verdict
+from analysis.studies.rahman import method
+from analysis.studies.rahman.printed import dependable, joint_rates, turn
+from analysis.studies.rahman.table import (
+    CAPTIONS,
+    COMPONENTS,
+    CONSTANT,
+    FAMILIES,
+    FIGURES,
+    IDEAL,
+    QUANTITIES,
+    Case,
+    Component,
+)
+from analysis.studies.statements import Case as Judged
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 
 from ..published_rahman import (
+    AXIAL_LB,
     CRANK_IN,
     DEAD_CENTRES_DEG,
+    INCH,
     MASSES_LB_S2_IN,
+    POUND_FORCE,
+    POUND_INCH,
     ROD_IN,
     ROD_RADIUS_IN,
     SPEED_RPM,
@@ -32,20 +50,12 @@ from ..published_rahman import (
     TORQUE_LB_IN,
     TWISTS_DEG,
 )
-from .results import check, every, result
+from .results import check, every, result, statement
 
 
 @every("R", "rahman-")
 def test_verdicts_plot_and_data(number: str) -> None:
     check(number)
-
-
-@every("R", "rahman-")
-def test_statements_have_a_place_and_are_unique(number: str) -> None:
-    verdicts = result(number).verdicts
-    assert all((v.source.kind == TEXT) == bool(v.source.place) for v in verdicts)
-    assert all(re.search(r"L\d", v.source.place) for v in verdicts if v.source.kind == TEXT)
-    assert len({v.statement for v in verdicts}) == len(verdicts)
 
 
 FloatArray = NDArray[np.float64]
@@ -71,11 +81,9 @@ def column(symbol: str, case: Case) -> FloatArray:
     return rahman.values(case, component)
 
 
-def verdicts(number: str, statement: str) -> list[Verdict]:
-    """Verdicts of a figure whose statement begins so."""
-    found = [v for v in result(number).verdicts if v.statement.startswith(statement)]
-    assert found, statement
-    return found
+def judged(number: str, beginning: str) -> dict[str, Judged]:
+    """The cases of a statement by their labels."""
+    return {case.label: case for case in statement(number, beginning).cases}
 
 
 def slider(case: Case, theta: FloatArray = THETA) -> FloatArray:
@@ -107,7 +115,8 @@ class TestNumbers:
         }
         found = {family: tuple(int(n[1:]) for n, f in FIGURES.items() if f.family == family) for family in listed}
         assert found == listed
-        assert list(RAHMAN) == [*FIGURES, "rahman-closure", "rahman-rates", "rahman-forces"]
+        words = ("closure", "rates", "forces", "conclusions")
+        assert list(RAHMAN) == [*FIGURES, *(f"rahman-{word}" for word in words)]
         assert [n for n in ENTRIES if n in ("R1", "R2", "R3", "R4") and n not in RAHMAN] == ["R1", "R2", "R3", "R4"]
 
     def test_captions(self) -> None:
@@ -162,8 +171,9 @@ class TestMotion:
     def test_the_offset_lengthens_the_stroke_and_twist_shortens_it(self) -> None:
         strokes = [np.ptp(slider(Case("", a4, 0.0, 270.0))) for a4 in STROKES_IN]
         assert strokes == pytest.approx(list(STROKES_IN.values()), abs=6e-4)
-        for verdict, case in zip(verdicts("R5", "stroke relative to the ideal one's"), OFFSETS):
-            assert verdict.computed == pytest.approx(np.ptp(slider(case)) / 24.0, abs=1e-5)
+        longer = judged("R5", "When crank is placed at higher level")
+        for case in OFFSETS:
+            assert longer[case.name].computed == pytest.approx(np.ptp(slider(case)) / 24.0, abs=1e-5)
         for twist, stroke in STROKES_BY_TWIST_IN.items():
             assert np.ptp(slider(Case("", 20.0, 0.0, twist))) == pytest.approx(stroke, abs=6e-3)
 
@@ -171,10 +181,8 @@ class TestMotion:
         """The least-squares fit of a constant, a cosine and a sine."""
         s4, basis = slider(OFFSETS[2])[:-1], np.stack([np.ones(720), C[:-1], S[:-1]], -1)
         left = s4 - basis @ np.linalg.lstsq(basis, s4)[0]
-        (verdict,) = verdicts(
-            "R5", "greatest departure of the displacement from a sine, relative to half the stroke; a4 = 30"
-        )
-        assert verdict.computed == pytest.approx(np.abs(left).max() / (0.5 * np.ptp(s4)), rel=1e-4)
+        case = judged("R5", "Slider displacement curves")["a4 = 30 in, S1 = 3.5 in"]
+        assert case.computed == pytest.approx(np.abs(left).max() / (0.5 * np.ptp(s4)), rel=1e-4)
 
 
 class TestBalance:
@@ -268,14 +276,14 @@ def pin_force(case: Case) -> FloatArray:
 class TestStatements:
     """What sections 3.2 and 3.3 state of the forces."""
 
-    @pytest.mark.parametrize(
-        ("case", "stated", "tolerance"), [(OFFSETS[0], 4.1, 0.05), (TWISTS[2], 27.0, 0.5)], ids=["offset", "twist"]
-    )
-    def test_2f2k_is_not_zero_out_of_the_plane(self, case: Case, stated: float, tolerance: float) -> None:
-        assert np.abs(pin_force(case)[2][clear(case)]).max() == pytest.approx(stated, abs=tolerance)
-        for symbol in ("2F2k", "1F1k"):
-            (verdict,) = verdicts(CONSTANT, f"greatest magnitude of {symbol}; {case.name}")
-            assert verdict.computed == pytest.approx(np.abs(pin_force(case)[2][clear(case)]).max(), rel=1e-5)
+    @pytest.mark.parametrize("case", [OFFSETS[0], TWISTS[2]], ids=["offset", "twist"])
+    def test_2f2k_is_not_zero_out_of_the_plane(self, case: Case) -> None:
+        stated, tolerance = AXIAL_LB[case[1:]]
+        axial = np.abs(pin_force(case)[2][clear(case)]).max()
+        assert axial == pytest.approx(stated, abs=tolerance)
+        name = "a4 = 10 in, S1 = 3.5 in" if case in OFFSETS else case.name
+        assert judged(CONSTANT, "All the torque components")[f"2F2k; {name}"].computed == pytest.approx(axial, rel=1e-5)
+        assert judged(CONSTANT, "Axial force")[name].computed == pytest.approx(axial, rel=1e-5)
 
     @pytest.mark.parametrize(
         ("axis", "case", "stated"),
@@ -288,12 +296,15 @@ class TestStatements:
         axial = pin_force(case)[2]
         left_out = np.abs({"i": axial * CRANK_IN * S, "j": -axial * CRANK_IN * C}[axis][clear(case)]).max()
         assert left_out == pytest.approx(stated, abs=0.5)
-        number = CONSTANT if case in TWISTS else {"i": "R14", "j": "R16"}[axis]
-        beginning = f"greatest magnitude of 1T1{axis}" + (", where" if case in TWISTS else " - (")
-        (verdict,) = (
-            v for v in verdicts(number, beginning) if v.source.kind == TEXT and v.statement.endswith(case.name)
-        )
-        assert verdict.computed == pytest.approx(left_out, rel=1e-5)
+        beginning = "Two torque components" if case in TWISTS else "By manual manipulation"
+        name = case.name if case in TWISTS else f"{case.name}, S1 = 3.5 in"
+        assert judged("R14", beginning)[f"1T1{axis}; {name}"].computed == pytest.approx(left_out, rel=1e-5)
+
+    def test_with_a_sinusoidal_shift_the_rod_pulls_along_the_axis_too(self) -> None:
+        """1F1k less m1 S1'' is the pull of the rod at the crank pin: the rod's inertia and the force along it."""
+        assert rahman.sinusoidal_axial_force(1.0) > 1.0
+        still = judged(CONSTANT, "Axial force")
+        assert still["a4 = 10 in, sinusoidal shift of 3.5 in, alpha = 2"].computed == rahman.sinusoidal_axial_force(2.0)
 
     @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
     def test_spikes_are_at_the_dead_centres(self, case: Case) -> None:
@@ -320,17 +331,128 @@ class TestStatements:
                 value = np.abs(column(symbol, case))
                 peaks = value[np.isfinite(value)].max() / value[clear(case)].max()
                 assert (peaks > 4.0) == (expected == 2), (symbol, case.name)
-            number = next(n for n, figure in FIGURES.items() if figure.symbols == (symbol,))
-            (verdict,) = verdicts(number, "spikes of")
-            assert verdict.computed == expected
+            assert judged("R8", "In most of the joint force")[f"spikes of {symbol}"].computed == expected
+
+    def test_spikes_of_all_components_are_at_the_dead_centres(self) -> None:
+        for component in (COMPONENTS[symbol] for symbol in QUANTITIES[1:]):
+            for case in CASES[1:]:
+                found = rahman.spikes_deg(case, component)
+                if found.size:
+                    np.testing.assert_allclose(found, rahman.dead_centres_deg(case), atol=0.005)
 
     def test_the_offset_raises_the_forces_with_the_load_given_and_not_with_the_torque_given(self) -> None:
-        gains = [v for n in FIGURES for v in result(n).verdicts if "least gain" in v.statement]
-        load, torque = ([v for v in gains if v.source.kind == kind] for kind in (OURS.kind, TEXT))
-        assert (len(load), len(torque)) == (10, 11)
-        assert {v.statement.split()[3].rstrip(",") for v in torque if v.holds} == {"3F3j", "3F3k", "4F4i"}
-        peaks = [np.abs(curve("R11", "1F1j", case)[clear(case)]).max() for case in (IDEAL, *OFFSETS)]
-        assert peaks == sorted(peaks, reverse=True)
+        growing = {label for label, case in judged("R8", "But with the increase of offset").items() if case.holds}
+        assert growing == {"3F3j", "3F3k", "4F4i"}
+        for symbol in QUANTITIES[1:-1]:
+            peaks = rahman.offsets_peaks(COMPONENTS[symbol], "load")
+            assert peaks == sorted(peaks), symbol
+
+    def test_why_forces_fall_with_the_offset_at_equal_distance_from_a_dead_centre(self) -> None:
+        """The torque alone pulls the rod as hard at every a4; what it brings along j and k falls with the direction of crank
+        and rod, and the inertia forces of a4 = 30 in act against it."""
+        pulls, across, along = [], [], []
+        for case in (Case("", a4, 3.5, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0)):
+            at = tuple(rahman.dead_centres_deg(case)[1] + np.array([-10.0, 10.0]))
+
+            def force(
+                symbol: str, speed: float, torque: float, case: Case = case, at: tuple[float, ...] = at
+            ) -> FloatArray:
+                mechanism = parameters(case.offset_in)
+                closed = close(mechanism, np.radians(at), 3.5 * INCH)
+                loads = joint_loads(closed, speed=speed, torque=torque)
+                return in_thesis(loads, COMPONENTS[symbol])
+
+            pull = np.sqrt(sum(force(f"2F2{axis}", 0.0, CRANK_TORQUE) ** 2 for axis in "ijk"))
+            pulls.append(pull.mean())
+            across.append(np.abs(force("1F1j", 0.0, CRANK_TORQUE)).mean())
+            along.append(np.abs(force("4F4k", 0.0, CRANK_TORQUE)).mean())
+            if case.offset_in == 30.0:
+                for symbol in ("2F2i", "4F4j"):
+                    assert np.all(force(symbol, 0.0, CRANK_TORQUE) * force(symbol, CRANK_SPEED, 0.0) < 0.0)
+        assert pulls == pytest.approx([pulls[0]] * 4, rel=0.01)
+        assert across == sorted(across, reverse=True)
+        assert along == sorted(along, reverse=True)
+
+    @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+    def test_all_forces_by_dual_vectors(self, case: Case) -> None:
+        """The joint forces of the plant against those by dual vectors, which share no equation with it."""
+        mechanism, shift = parameters(case.offset_in, case.twist_deg), case.shift_in * INCH
+        clear_of = rahman.clear(case)
+        angles = np.degrees(THETA)[clear_of]
+        turned = follow(mechanism, np.radians(np.arange(0.0, 361.0, 20.0)), shift)
+        closed = close(mechanism, np.radians(angles), shift, turned.at((angles // 20.0).astype(int)))
+        loads = joint_loads(closed, speed=CRANK_SPEED, torque=CRANK_TORQUE)
+        for component in COMPONENTS.values():
+            found = rahman.values(case, component)[clear_of]
+            scale = TORQUE_LB_IN if component.unit == "lb.in" else TORQUE_LB_IN / CRANK_IN
+            assert np.abs(found - in_thesis(loads, component)).max() < 1e-9 * scale, component.symbol
+
+
+def in_thesis(loads: JointLoads, component: Component) -> FloatArray:
+    """A component of joint loads by dual vectors, in the thesis's unit and sense."""
+    if component.source in ("axial_force", "slider_force"):
+        si = loads.axial if component.source == "axial_force" else loads.slider_force
+    else:
+        si = loads.components(component.source, component.frame)[:, component.axis]
+    return component.sign * si / {"lb": POUND_FORCE, "lb.in": POUND_INCH}[component.unit]
+
+
+class TestMethod:
+    """The thesis's method to the letter against an independent reconstruction of it."""
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        ("case", "rotation", "error"),
+        list(zip(method.OPEN, (27.02, 37.84, 37.90), (5.88, 3.78, 2.74))),
+        ids=["S1", "232", "310"],
+    )
+    def test_what_the_iteration_leaves(self, case: Case, rotation: float, error: float) -> None:
+        found = method.followed(case)
+        assert np.max(found.rotation_deg) == pytest.approx(rotation, abs=0.005)
+        assert np.max(found.error_in) == pytest.approx(error, abs=0.005)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        ("rows", "from_before", "rotation", "error", "digit"),
+        [("printed", False, 23.0, 4.62, 0.05), ("upper", True, 20.3, 2.31, 0.05), ("all", True, 20.26, 1.71, 0.005)],
+    )
+    def test_variants_of_the_iteration(
+        self, rows: Rows, from_before: bool, rotation: float, error: float, digit: float
+    ) -> None:
+        found = turn(parameters(10.0), 3.5, rows, from_before=from_before)
+        assert np.max(found.rotation_deg) == pytest.approx(rotation, abs=digit)
+        assert np.max(found.error_in) == pytest.approx(error, abs=0.005)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        ("case", "printed", "mended"), list(zip(method.ROW_F, (84.0, 215.0), (40.0, 66.0))), ids=["S1", "310"]
+    )
+    def test_the_unsolved_row(self, case: Case, printed: float, mended: float) -> None:
+        found, with_erratum_2_mended = method.row_f(case)
+        assert np.nanmax(np.abs(found)) == pytest.approx(printed, abs=0.5)
+        assert np.abs(with_erratum_2_mended).max() == pytest.approx(mended, abs=0.5)
+
+    @pytest.mark.parametrize(("erratum_4", "rate"), [(False, -4.3389), (True, -4.3743)])
+    def test_theta2_rate_as_printed_and_mended(self, erratum_4: bool, rate: float) -> None:
+        found = joint_rates(method.CRANK_AT_SPEED, method.GENERAL, erratum_4=erratum_4)
+        assert float(found.th2) == pytest.approx(rate, abs=5e-5)
+
+    @pytest.mark.slow
+    def test_davidon_fletcher_powell_ends_at_a_least_error_which_is_not_zero(self) -> None:
+        """In the plane it closes the loop. With the twist it ends lower than the printed iteration, and the loop stays open."""
+        flat, _, settled = dependable(parameters(10.0), 0.0)
+        assert settled
+        assert flat.max() < 1e-9
+        rotation, position, _ = dependable(parameters(20.0, 232.0), 0.0)
+        assert rotation.max() > 20.0
+        assert position.max() > 1.0
+
+    def test_both_mended_the_planar_forces_are_the_plants(self) -> None:
+        found = method.planar_forces(erratum_5=True, erratum_6=True)
+        plane = Case("", 10.0, 0.0, 270.0)
+        for symbol in ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k"):
+            away = (found[symbol] - rahman.values(plane, COMPONENTS[symbol]))[rahman.clear(plane)]
+            assert np.abs(away).max() < 6e-10
 
 
 class TestFiles:

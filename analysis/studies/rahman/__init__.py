@@ -29,5 +29,6 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
         ),
         "rahman-rates": Entry("Rahman's rates: velocities and accelerations", "rahman.method", "sections 2.7, 2.8"),
         "rahman-forces": Entry("Rahman's force equations in the plane", "rahman.method", "sections 2.8, 3.1"),
+        "rahman-conclusions": Entry("Rahman's conclusions on his method", "rahman.method", "section 3.3"),
     }
 )

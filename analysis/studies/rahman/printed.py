@@ -6,7 +6,7 @@ that number in docs/rahman.md. The suffix ``_t`` of an angle's name is its rate,
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,15 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import POUND_FORCE
 
-from ...numerics.dual import Dual, about_i, about_j, about_k, cross
-from ...slider_crank import settle
-from ...slider_crank.closure import Rows, chain
+from ...numerics.dual import Dual, about_i, about_j, about_k, stack
+from ...slider_crank import close, settle
+from ...slider_crank.closure import Rows, chain, equations, planar, residuals
 from ...units import INCH
 
 FloatArray = NDArray[np.float64]
 
 #: Step of the crank angle (deg) in the continuation, and most corrections at an angle: our choice.
 STEP_DEG, MAX_STEPS = 5.0, 200
+#: Largest change of an angle (rad) or of S4 (in) in a step that counts as small: our choice too.
+STEP = 1e-6
+#: K2x2 of the rod (in2), of effect in eq 50a alone.
+ROD_X_SQUARE = 0.5
 #: Crank angles of the continuation (deg).
 GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
 
@@ -63,6 +67,56 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", 
         found.steps[at] = ended.steps[ended.settled]
         start = ended.unknowns[ended.settled] if from_before else None
     return found
+
+
+def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
+    """Iterate at every other angle by Newton and Raphson with Davidon, Fletcher and Powell, as in the thesis's reference 12.
+
+    The thesis prints the first alone (eqs 7 to 26). As we read the reference, a step by eq 23a is taken where it halves the sum
+    of squares of eq 25, lengths in inches, and a step of Davidon, Fletcher and Powell down that sum where it does not. The
+    start is the planar estimate, then the previous angle. Returns the rotation left (deg), the error of S4 (in), and whether
+    the last step was small at every angle.
+    """
+    unit, angles = np.array([1.0, 1.0, 1.0, 1.0, INCH]), np.radians(GRID_DEG[::2])
+    away = 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5), -np.eye(5)])
+    q, ended, settled = planar(p, angles[:1])[0] / unit, [], True
+    for angle in angles:
+
+        def at(q: FloatArray, angle: float = angle) -> tuple[FloatArray, FloatArray, float, FloatArray]:
+            """Return A and V of eqs 24 and 25, the sum of squares of V, and its slope."""
+            th, s1 = np.full(len(away), angle), np.full(len(away), shift_in * INCH)
+            matrix, right = equations(*chain(p, th, s1, (q + away) * unit), INCH, "printed")
+            sums = np.sum(right**2, -1)
+            return matrix[0], right[0], float(sums[0]), (sums[1:6] - sums[6:]) / 2e-6
+
+        matrix, right, error, slope = at(q)
+        metric: FloatArray = np.empty(0)
+        for _ in range(MAX_STEPS):
+            step = np.linalg.pinv(matrix) @ right
+            new = at(q + step)
+            if new[2] <= 0.5 * error:
+                metric = np.empty(0)
+            else:
+                metric = metric if metric.size else np.asarray(np.linalg.pinv(matrix.T @ matrix))
+                step = -metric @ slope
+                while (new := at(q + step))[2] > error and np.abs(step).max() > STEP:
+                    step *= 0.5
+                change = new[3] - slope
+                turned = metric @ change
+                if step @ change > 0.0:
+                    metric = (
+                        metric + np.outer(step, step) / (step @ change) - np.outer(turned, turned) / (change @ turned)
+                    )
+            q, (matrix, right, error, slope) = q + step, new
+            if np.abs(step).max() <= STEP:
+                break
+        else:
+            settled = False
+        ended.append(q)
+    shifts, found = np.full(angles.size, shift_in * INCH), np.array(ended) * unit
+    rotation, _ = residuals(chain(p, angles, shifts, found)[0])
+    position = np.abs(found[:, 4] - close(p, angles, shifts).slider_position)
+    return np.degrees(rotation), position / INCH, settled
 
 
 class Crank(NamedTuple):
@@ -197,8 +251,94 @@ def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
 
 def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
     """Build a dual vector (..., 3) of components that are numbers or arrays."""
-    joined = np.stack(np.broadcast_arrays(*real, *dual), -1).astype(float)
+    joined = np.stack(np.broadcast_arrays(*real, *dual), -1)
     return Dual(joined[..., :3], joined[..., 3:])
+
+
+def velocities(c: Crank, q: Joints, r: Joints) -> tuple[Dual, Dual, Dual]:
+    """Return the dual velocities by eqs 33, 36 and 32a, the mixed path."""
+    s3, c3 = np.sin(q.th3), np.cos(q.th3)
+    return (
+        _dual([0.0, 0.0, c.speed], [0.0, c.a1 * c.speed, c.shift_rate]),
+        _dual([0.0, -r.eta3, -r.th3], [-r.s4 * s3, r.s4 * c3, 0.0]),
+        _dual([0.0, 0.0, 0.0], [0.0, 0.0, -r.s4]),
+    )
+
+
+def forward_rod_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
+    """Return the rod's dual velocity by eq 35, the forward path."""
+    (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
+    return _dual(
+        [r.eta2 * s2 * ce - turning * se, r.eta2 * c2, turning * ce + r.eta2 * s2 * se],
+        [
+            c.speed * c.a1 * s2 * ce - c.shift_rate * se,
+            c.speed * c.a1 * c2 + r.eta2 * c.a2 * s2 * se + turning * c.a2 * ce,
+            c.shift_rate * ce + c.a1 * c.speed * s2 * se - r.eta2 * c.a2 * c2,
+        ],
+    )
+
+
+def crank_momentum(c: Crank, b: Bodies) -> Dual:
+    """Return the crank's dual momentum by eq 49a; with second rates in ``c`` its rate by eq 54, which has the same terms."""
+    m1, w, v = b.masses[0], c.speed, c.shift_rate
+    return _dual(
+        [0.0, m1 * w * (c.a1 + b.g1), m1 * v], [0.0, -m1 * b.g1 * v, m1 * (b.crank_square * w + b.g1 * c.a1 * w)]
+    )
+
+
+def forward_rod_momentum(c: Crank, b: Bodies, q: Joints, r: Joints) -> Dual:
+    """Return the rod's dual momentum by eq 50a, divided by its mass."""
+    (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
+    g2, square, twice = b.g2, b.rod_square, b.rod_square + b.g2 * c.a2
+    w, v = c.speed, c.shift_rate
+    return _dual(
+        [
+            c.a1 * w * s2 * ce - v * se,
+            (g2 * ce + c.a2 * ce) * turning + (g2 + c.a2) * r.eta2 * s2 * se + w * c.a1 * c2,
+            v * ce + c.a1 * w * s2 * se - (c.a2 + g2) * r.eta2 * c2,
+        ],
+        [
+            ROD_X_SQUARE * r.eta2 * s2 * ce - ROD_X_SQUARE * turning * se,
+            twice * r.eta2 * c2 - g2 * v * ce - g2 * c.a1 * w * s2 * se,
+            (square * ce + g2 * c.a2 * ce) * turning + twice * r.eta2 * s2 * se + c.a1 * g2 * w * c2,
+        ],
+    )
+
+
+def momenta(c: Crank, b: Bodies, q: Joints, r: Joints, *, slip: bool = False) -> tuple[Dual, Dual, Dual]:
+    """Return the dual momenta by eqs 49a, 52a and 53a; ``slip`` keeps the g3 for g2 of 52a (erratum 9), g3 being 0."""
+    (_, m2, m3), c3 = b.masses, np.cos(q.th3)
+    return (
+        crank_momentum(c, b),
+        _dual(
+            [-m2 * r.s4 * np.sin(q.th3), m2 * (r.s4 * c3 - b.g2 * r.th3), 0.0 if slip else m2 * b.g2 * r.eta3],
+            [0.0, -m2 * b.rod_square * r.eta3, m2 * (b.g2 * r.s4 * c3 - b.rod_square * r.th3)],
+        ),
+        _dual([0.0, 0.0, -m3 * r.s4], [0.0, 0.0, 0.0]),
+    )
+
+
+def momentum_rates(b: Bodies, q: Joints, r: Joints, a: Joints) -> tuple[Dual, Dual, Dual]:
+    """Return the rates of the dual momenta by eqs 54, 57 and 58, speed and shift being constant."""
+    (_, m2, m3), s3, c3 = b.masses, np.sin(q.th3), np.cos(q.th3)
+    turned = a.s4 * c3 - r.s4 * s3 * r.th3
+    return (
+        _dual([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        _dual(
+            [-m2 * (a.s4 * s3 + r.s4 * c3 * r.th3), m2 * (turned - b.g2 * a.th3), m2 * b.g2 * a.eta3],
+            [0.0, -m2 * b.rod_square * a.eta3, m2 * (b.g2 * turned - b.rod_square * a.th3)],
+        ),
+        _dual([0.0, 0.0, -m3 * a.s4], [0.0, 0.0, 0.0]),
+    )
+
+
+def inertia_force(velocity: Dual, momentum: Dual, rate: Dual) -> Dual:
+    """Return a dual inertia force by eqs 59 to 61, component by component as printed."""
+    (vx, vy, vz), (hx, hy, hz) = (
+        [Dual(x.real[..., n], x.dual[..., n]) for n in range(3)] for x in (velocity, momentum)
+    )
+    turned = (vy * hz - vz * hy, vz * hx - vx * hz, vx * hy - vy * hx)
+    return cast(Dual, rate + stack(turned))
 
 
 def joint_forces(
@@ -210,31 +350,8 @@ def joint_forces(
     ``erratum_5`` mends the signs of f1 and f3 in eqs 62 and 64. 1F1k is 0, as in the thesis.
     """
     (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))
-    w = c.speed
-    m1, m2, m3 = b.masses
-    velocities = (
-        _dual([0.0, 0.0, w], [0.0, c.a1 * w, 0.0]),
-        _dual([0.0, -r.eta3, -r.th3], [-r.s4 * s3, r.s4 * c3, 0.0]),
-        _dual([0.0, 0.0, 0.0], [0.0, 0.0, -r.s4]),
-    )
-    momenta = (
-        _dual([0.0, m1 * w * (c.a1 + b.g1), 0.0], [0.0, 0.0, m1 * (b.crank_square + b.g1 * c.a1) * w]),
-        _dual(
-            [-m2 * r.s4 * s3, m2 * (r.s4 * c3 - b.g2 * r.th3), m2 * b.g2 * r.eta3],
-            [0.0, -m2 * b.rod_square * r.eta3, m2 * (b.g2 * r.s4 * c3 - b.rod_square * r.th3)],
-        ),
-        _dual([0.0, 0.0, -m3 * r.s4], [0.0, 0.0, 0.0]),
-    )
-    turned = a.s4 * c3 - r.s4 * s3 * r.th3
-    rates = (
-        _dual([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
-        _dual(
-            [-m2 * (a.s4 * s3 + r.s4 * c3 * r.th3), m2 * (turned - b.g2 * a.th3), m2 * b.g2 * a.eta3],
-            [0.0, -m2 * b.rod_square * a.eta3, m2 * (b.g2 * turned - b.rod_square * a.th3)],
-        ),
-        _dual([0.0, 0.0, -m3 * a.s4], [0.0, 0.0, 0.0]),
-    )
-    f1, f2, f3 = (rate + cross(v, h) for rate, v, h in zip(rates, velocities, momenta))
+    known = zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(b, q, r, a))
+    f1, f2, f3 = (inertia_force(*of) for of in known)
     if erratum_5:
         f1, f3 = -f1, -f3
     (f1x, f1y, f1z), (f2x, f2y, f2z), (f3x, f3y, f3z) = (np.moveaxis(f.real, -1, 0) for f in (f1, f2, f3))

@@ -21,53 +21,12 @@ INFERRED = (
     "displacement, a force or a torque. Which component has which number is our inference, by the order of section 3.2."
 )
 
-
-class Spot(NamedTuple):
-    """Values at theta1 = 30 deg, 50 rpm, branch +.
-
-    The last two are the slider force along -k4 at a torque of 100 lb.in, and the torque without a slider force.
-    """
-
-    offset_in: float
-    shift_in: float
-    twist_deg: float
-    position_in: float
-    velocity_in_s: float
-    acceleration_in_s2: float
-    slider_force_lb: float
-    torque_lb_in: float
-
-
-# The available copy lacks the curves of the figures. Reference numbers are from an independent derivation of the closed form,
-# to the digits shown; none is an output of this program.
-
 #: Crank angles of the spikes in sections 3.2 and 3.3 (deg).
 SPIKES_DEG = (100.0, 300.0)
-#: Numbers of spikes that section 3.3 finds in a component (L1125): two in all others.
-SPIKES: Mapping[str, int] = MappingProxyType({"3F3j": 0, "3F3k": 1, "4F4k": 1})
-#: Shifts (in) up to which the thesis's iteration converges by a4 (in), and twists (deg) between which (L1121).
-SHIFTS_REACHED_IN: Mapping[float, float] = MappingProxyType({0.0: 1.5, 10.0: 3.5, 30.0: 9.0})
+#: Numbers of spikes that section 3.3 finds in a component (L1125), in words: two in all others.
+SPIKES: Mapping[str, str] = MappingProxyType({"3F3j": "no", "3F3k": "one", "4F4k": "one"})
+#: Twists (deg) between which the thesis's iteration converges (L1121).
 TWISTS_REACHED_DEG = (232.0, 310.0)
-
-SPOTS = (
-    Spot(10.0, 3.5, 270.0, 51.518171, 68.488429, -62.88695, -15.328251, -100.49853),
-    Spot(20.0, 0.0, 310.0, 44.111244, 62.432803, 36.61340, -8.206263, 2.15027),
-)
-#: Dead centres at S1 = 0 and 270 deg, by the offset in inches.
-DEAD_CENTRES_DEG: Mapping[float, tuple[float, float]] = MappingProxyType(
-    {10.0: (99.28, 285.26), 20.0: (108.82, 301.76), 30.0: (118.94, 322.14)}
-)
-#: Strokes (in) at S1 = 0 and 270 deg, by the offset in inches.
-STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935})
-#: Strokes at a4 = 20 in and S1 = 0, by the twist in degrees.
-STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
-#: Greatest shifts at which the crank turns fully at 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2).
-GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})
-#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). We read it as the
-#: greatest more than 10 deg from a dead centre, since it is unbounded there.
-AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = MappingProxyType(
-    {(10.0, 3.5, 270.0): (4.1, 0.05), (20.0, 0.0, 310.0): (27.0, 0.5)}
-)
 
 
 class Case(NamedTuple):
@@ -172,7 +131,8 @@ def _figures() -> Iterator[Figure]:
             what = "Slider displacement" if symbol == "S4" else f"Joint {kind}"
             shown = () if symbol == "S4" else (symbol,)
             title = f"{what} {symbol}; {FAMILIES[family].title}"
-            yield Figure(family, shown, title, f"section 3.2, L1111-1113{caption}")
+            judged = "L1125" + ("; L1119, L1127" if kind == "torque" else "")
+            yield Figure(family, shown, title, f"section 3.2, L1111-1113{caption}; statements, {judged}")
             number += 1
 
 

@@ -5,7 +5,7 @@ The methods are the true orbit, the corrected linear equation, and the thesis's 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from math import sqrt
@@ -14,7 +14,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K
 
 from ...numerics.boundaries import scan
-from ...periodic import Confirmation, Drive, Stability, confirm, orbit_test
+from ...periodic import Drive, orbit_test
 from ...youssef import (
     Form,
     PeriodicEquation,
@@ -25,10 +25,6 @@ from ...youssef import (
     perturbed_removing_damping,
     slider_equation,
 )
-from ..study import OURS, Verdict, at_most, near
-
-#: Turns of a long run.
-TURNS = 2000
 
 
 def crank_speed(lambda_k2: float) -> float:
@@ -94,25 +90,3 @@ def removing_estimate(parameters: FiveBarParameters, number: int = 1) -> float:
     """Estimate the damper (1/s) that removes a region of the corrected linear equation from its width."""
     found = equation(parameters)
     return perturbed_removing_damping(found, number) * crank_speed(hill(parameters, number).low)
-
-
-# Long runs
-
-
-@cache
-def long_run(parameters: FiveBarParameters, lambda_k2: float) -> Confirmation:
-    """Run the nonlinear mechanism for many turns from close to its periodic orbit."""
-    return confirm(parameters, Drive(speed=crank_speed(lambda_k2)), turns=TURNS)
-
-
-def run_verdicts(name: str, parameters: FiveBarParameters, places: Iterable[float]) -> list[Verdict]:
-    """Judge long runs: their growth against the multiplier, or their boundedness."""
-    verdicts = []
-    for lambda_k2 in places:
-        run, where = long_run(parameters, lambda_k2), f"long run; {name}, lambda_k^2 = {lambda_k2:g}"
-        if run.verdict.stability is Stability.MARGINAL:
-            verdicts.append(at_most(f"{where}: greatest deviation, of the first", OURS, 2.0, run.deviations.max()))
-        else:
-            multiplier = 1.0 - run.verdict.margin
-            verdicts.append(near(f"{where}: factor a turn, by the multiplier", OURS, multiplier, run.growth, 1e-5))
-    return verdicts

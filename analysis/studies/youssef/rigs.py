@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +28,13 @@ from ...periodic import (
     natural_frequency,
 )
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
-from ..study import OURS, StudyResult, Verdict, at_most
-from .runs import SETTLING_TIME, steady_turn
+from ..rules import ALIKE
+from ..study import StudyResult
+from ..variation import cache, vary
 
 LOST = "the measured curve is lost with the figure"
-#: Relative rise of the amplitude, and departure from a sine, that the thesis would hardly have noticed.
-NOTICED = 0.05
+#: Relative rise of the amplitude that no one notices on a graph.
+NOTICED = ALIKE
 #: Coefficient of friction in the guide that reduces the amplitude slightly.
 SLIGHT = 0.05
 #: The rig of each spring.
@@ -48,8 +48,6 @@ GRID = {
     spring: np.arange(first, last + 1.0, 5.0)
     for spring, first, last in (("A", 150, 520), ("B", 250, 820), ("C", 250, 350), ("D", 360, 500))
 }
-#: Difference (cm) up to which a run and an orbit, two turns of a run, or two sweeps, count as the same motion.
-SAME = 1e-4
 #: Samples of a turn.
 SAMPLES = 1440
 #: Greatest steps of the continuation relative to the range of speeds: fine enough to resolve the resonance of the third
@@ -59,8 +57,10 @@ FINE, COARSE = 5e-3, 2e-2
 
 @cache
 def rig(spring: str, **changes: float) -> FiveBarParameters:
-    """Return the rig of a spring, with changes of its parameters."""
-    parameters: FiveBarParameters = replace(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters, **changes)
+    """Return the rig of a spring, with the reader's changes of its parameters, and then these."""
+    parameters: FiveBarParameters = replace(
+        vary(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters), **changes
+    )
     return parameters
 
 
@@ -207,22 +207,6 @@ def marks(spring: str, *orders: int) -> Mapping[str, float]:
     """Return the natural frequency of a spring, or fractions of it, as marks of a panel."""
     words = {1: "natural", 2: "half", 3: "a third", 4: "a quarter"}
     return {f"{words[n]}, {natural_speed(spring) / n:.0f}": natural_speed(spring) / n for n in orders}
-
-
-def runs_verdict(spring: str, speeds: Sequence[float]) -> Verdict:
-    """Judge that runs from rest at u = 0 end in the periodic motions at some speeds (rpm)."""
-    worst = 0.0
-    for speed in speeds:
-        run = steady_turn(rig(spring), speed)
-        worst = max(worst, run.change, float(np.abs(run.slider_cm - slider(turn(spring, speed))).max()))
-    return at_most(
-        f"difference between orbits and runs of {SETTLING_TIME:g} s from rest at "
-        f"{', '.join(f'{speed:g}' for speed in speeds)} rpm",
-        OURS,
-        SAME,
-        worst,
-        "cm",
-    )
 
 
 def largest_multiplier(spring: str, low: float, high: float) -> float:

@@ -6,44 +6,47 @@ turns, rad/s and N.m.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
-from functools import cache
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.errors import AssemblyError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import DYN_PER_CM_PER_NEWTON_PER_METRE, TABLE_3_1
 
 from ...run import Inputs, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..rules import ALIKE
+from ..variation import cache, vary
 
 #: Crank speed of chapter III (rpm).
 SPEED = 420.0
 #: Springs of Fig 3.4 to 3.14 (dyn/cm).
 STIFFNESSES = (5e5, 1e6, 2e6)
-#: Share of the scale of a graph below which its reader sees no difference.
-ON_THE_GRAPH = 0.05
-#: Relative departure from a line up to which a quantity counts as linear.
-LINEAR = 0.1
+#: Tolerances in the words of statements.
+ALIKE_WORDS, SIGN = f"{ALIKE:g}, the rule for what is steady, linear or the same", "none, the sign decides"
 #: Time for a motion to become steady (s).
 SETTLING_TIME = 8.0
 
 
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
-    """Return the mechanism of Table 3.1 with a spring (dyn/cm), a damper (dyn.s/cm) and gravity (m/s2)."""
-    return replace(
-        TABLE_3_1,
-        slider_stiffness=stiffness / DYN_PER_CM_PER_NEWTON_PER_METRE,
-        slider_damping=damping / DYN_PER_CM_PER_NEWTON_PER_METRE,
-        gravity=gravity,
+    """Return Table 3.1 with a spring (dyn/cm), a damper (dyn.s/cm), gravity (m/s2) and the reader's changes."""
+    return vary(
+        replace(
+            TABLE_3_1,
+            slider_stiffness=stiffness / DYN_PER_CM_PER_NEWTON_PER_METRE,
+            slider_damping=damping / DYN_PER_CM_PER_NEWTON_PER_METRE,
+            gravity=gravity,
+        )
     )
 
 
 def plain(value: float) -> str:
     """Format a value as in the thesis's tables and in CSV headers: 5e5."""
-    return f"{value:.0e}".replace("e+0", "e")
+    return re.sub(r"\.?0*e\+0?", "e", f"{value:.3e}")
 
 
 def scientific(value: float) -> str:
@@ -94,7 +97,8 @@ def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[fl
         stop_time=turns * period,
         step=turns * period,
     )
-    assert not settling.status, "the published mechanisms stay assembled at the speeds of the figures"
+    if settling.status:
+        raise AssemblyError(f"the mechanism does not stay assembled at {speed_rpm:g} rpm: {settling.message}")
     u, v = (float(settling[name][-1]) for name in ("slider.position", "slider.velocity"))
     run = simulate(
         parameters,

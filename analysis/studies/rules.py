@@ -1,0 +1,27 @@
+"""The rule for the thesis's words of degree, the same in every study."""
+
+from __future__ import annotations
+
+#: "About", "approximately", "nearly", "almost", "in the region of" a number: largest departure relative to it.
+ABOUT = 0.15
+#: The same of an angle, which has no natural zero (deg).
+ABOUT_DEG = 10.0
+#: "Slightly", "a little": a change by no more than this, relative to what changes, and by more than `ALIKE`.
+SLIGHTLY = 0.15
+#: "Small", "negligible", "insignificant": no more than this, relative to what it is compared with.
+SMALL = 0.05
+#: "The same", "constant", "linear", "straight", "steady": what a reader cannot tell from it on a graph, relative to its scale.
+ALIKE = 0.05
+#: What a place on a graph can be read to: relative to the scale, and for a crank angle (deg).
+READ, READ_DEG = 0.02, 3.0
+
+#: The rule as the pages print it.
+RULE = (
+    "**Words of degree.** One rule holds on both pages. *About*, *approximately*, *nearly*, *almost*, *in the region of*: "
+    f"within {100 * ABOUT:g} % of the number, or within {ABOUT_DEG:g} deg of an angle. *Slightly*, *a little*: a change by at "
+    f"most {100 * SLIGHTLY:g} %, and by more than {100 * ALIKE:g} %. *Small*, *negligible*: at most {100 * SMALL:g} % of what "
+    f"it is compared with. *The same*, *constant*, *linear*, *straight*, *steady*: within {100 * ALIKE:g} % of the scale, "
+    f"which no one sees on a graph. A number that was read from a graph: within {100 * READ:g} % of its scale, or "
+    f"{READ_DEG:g} deg. A printed number: within half a unit of its last digit. *Increases*, *reduces*, *greater*, *sooner*: "
+    "the sign alone."
+)

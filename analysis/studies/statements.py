@@ -1,0 +1,191 @@
+"""A sentence of a thesis with its verdict: where it stands, what is measured, to which tolerance, and its cases."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import NamedTuple, SupportsFloat
+
+import numpy as np
+
+#: Kinds of sources: the thesis's text, and its program when run.
+TEXT, LISTING = "text", "listing"
+#: What a verdict may be.
+HOLDS, IN_PART, FAILS, UNJUDGED = OUTCOMES = ("holds", "holds in part", "does not hold", "cannot be judged")
+
+
+class Source(NamedTuple):
+    """Source of a statement: its kind, and its place in the thesis (section, lines L of the scanned text)."""
+
+    kind: str
+    place: str
+
+    @property
+    def words(self) -> str:
+        """The source as a reader without the documentation understands it."""
+        place = re.sub(r"\bL(?=\d)", "line ", self.place)
+        return f"{'the thesis' if self.kind == TEXT else 'the program of the thesis'}, {place}"
+
+
+def text(place: str) -> Source:
+    """Return a place in the thesis's text as a source."""
+    return Source(TEXT, place)
+
+
+def listing(place: str) -> Source:
+    """Return the thesis's program when run as a source."""
+    return Source(LISTING, place)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One of the cases of a statement; it holds if ``computed`` lies from ``lower`` to ``upper``.
+
+    Attributes
+    ----------
+    label : str
+    stated : str
+        Number as the thesis prints it; empty if it says it in words. Never a tolerance of ours.
+    computed : float or None
+        None where the case cannot be judged.
+    lower, upper : float
+        Range that the statement allows, with its tolerance.
+    why : str
+        Reason why the case fails or cannot be judged.
+    """
+
+    label: str
+    stated: str = ""
+    computed: float | None
+    lower: float = -np.inf
+    upper: float = np.inf
+    unit: str = ""
+    why: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the computed value is in the range."""
+        return self.computed is not None and bool(self.lower <= self.computed <= self.upper)
+
+    @property
+    def outcome(self) -> str:
+        """`HOLDS`, `FAILS` or `UNJUDGED`."""
+        return UNJUDGED if self.computed is None else HOLDS if self.holds else FAILS
+
+    @property
+    def expected(self) -> str:
+        """The stated number with its unit; empty where there is none."""
+        return f"{self.stated} {self.unit}".rstrip() if self.stated else ""
+
+    @property
+    def allowed(self) -> str:
+        """The range that is allowed, in words."""
+        low, high = (f"{bound:.6g}" for bound in (self.lower, self.upper))
+        if self.computed is None or self.lower == self.upper:
+            return low if self.computed is not None else ""
+        if np.isneginf(self.lower):
+            return f"at most {high}"
+        return f"at least {low}" if np.isposinf(self.upper) else f"{low} to {high}"
+
+    @property
+    def numbers(self) -> list[str]:
+        """The stated, allowed and computed values in words."""
+        named = (("stated", self.expected), ("allowed", self.allowed), ("computed", self.found))
+        return [f"{name} {value}" for name, value in named if value]
+
+    @property
+    def found(self) -> str:
+        """The computed value with its unit, to four digits or one more than are stated; empty where there is none."""
+        digits = max(4, 1 + len(re.sub(r"e.*|\D", "", self.stated).lstrip("0")))
+        return "" if self.computed is None else f"{self.computed:.{digits}g} {self.unit}".rstrip()
+
+
+def near(
+    label: str,
+    stated: str | float,
+    computed: SupportsFloat,
+    tolerance: float | None = None,
+    unit: str = "",
+    *,
+    why: str = "",
+) -> Case:
+    """Judge a value: a number as printed (a text), by default to half a unit of its last digit, or one said in words."""
+    value = float(stated)
+    if tolerance is None:
+        tolerance = 0.5 * 10.0 ** int(Decimal(str(stated)).as_tuple().exponent)
+    return _case(label, stated, computed, unit, why, lower=value - tolerance, upper=value + tolerance)
+
+
+def at_least(label: str, stated: str | float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
+    """Judge a lower bound: a number as printed (a text), or one that is said in words."""
+    return _case(label, stated, computed, unit, why, lower=float(stated))
+
+
+def at_most(label: str, stated: str | float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
+    """Judge an upper bound: a number as printed (a text), or one that is said in words."""
+    return _case(label, stated, computed, unit, why, upper=float(stated))
+
+
+def _case(label: str, stated: str | float, computed: SupportsFloat, unit: str, why: str, **bounds: float) -> Case:
+    printed = stated if isinstance(stated, str) else ""
+    return Case(label=label, stated=printed, computed=float(computed), unit=unit, why=why, **bounds)
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """Sentence of the thesis with its verdict.
+
+    Attributes
+    ----------
+    quote : str
+        The sentence to the letter: slips of the scan mended in square brackets, an ellipsis where it is cut.
+    source : Source
+    measure, tolerance : str
+        What is measured; the tolerance and where it comes from. Empty where the statement cannot be judged.
+    cases : tuple of Case
+        None where the statement cannot be judged.
+    why : str
+        Reason for the verdict; the statement needs one unless it holds, or its cases have their own.
+    """
+
+    quote: str
+    source: Source
+    measure: str = ""
+    tolerance: str = ""
+    cases: tuple[Case, ...] = ()
+    why: str = ""
+
+    @property
+    def outcome(self) -> str:
+        """One of `OUTCOMES`: it holds in part if some of its cases do."""
+        if all(case.computed is None for case in self.cases):
+            return UNJUDGED
+        holding = [case.holds for case in self.cases]
+        return HOLDS if all(holding) else IN_PART if any(holding) else FAILS
+
+    @property
+    def reason(self) -> str:
+        """The reason for the verdict: the numbers of a single case, how many of several hold, and why the others do not."""
+        parts = []
+        if len(self.cases) == 1:
+            parts += self.cases[0].numbers
+        elif self.outcome == IN_PART:
+            parts.append(f"{sum(case.holds for case in self.cases)} of {len(self.cases)} cases")
+        shared = {case.why for case in self.cases if not case.holds}
+        parts += shared if len(shared) == 1 else ()
+        return "; ".join(part for part in (*parts, self.why) if part)
+
+    @property
+    def reasons_differ(self) -> bool:
+        """Whether the cases fail for different reasons, so that each needs its own."""
+        return len({case.why for case in self.cases if not case.holds}) > 1
+
+    def __str__(self) -> str:
+        quote = self.quote if len(self.quote) <= 120 else f"{self.quote[:100].rsplit(' ', 1)[0]} ..."
+        outcome = self.outcome if self.outcome == HOLDS else self.outcome.upper()
+        lines = [f'"{quote}" ({self.source.words})', f"  {outcome}{self.reason and f': {self.reason}'}"]
+        for case in self.cases if len(self.cases) > 1 else ():
+            why = [case.why] if self.reasons_differ and not case.holds else []
+            lines.append("; ".join([f"    {case.label}: {case.outcome}", *case.numbers, *why]))
+        return "\n".join(lines)

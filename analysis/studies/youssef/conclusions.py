@@ -1,0 +1,458 @@
+"""What the thesis concludes: sections 8.0 and 9.1, each sentence that claims something.
+
+Most of them sum up what is judged in its chapter; here each is measured once more, by one number for all that it covers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
+
+from ...periodic import mean_effective_mass, natural_frequency
+from ...run import Trajectory
+from ...slider import slider_motion
+from ...synthesis import Search, SliderUnknown, evaluate
+from ...youssef import HarmonicMotion, resonance, slider_equation, two_harmonics
+from ..rules import ABOUT, ABOUT_DEG, ALIKE, SLIGHTLY, SMALL
+from ..statements import Case, Statement, at_least, at_most, near, text
+from ..study import Study, StudyResult
+from .chapter_3 import DAMPINGS, drift
+from .chapter_6 import TABLE, our_error, printed_error
+from .formulation import STEPS, integrated, multipliers
+from .free_crank import Turns, coast, launch
+from .problems import PROBLEMS
+from .regions import axis, hill, removing_estimate
+from .rig_2 import RANGE, length, linear_motion
+from .rigs import LOST, amplitude, turn
+from .runs import STIFFNESSES, plain, steady_turn, table_3_1
+from .series_2 import error_of, out_of_reach, path_motion, reduced
+
+NUMBER = "conclusions"
+OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
+#: Inertia ratios of chapters IV and V, dampers (1/s) and speeds (rad/s) of its resonance curves.
+RATIOS, DAMPER, SPEEDS = (0.25, 0.5, 1.0, 1.5, 2.0), 0.45, np.arange(10.0, 45.0, 0.05)
+#: Lengths of crank and coupler over the rocker's, in the steps of Fig 5.2 and 5.3.
+CRANKS, COUPLERS = (0.01, 0.03, 0.05, 0.07, 0.1), (0.8, 0.9, 1.0, 1.1, 1.2)
+#: Amplitude u/l4 above which a speed counts as resonant.
+LARGE = 0.1
+#: The damper of a free run (dyn.s/cm).
+DAMPED = {"with the damper": 3e4, "without": 0.0}
+#: Torques of the launches (dyn.cm).
+TORQUES = (1e7, 1e8, 2e8)
+SIGN = "none, the sign decides"
+
+
+@cache
+def short_crank(inertia_ratio: float) -> tuple[HarmonicMotion, ...]:
+    """Return u/l4 of chapter IV's mechanism over the speeds, by two harmonics."""
+    found = slider_equation(chapter_4(inertia_ratio), 1.0)
+    return tuple(
+        two_harmonics(replace(found, spring=SQUARE_OF_OMEGA_K / w**2, damping=DAMPER / w)) for w in SPEEDS.tolist()
+    )
+
+
+def harmonic(order: int, inertia_ratio: float) -> NDArray[np.float64]:
+    """Return the amplitude of a harmonic of u/l4 over the speeds."""
+    return np.array([motion.harmonic(order) for motion in short_crank(inertia_ratio)])
+
+
+def unlike_oscillator(inertia_ratio: float) -> float:
+    """Return the spread of the force, over the square of the speed, on an oscillator that gives the first harmonic."""
+    p, w = chapter_4(inertia_ratio, DAMPER), SPEEDS
+    part = p.slider_stiffness - mean_effective_mass(p) * w**2 + 1j * p.slider_damping * w
+    force = harmonic(1, inertia_ratio) * np.abs(part) / w**2
+    return float(np.ptp(force) / force.mean())
+
+
+def width(parameters: FiveBarParameters, number: int = 1) -> float:
+    """Return the width of a region of instability in lambda_k^2."""
+    return hill(parameters, number).width
+
+
+def spacing(run: Trajectory) -> float:
+    """Return the mean crank angle (deg) between the last three maxima of the slider in a run."""
+    angle = run["crank.angle"]
+    grid = np.arange(1.0, angle[-1], pi / 720.0)
+    u = np.interp(grid, angle, run["slider.position"])
+    tops = grid[1:-1][(u[1:-1] > u[:-2]) & (u[1:-1] >= u[2:])]
+    return float(np.degrees(np.diff(tops[-3:])).mean())
+
+
+def decay(stiffness: float, damping: float) -> float:
+    """Return the range of u over the last five turns of a free run over that of the first five, medians."""
+    swing = Turns.of(coast(stiffness, damping)).slider_range
+    return float(np.median(swing[-5:]) / np.median(swing[:5]))
+
+
+def introduction() -> tuple[Statement, ...]:
+    """Judge what 8.0 says of the theory."""
+    second = max(width(chapter_4(i), 2) / width(chapter_4(i)) for i in RATIOS)
+    twice = [axis(hill(chapter_4(i))) * OMEGA_K / natural_frequency(chapter_4(i)) for i in RATIOS]
+    return (
+        Statement(
+            "The resonance analysis showed a behaviour similar to a second order system while the stability analysis showed "
+            "instability in the second region, i. e. in the vicinity of twice the natural frequency only.",
+            text("8.0, L6057"),
+            "spread of the force over the square of the speed on a damped mass-spring system that gives the first harmonic, "
+            "10 to 45 rad/s, I4 = 1; speed in the middle of the first region over the natural frequency, the least of I4 = "
+            "0.25 to 2; width of the region at the natural frequency over that of the first, the most",
+            f"{ABOUT:g}, the rule for *almost*, for *similar* too; {ALIKE:g}, for *the same*; {SMALL:g}, for *negligible*",
+            (
+                at_most("unlike a second order system", ABOUT, unlike_oscillator(1.0)),
+                near("twice the natural frequency", 2.0, min(twice), 2.0 * ALIKE),
+                at_most(
+                    "another region", SMALL, second, why="undamped, there is another at the natural frequency itself"
+                ),
+            ),
+        ),
+        Statement(
+            "The instability, however, disappeared completely by addition of a small value of damping.",
+            text("8.0, L6063"),
+            "damping that removes the first region of the corrected equation, the most of I4 = 0.25 to 2, over the critical "
+            "one",
+            f"{SMALL:g}, the rule for *small*",
+            (
+                at_most(
+                    "of the critical damping",
+                    SMALL,
+                    max(removing_estimate(chapter_4(i)) for i in RATIOS) / (2.0 * OMEGA_K),
+                ),
+            ),
+        ),
+    )
+
+
+def kinematics() -> tuple[Statement, ...]:
+    """Judge the conclusions on synthesis and control."""
+    a, b = PROBLEMS["path-a"], PROBLEMS["path-b"]
+    still = a.convert(evaluate(a.task, b.linkage).error)
+    other = slider_motion(a.task, b.linkage, SliderUnknown(harmonics=3, stroke=0.25), search=Search(starts=4)).best
+    ratios = [printed_error(row.problem) / our_error(row.problem) for row in TABLE.values()]
+    true = [
+        p
+        for row in TABLE.values()
+        if (p := PROBLEMS[row.problem]).error and abs(printed_error(row.problem) / p.error - 1.0) <= ABOUT
+    ]
+    return (
+        Statement(
+            "The releasing of some constraints in linkage mechanisms and treating them as inputs that may be controlled "
+            "yield versatile and powerful mechanisms.",
+            text("9.1, L6993"),
+            why="there is no measure of versatile and powerful",
+        ),
+        Statement(
+            "For example the introduction of a second input to a four bar linkage gives a variety of outputs thus making "
+            "the linkage a multipurpose mechanism which may be adapted to generate a family of [output] motions.",
+            text("9.1, L6997"),
+            "area between path (a) and the curve of the links printed for path (b), with three harmonics of the slider over "
+            "that with the pivot fixed",
+            f"below {1.0 - ALIKE:g}, as a fall that is seen",
+            (at_most("path (a) by the links for path (b)", 1.0 - ALIKE, a.convert(other.error) / still),),
+        ),
+        Statement(
+            "[A] proper control of the slider enabled modifications and more accurate generation of outputs than could "
+            "otherwise be obtained.",
+            text("9.1, L7012"),
+            "error with two harmonics of the slider over that with the pivot fixed, the most of the eight problems of "
+            "chapter VI",
+            f"below {1.0 - ALIKE:g}, as a fall that is seen",
+            (at_most("most of eight problems", 1.0 - ALIKE, max(reduced().values())),),
+        ),
+        Statement(
+            "However, the control of this second input produced changes that were limited by an envelope dictated by the "
+            "linkage kinematics.",
+            text("9.1, L7016"),
+            "area of path (b) that lies farther from the crank shaft than the links reach; area between it and the curve "
+            "with five harmonics, over it",
+            "above 0; at least 1",
+            (
+                at_least("out of reach", 0.01, out_of_reach(), "cm2"),
+                at_least(
+                    "area with five harmonics over it", 1.0, error_of("path-b", path_motion(5).linkage) / out_of_reach()
+                ),
+            ),
+        ),
+        Statement(
+            "Therefore it was logical firstly to find the linkage that would approximately generate the desired output and "
+            "then secondly to introduce a second input and control it for more accurate generation.",
+            text("9.1, L7020"),
+            why="it is a choice; no other order is tried",
+        ),
+        Statement(
+            "As a result an optimisation method was developed, the output of which gave a planar linkage that minimised the "
+            "errors involved in function or path generation.",
+            text("9.1, L7026"),
+            f"error of the {len(ratios)} printed linkages that have one, over the least that we find with no longer link, "
+            "the most",
+            f"{1.0 + ALIKE:g}, the rule for *the same*",
+            (at_most("most of the printed linkages", 1.0 + ALIKE, max(ratios), why="most are no minima"),),
+        ),
+        Statement(
+            "The method could be applied to any planar linkage and was implemented as a package of subroutines for general "
+            "use.",
+            text("9.1, L7030"),
+            why="it is applied to four-bars and to one five-bar; any other needs other equations in its function (L6022)",
+        ),
+        Statement(
+            "The optimisation method was applied to a variety of examples and in most cases produced satisfactory results.",
+            text("9.1, L7037"),
+            f"printed linkages whose error is the stated one, within {ABOUT:g}, of {len(ratios)}",
+            "more than half: a result that the linkage does not give satisfies no one",
+            (
+                at_least(
+                    "as stated",
+                    0.5 * len(ratios),
+                    len(true),
+                    why="the others have 0.6 to 6 times the stated error",
+                ),
+            ),
+        ),
+    )
+
+
+def dynamics() -> tuple[Statement, ...]:
+    """Judge the conclusions on the equations of motion and their solutions."""
+    torques = {k: steady_turn(table_3_1(k), 420.0).torque for k in (STIFFNESSES[0], STIFFNESSES[-1])}
+    soft, stiff = torques.values()
+    drifts = {f"mu = {plain(mu)} dyn.s/cm": drift(mu) for mu in DAMPINGS}
+    launches = {f"T0 = {plain(torque)} dyn.cm": launch(torque) for torque in TORQUES}
+    accelerated = {}
+    for name, run in launches.items():
+        acting = run["crank.angle"] <= 1.0
+        accelerated[name] = float(run["crank.angle"][acting][run["crank.speed"][acting].argmax()])
+    swings = {
+        f"{words}; k = {plain(k)} dyn/cm": decay(k, damping) for words, damping in DAMPED.items() for k in (5e5, 2e6)
+    }
+    last = integrated(STEPS[-1])
+    return (
+        Statement(
+            "The multipliers were associated with the pin forces and suitable methods of solution of the equations of "
+            "motion were discussed.",
+            text("9.1, L7049"),
+            "multipliers of (3.1) less the plant's force of the rocker on the coupler and its torque, relative to the "
+            "greatest, the most of Fig 3.1",
+            "1e-9, above rounding errors",
+            (at_most("multipliers", 1e-9, max(case.computed or 0.0 for case in multipliers())),),
+        ),
+        Statement(
+            "It was found that, when performing the numerical integrations, it was better if all the derivatives of the "
+            "generalised coordinates used in the multipliers method were integrated.",
+            text("9.1, L7053"),
+            f"greatest error of u with all of them integrated, over that with u alone, step {1e3 * STEPS[-1]:g} ms; failure "
+            "of closure, which only the first has, over its error",
+            "below 1; 1 to 100, so that it tells the error",
+            (
+                at_most(
+                    "error", 1.0, last.errors[0] / last.errors[1], why="it is less accurate, but it can be checked"
+                ),
+                Case(
+                    label="failure of closure", computed=float(last.gap.max()) / last.errors[0], lower=1.0, upper=100.0
+                ),
+            ),
+        ),
+        Statement(
+            "It was found that the spring stiffness had little effect on the torque required to drive the mechanism.",
+            text("9.1, L7067"),
+            "greatest difference of the steady torque between k = 5e5 and 2e6 dyn/cm, relative to its peak; Table 3.1, 420 "
+            "rpm",
+            f"{SLIGHTLY:g}, the rule for *a little*",
+            (at_most("difference", SLIGHTLY, np.abs(soft - stiff).max() / np.abs(soft).max()),),
+        ),
+        Statement(
+            "It was also found that when the slider was opposed by both spring and viscous damping its motion was a "
+            "transient followed by periodic oscillations of period [2 pi] of the crank angle.",
+            text("9.1, L7071"),
+            "difference of u from one turn of the crank to the next after 8 s, 420 rpm",
+            "1e-4 cm, far less than one sees",
+            tuple(
+                at_most(f"k = {plain(k)} dyn/cm", 1e-4, steady_turn(table_3_1(k), 420.0).change, "cm")
+                for k in STIFFNESSES
+            ),
+        ),
+        Statement(
+            "However, when the spring was eliminated the slider moved with periodic oscillations superimposed on a linear "
+            "shift in its position thus making the linkage fall into a collinear configuration.",
+            text("9.1, L7077"),
+            "distance of u at the ends of the first turns from a line, relative to the drift over them; turns until the "
+            "links are collinear",
+            f"{ALIKE:g}, the rule for *linear*; within {40} turns",
+            (
+                *(
+                    at_most(f"line; {name}", ALIKE, run.bend, why="the drift accelerates")
+                    for name, run in drifts.items()
+                ),
+                *(
+                    Case(
+                        label=f"collinear; {name}",
+                        computed=None if np.isnan(run.collinear_turn) else run.collinear_turn,
+                        upper=40.0,
+                        unit="turns",
+                        why="not in the turns that were run",
+                    )
+                    for name, run in drifts.items()
+                ),
+            ),
+        ),
+        Statement(
+            "For a forced input (torsion bar input applied to the crank) it was found that the linkage accelerated until "
+            "the input torque became smaller than the load offered by the linkage after which the slider executed periodic "
+            "oscillations in [2 pi] of the crank angle.",
+            text("9.1, L7083"),
+            "crank angle of the greatest speed while the torque acts; crank angle between the last maxima of the slider",
+            f"below 1 rad, where the torque ends; {ABOUT_DEG:g} deg, the rule for *about*, as the oscillations decay",
+            (
+                *(at_most(f"greatest speed; {name}", 1.0, place, "rad") for name, place in accelerated.items()),
+                *(near(f"period; {name}", 360.0, spacing(run), ABOUT_DEG, "deg") for name, run in launches.items()),
+            ),
+        ),
+        Statement(
+            "The oscillations, however, decayed due to the viscous dissipation of energy in the slider guide.",
+            text("9.1, L7092"),
+            "range of u over a turn of a free run from 420 rpm, median of the last five turns over that of the first five",
+            f"below {1.0 - ALIKE:g} with the damper, as a fall that is seen, and above it without",
+            tuple(
+                (at_most if "with the" in name else at_least)(name, 1.0 - ALIKE, ratio)
+                for name, ratio in swings.items()
+            ),
+        ),
+    )
+
+
+def linearised() -> tuple[Statement, ...]:
+    """Judge the conclusions on the linear equation and its stability."""
+    ratios = (0.5, 1.0, 1.5)
+    first, second = ({i: harmonic(n, i) for i in ratios} for n in (1, 2))
+    speeds = np.array([resonance(chapter_4(i))[0] for i in RATIOS])
+    bend = np.abs(speeds - np.polyval(np.polyfit(RATIOS, speeds, 1), RATIOS)).max() / np.ptp(speeds)
+    tops = np.array([first[i].max() for i in ratios])
+    wide = np.array([np.count_nonzero(first[i] > LARGE) for i in ratios])
+    by_crank = [width(replace(p := chapter_4(1.0), crank_length=s * p.rocker_length)) for s in CRANKS]
+    by_coupler = [width(replace(p := chapter_4(2.0), coupler_length=s * p.rocker_length)) for s in COUPLERS]
+    by_inertia = [width(chapter_4(i)) for i in RATIOS]
+    narrow = max(width(chapter_4(i)) / hill(chapter_4(i)).low for i in RATIOS)
+    return (
+        Statement(
+            "Results for a short crank showed similarity to a damped second order linear system behaviour.",
+            text("9.1, L7102"),
+            "spread of the force over the square of the speed on a damped mass-spring system that gives the first harmonic, "
+            "10 to 45 rad/s",
+            f"{ABOUT:g}, the rule for *almost*, for *similarity* too",
+            tuple(at_most(f"I4 = {i:g}", ABOUT, unlike_oscillator(i)) for i in ratios),
+        ),
+        Statement(
+            "The major harmonic in the solution was the first harmonic; the remaining ones were almost negligible.",
+            text("9.1, L7104"),
+            f"second harmonic over the first, omega_c = {DAMPER:g}, the most of I4 = 0.5, 1, 1.5: greatest over greatest, "
+            "and at the same speed",
+            f"{SMALL:g}, the rule for *negligible*",
+            (
+                at_most("greatest over greatest", SMALL, max(second[i].max() / first[i].max() for i in ratios)),
+                at_most(
+                    "at the same speed",
+                    SMALL,
+                    max((second[i] / first[i]).max() for i in ratios),
+                    why="near half the natural frequency the second is the greater one",
+                ),
+            ),
+        ),
+        Statement(
+            "It was found that the increase in the rocker inertia decreased the natural frequency linearly, increased the "
+            "amplitude of vibrations and widened the region of resonance.",
+            text("9.1, L7110"),
+            "distance of the resonant speeds for I4 = 0.25 to 2 from a line, relative to their range, and their greatest "
+            "growth; least growth, from I4 = 0.5 to 1 and 1.5, of the greatest amplitude and of the range of speeds with "
+            f"u/l4 above {LARGE:g}, omega_c = {DAMPER:g}",
+            f"{ALIKE:g}, the rule for *linear*; {SIGN}",
+            (
+                at_most("distance from a line", ALIKE, bend),
+                at_most("growth of the resonant speed", 0.0, np.diff(speeds).max(), "rad/s"),
+                at_least("growth of the amplitude", 0.0, np.diff(tops).min()),
+                at_least("growth of the range", 1e-9, 0.05 * np.diff(wide).min(), "rad/s"),
+            ),
+        ),
+        Statement(
+            "The stability analysis showed a narrow region of instability in the [vicinity of w = 2wn] only, where wn is "
+            "the natural frequency.",
+            text("9.1, L7116"),
+            "width of the first region relative to its lower end, the most of I4 = 0.25 to 2; width of the region at the "
+            "natural frequency itself over it, the least",
+            f"{SMALL:g}, the rule for *small*",
+            (
+                at_most("first region", SMALL, narrow),
+                at_most(
+                    "region at the natural frequency",
+                    SMALL,
+                    min(width(chapter_4(i), 2) / width(chapter_4(i)) for i in RATIOS),
+                    why="without a damper it is there too, nearly half as wide",
+                ),
+            ),
+        ),
+        Statement(
+            "Instability of the slider motion was shown to increase with increase of crank length, decrease of coupler "
+            "length and increase of output inertia.",
+            text("9.1, L7120"),
+            "least growth of the width of the first region from one to the next of l2/l4 = 0.01 to 0.1; l3/l4 = 1 to 0.8 "
+            "and 1.2 to 1, with the same ground link and I4 = 2; I4 = 0.25 to 2",
+            SIGN,
+            (
+                at_least("longer crank", 0.0, np.diff(by_crank).min()),
+                at_least("shorter coupler, below 1", 0.0, -np.diff(by_coupler[:3]).max()),
+                at_least(
+                    "shorter coupler, above 1",
+                    0.0,
+                    -np.diff(by_coupler[2:]).max(),
+                    why="the region is narrowest where coupler and rocker are equal",
+                ),
+                at_least("larger inertia", 0.0, np.diff(by_inertia).min()),
+            ),
+        ),
+    )
+
+
+def experiment() -> tuple[Statement, ...]:
+    """Judge the conclusions on the experiment."""
+    error = max(
+        abs(length(s) * linear_motion(s, w).amplitude / amplitude(turn(s, w)) - 1.0) for s in "CD" for w in RANGE[::5]
+    )
+    return (
+        Statement(
+            "It was found that good agreement existed between the two in both phase and amplitude.",
+            text("9.1, L7134"),
+            why=LOST,
+        ),
+        Statement(
+            "The assumptions were found to be reasonable and good agreement between theory and experiment was found in the "
+            "resonance behaviour.",
+            text("9.1, L7145"),
+            "error of the amplitude by the linear equation, the most of springs C and D from 300 to 1000 rpm, relative",
+            f"{SMALL:g}, the rule for *negligible*",
+            (
+                at_most("assumptions", SMALL, error),
+                Case(label="agreement with the experiment", computed=None, why=LOST),
+            ),
+        ),
+    )
+
+
+def compute() -> StudyResult:
+    """Judge each sentence."""
+    return StudyResult(
+        number=NUMBER,
+        claim="What the introduction to the experiments says of the theory (8.0), and what the thesis concludes (9.1).",
+        assignment=(
+            "Sentences that only tell what was done claim nothing and have no verdict: L6045 to 6053, 6067 to 6096, 7005, "
+            "7034, 7041, 7045, 7061, 7065, 7096, 7108, 7128, 7130, 7136, 7140."
+        ),
+        statements=(*introduction(), *kinematics(), *dynamics(), *linearised(), *experiment()),
+    )
+
+
+#: The study by its name.
+STUDIES = {NUMBER: Study(NUMBER, compute)}

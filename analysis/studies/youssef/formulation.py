@@ -1,0 +1,260 @@
+"""Chapter II and section 3.1: the equations with Lagrange's multipliers, eqs (3.1) to (3.10), and how they are integrated.
+
+The equations are the thesis's, to the letter; what they give is compared with the plant, which has no multipliers.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+
+from linkwork.five_bar import kinematics
+
+from ...figures import Figure, Panel, plot_curves
+from ...run import Hamming, Inputs, TorsionBar, simulate
+from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ..statements import Case, Statement, at_least, at_most, near, text
+from ..study import Study, StudyResult, curves_of
+from .runs import SPEED, table_3_1
+
+#: The mechanism, its speed (rad/s), the time that is integrated (s), and the steps (s); appendix 1 begins with 1e-3 s.
+TABLE = table_3_1(1e6)
+OMEGA, STOP = SPEED * RAD_S_PER_RPM, 0.5
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
+#: Torque of the launch that is compared (N.m), and relative rounding errors of a solution.
+TORQUE, ROUNDING = 10.0, 1e-9
+
+
+def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
+    """Solve A W = B, eqs (3.1), (3.8), (3.10), at q = (th2, th3, th4, u).
+
+    W = (lambda3, lambda2, lambda1, u'', th4'', th3''); with a torque on the crank th2'' in place of lambda3 (3.2.2).
+    """
+    q, qd, p = np.asarray(q), np.asarray(qd), TABLE
+    m3, m4, r3, r4, g = p.coupler_mass, p.rocker_mass, p.coupler_cog_distance, p.rocker_cog_distance, p.gravity
+    (x2, x3, x4), (y2, y3, y4) = (
+        (p.crank_length, p.coupler_length, p.rocker_length) * f(q[:3]) for f in (np.cos, np.sin)
+    )
+    w2, w3, w4 = qd[:3] ** 2
+    couple = m3 * p.crank_length * r3 * np.exp(1j * (q[0] - q[1]))
+    lift4, sway4 = m4 * r4 * np.sin(q[2]), m4 * r4 * np.cos(q[2])
+    a = [
+        [-1.0, -x2, y2, 0.0, 0.0, couple.real],
+        [0.0, -x3, y3, 0.0, 0.0, p.coupler_inertia + m3 * r3**2],
+        [0.0, x4, -y4, -lift4, p.rocker_inertia + m4 * r4**2, 0.0],
+        [0.0, 0.0, 1.0, m4 + p.slider_mass, -lift4, 0.0],
+        [0.0, 0.0, 0.0, 1.0, -y4, y3],
+        [0.0, 0.0, 0.0, 0.0, -x4, x3],
+    ]
+    b = [
+        -m3 * g * x2 - couple.imag * w3,
+        -m3 * g * r3 * np.cos(q[1]) + couple.imag * w2,
+        -g * sway4,
+        -p.slider_damping * qd[3] - p.slider_stiffness * q[3] + sway4 * w4,
+        -x2 * w2 - x3 * w3 + x4 * w4,
+        y2 * w2 + y3 * w3 - y4 * w4,
+    ]
+    if torque is not None:
+        for row, entry in ((0, p.crank_inertia + m3 * p.crank_length**2), (1, couple.real), (4, y2), (5, x2)):
+            a[row][0] = entry
+        b[0] += torque
+    unknowns: NDArray[np.float64] = np.linalg.solve(a, b)
+    return unknowns
+
+
+def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return q and q' of the closed loop, eqs (2.1) and (2.4)."""
+    p = TABLE.constants()
+    g = kinematics.position(crank, u, p)
+    k = kinematics.coefficients(g, p)
+    rates = [speed, k.k32 * speed + k.k3u * velocity, k.k42 * speed + k.k4u * velocity, velocity]
+    return np.array([crank, kinematics.coupler_angle(g), kinematics.rocker_angle(g), u]), np.array(rates)
+
+
+def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return y' of y = (th3, th4, u, th3', th4', u') at constant crank speed: the first approach of 3.1."""
+    w = solved((OMEGA * t, *y[:3]), (OMEGA, *y[3:]))
+    return np.array([*y[3:], w[5], w[4], w[3]])
+
+
+def slider_alone(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return y' of y = (u, u') with the loop closed by its kinematics: the second approach."""
+    return np.array([y[1], solved(*closed(OMEGA * t, y[0], OMEGA, y[1]))[3]])
+
+
+class Integrated(NamedTuple):
+    """Runs with a constant step of Hamming's method: times (s), and over them the failure of closure (cm).
+
+    ``errors`` are the greatest of u (cm) by the first and the second approach of 3.1, ``unseen`` the greatest failure of
+    closure by the second (cm).
+    """
+
+    times: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    errors: tuple[float, float]
+    unseen: float
+
+
+@cache
+def integrated(step: float) -> Integrated:
+    """Integrate with a constant step."""
+    options = {"method": Hamming, "first_step": step, "max_step": step, "rtol": 1e3, "atol": 1e9}
+    q, qd = closed(0.0, 0.0, OMEGA, 0.0)
+    first, second = (
+        solve_ivp(f, (0.0, STOP), start, **options)
+        for f, start in ((all_derivatives, [*q[1:], *qd[1:]]), (slider_alone, [0.0, 0.0]))
+    )
+    true = solve_ivp(slider_alone, (0.0, STOP), [0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-14, t_eval=first.t).y[
+        0
+    ]
+    error, other = (CM_PER_METRE * float(np.abs(u - true).max()) for u in (first.y[2], second.y[0]))
+    again = np.transpose([closed(OMEGA * t, u, OMEGA, 0.0)[0] for t, u in zip(second.t, second.y[0])])
+    gaps = (opening(np.array([OMEGA * first.t, *first.y[:3]])), opening(again))
+    return Integrated(first.t, gaps[0], (error, other), float(gaps[1].max()))
+
+
+def opening(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the failure of closure (cm), eq (2.1), at columns q."""
+    lengths = np.array([TABLE.crank_length, TABLE.coupler_length, -TABLE.rocker_length])
+    gap: NDArray[np.float64] = CM_PER_METRE * np.abs(lengths @ np.exp(1j * q[:3]) - TABLE.ground_length - q[3])
+    return gap
+
+
+def evaluations_a_step() -> float:
+    """Count the evaluations of the accelerations that a further step of Hamming's method takes."""
+    counts = []
+    for stop in (0.4, 0.5):
+        found = solve_ivp(
+            slider_alone, (0.0, stop), [0.0, 0.0], method=Hamming, first_step=1e-3, max_step=1e-3, rtol=1e3, atol=1e9
+        )
+        counts.append((found.nfev, len(found.t)))
+    (fewer, short), (more, long) = counts
+    return float((more - fewer) / (long - short))
+
+
+def parasite(past: ArrayLike, rates: ArrayLike, h: float) -> float:
+    """Return the greatest root of a corrector on y' = -y at a step h, apart from the one that is near exp(-h)."""
+    roots = np.roots(np.asarray(past) + h * np.asarray(rates))
+    return float(np.abs(np.delete(roots, np.abs(roots - np.exp(-h)).argmin())).max())
+
+
+def multipliers() -> tuple[Case, ...]:
+    """Compare multipliers and accelerations with the plant's, at constant speed and under a torque."""
+    worst: dict[str, float] = {}
+    for drive, inputs in (
+        ("constant speed", Inputs(speed=OMEGA)),
+        ("torque", Inputs(torque=TorsionBar(torque=TORQUE))),
+    ):
+        run = simulate(TABLE, inputs, stop_time=0.3, step=0.003)
+        first = "drive.applied_torque" if inputs.speed is not None else "crank.acceleration"
+        names = {first: 0, "pin.C.fy": 1, "pin.C.fx": 2, "slider.acceleration": 3}
+        for i in range(1, len(run)):
+            where = closed(
+                *(run[name][i] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity"))
+            )
+            w = solved(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
+            for name, place in names.items():
+                label, scale = f"{name}; {drive}", np.abs(run[name]).max()
+                worst[label] = max(worst.get(label, 0.0), abs(w[place] - run[name][i]) / scale)
+    return tuple(at_most(label, ROUNDING, x) for label, x in worst.items())
+
+
+def compute() -> StudyResult:
+    """Judge chapter II and section 3.1, and compute the closure of the loop over time."""
+    found = {f"step {1e3 * step:g} ms": integrated(step) for step in STEPS}
+    columns = {"time [s]": found[next(iter(found))].times}
+    for label, run in found.items():
+        columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
+    order = np.polyfit(np.log(STEPS), np.log([run.errors[1] for run in found.values()]), 1)[0]
+    milne, hamming = (
+        parasite(past, rates, 0.1)
+        for past, rates in (((1, 0, -1), (1 / 3, 4 / 3, 1 / 3)), ((1, -9 / 8, 0, 1 / 8), (3 / 8, 6 / 8, -3 / 8, 0)))
+    )
+    return StudyResult(
+        number="3.1",
+        claim="The multipliers are the pin forces; with all second derivatives integrated, the closure of the loop "
+        "tells the error of the integration.",
+        columns=columns,
+        statements=(
+            Statement(
+                "[T]he multipliers are equal to the internal forces components and the input torque.",
+                text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
+                "solution of (3.1) with the matrices (3.8) and (3.10) as printed, those of 3.2.2 for a torque, less "
+                "the plant's torque, force of the rocker on the coupler and accelerations, relative to the greatest; "
+                "Table 3.1, k = 1e6 dyn/cm, 0.3 s",
+                f"{ROUNDING:g}, above rounding errors",
+                multipliers(),
+            ),
+            Statement(
+                "The accuracy or even the debugging of the integration procedure may then be examined by simple "
+                "checks on loop closure.",
+                text("3.1, L1744-1748; the same in L1772-1782"),
+                "greatest failure of closure over 0.5 s relative to the greatest error of u, all second derivatives "
+                "integrated by Hamming's method with a constant step",
+                "1 to 100: the check shows an error, and no more than a hundred times as large as it is",
+                tuple(
+                    Case(label=label, computed=run.gap.max() / run.errors[0], lower=1.0, upper=100.0)
+                    for label, run in found.items()
+                ),
+            ),
+            Statement(
+                "It is important to recognise that a loop closure check is meaningful other than for trivial "
+                "arithmetical checks, only if used in conjunction with the first approach.",
+                text("3.1, L1748-1757"),
+                "greatest error of u by the second approach, which integrates u alone and closes the loop by its "
+                "kinematics, relative to its failure of closure",
+                "more than 100: the check shows nothing of the error",
+                tuple(at_least(label, 100.0, run.errors[1] / run.unseen) for label, run in found.items()),
+            ),
+            Statement(
+                "These errors are in all cases convergent and, thus the methods are highly stable.",
+                text("2.4, L1383-1389"),
+                "factor by which an error that is no solution changes in a step on y' = -y, step 0.1, in the "
+                "corrector alone",
+                "below 1",
+                (
+                    at_most("Hamming's, which appendix 1 has", 1.0, hamming),
+                    at_most("Milne's, which CSMP has (L1411)", 1.0, milne, why="Milne's corrector is weakly unstable"),
+                ),
+            ),
+            Statement(
+                "One of their most attractive qualities is that they require only two evaluations of the function "
+                "[Phi] per step of integration.",
+                text("2.4, L1389-1393"),
+                "evaluations that a further step of (2.28) to (2.31) takes",
+                "none, they are counted",
+                (near("", "2", evaluations_a_step(), 0.0),),
+            ),
+            Statement(
+                "The Hamming fourth order modified predictor-corrector is the method chosen here.",
+                text("2.4, L1407-1409"),
+                "order at which the error of u falls with the step; modifier and final value take the leading error "
+                "out, and add one",
+                "at least the order",
+                (at_least("", "4", order),),
+            ),
+        ),
+    )
+
+
+def draw(result: StudyResult) -> Figure:
+    """Draw the failure of closure over the time."""
+    time, *names = result.columns
+    curves = curves_of(result, time, {name: name.partition("; ")[2].partition(" [")[0] for name in names})
+    panel = Panel(
+        x_label=time,
+        y_label="failure of closure [cm]",
+        curves=curves,
+        logarithmic="y",
+        legend_at="outside",
+        x_range=(0.0, STOP),
+    )
+    return plot_curves([panel], title=result.heading)
+
+
+#: The studies by number.
+STUDIES = {"3.1": Study("3.1", compute, draw)}

@@ -1,0 +1,310 @@
+"""Section 4.1 to 4.4: the linearised equations (4.1) to (4.35), one by one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import cos, degrees, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import fsolve
+
+from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import SIGMA2, chapter_4
+
+from ...figures import Figure, Panel, plot_curves
+from ...numerics.fourier import FourierSeries
+from ...units import RAD_S_PER_RPM
+from ...youssef import Form, SliderEquation, Variant, slider_equation, two_harmonics
+from ...youssef.printed_coefficients import DATUM, Coefficients, Datum, convert, listed, printed, ratios
+from ..statements import Case, Statement, at_least, at_most, near, text
+from ..study import Study, StudyResult, curves_of
+from .runs import SPEED, table_3_1
+
+#: Greatest rounding errors, crank lengths sigma2 that show an order, and departure of a limit at the shorter one.
+ROUNDING, SHORT, LIMIT = 1e-9, (0.002, 0.001), 0.01
+TURN = np.linspace(0.0, 2.0 * pi, 361)
+
+
+def with_crank(sigma2: float, inertia_ratio: float = 1.0) -> FiveBarParameters:
+    """Return the mechanism of chapters IV and V with another crank, sigma2 = l2/l4."""
+    mechanism = chapter_4(inertia_ratio)
+    return replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
+
+
+def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the angles of coupler and rocker over a turn with the slider held."""
+    p = parameters.constants()
+    places = [kinematics.position(angle, zeta * p.l4, p) for angle in TURN.tolist()]
+    coupler, rocker = (np.array([f(g) for g in places]) for f in (kinematics.coupler_angle, kinematics.rocker_angle))
+    return coupler, rocker
+
+
+@cache
+def datum(sigma2: float) -> Datum:
+    """Return the datum by (4.1), and crank and coupler by the closure (4.6)."""
+    _, rocker = angles(with_crank(sigma2))
+    middle = 0.5 * (rocker.max() + rocker.min())
+
+    def closure(x: NDArray[np.float64]) -> list[float]:
+        gap = sigma2 * np.exp(1j * x[0]) - 1.0 - np.exp(1j * middle) + np.exp(1j * x[1])
+        return [gap.real / sigma2, gap.imag / sigma2]
+
+    crank, coupler = fsolve(closure, [DATUM.crank, pi - middle], xtol=1e-11).tolist()
+    return Datum(crank, coupler, middle)
+
+
+def deviations(sigma2: float) -> tuple[float, float]:
+    """Return the greatest errors of xi3 and xi4 by (4.8) over a turn, the slider off by sigma2/2."""
+    alpha, a3, a4 = datum(sigma2)
+    zeta, s = 0.5 * sigma2, sin(a4 - a3)
+    by_print = (
+        a + (cos(b) * zeta - sigma2 * np.cos(TURN - b) + sigma2 * cos(alpha - b)) / s for a, b in ((a3, a4), (a4, a3))
+    )
+    first, second = (float(np.abs(x - true).max()) for x, true in zip(by_print, angles(with_crank(sigma2), zeta)))
+    return first, second
+
+
+def residuals() -> dict[str, float]:
+    """Return the residual of each equation (4.10) to (4.20) in a motion of the plant, relative to its greatest term.
+
+    The plant is Table 3.1 without gravity, whose coupler has mass and whose rocker is not balanced.
+    """
+    par, w = table_3_1(1e6, gravity=0.0), SPEED * RAD_S_PER_RPM
+    p, worst = par.constants(), dict[str, float]()
+    m3, m4, r3, r4 = par.coupler_mass, par.rocker_mass, par.coupler_cog_distance, par.rocker_cog_distance
+    # (4.14)
+    i3, i4, mr3 = (x / (m4 * p.l4**2) for x in (p.i3b, p.i4d, m3 * p.l2 * r3))
+    s2, s3, s4, p45, k, c = p.l2 / p.l4, p.l3 / p.l4, r4 / p.l4, m4 / p.m45, p.k / (p.m45 * w**2), p.mu / (p.m45 * w)
+    for th in TURN[::15].tolist():
+        u, v = 0.01 * cos(2.0 * th), 0.3 * sin(th + 1.0)
+        state, inputs = (th, u, w, v, 0.0, 0.0), dynamics.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        g = kinematics.position(th, u, p)
+        m = dynamics.motion(g, kinematics.coefficients(g, p), state, inputs, p)
+        pins = dynamics.reactions(g, state, m, inputs, p)
+        z, dz, ddz = u / p.l4, v / (p.l4 * w), m.slider_acceleration / (p.l4 * w**2)
+        d3, d4, dd3, dd4 = m.w3 / w, m.w4 / w, m.e3 / w**2, m.e4 / w**2
+        f1, f2, f3 = (x / (m4 * w**2 * p.l4) for x in (pins.cx, pins.cy, m.torque / p.l4))
+        y23, x23 = g.s2 * g.c3 - g.c2 * g.s3, g.c2 * g.c3 + g.s2 * g.s3
+        terms = {
+            "(4.10), (4.15)": (mr3 * x23 * dd3, s2 * g.s2 * f1, -s2 * g.c2 * f2, -f3, mr3 * y23 * d3**2),
+            "(4.11), (4.16)": (i3 * dd3, s3 * g.s3 * f1, -s3 * g.c3 * f2, -mr3 * y23),
+            "(4.12), (4.17)": (i4 * dd4, -s4 * g.s4 * ddz, -g.s4 * f1, g.c4 * f2),
+            "(4.13), (4.18)": (ddz, -p45 * s4 * g.s4 * dd4, c * dz, k * z, p45 * f1, -p45 * s4 * g.c4 * d4**2),
+            "(4.19)": (s3 * g.s3 * dd3, -g.s4 * dd4, ddz, s2 * g.c2, s3 * g.c3 * d3**2, -g.c4 * d4**2),
+            "(4.20)": (s3 * g.c3 * dd3, -g.c4 * dd4, -s2 * g.s2, -s3 * g.s3 * d3**2, g.s4 * d4**2),
+        }
+        for name, parts in terms.items():
+            worst[name] = max(worst.get(name, 0.0), abs(sum(parts)) / max(map(abs, parts)))
+    return worst
+
+
+def coefficients(sigma2: float) -> dict[str, float]:
+    """Return the coefficients of (4.21) as printed, about its own datum, relative to the right ones of first order."""
+    mechanism = with_crank(sigma2)
+    right = slider_equation(mechanism, 1.0, variant=Variant.FIRST_ORDER)
+    parts = printed(ratios(mechanism), datum(sigma2))
+    found = {name: _over(getattr(parts, name), parts.spring) for name in ("inertia", "stiffness", "force")}
+    wanted = {"inertia": right.mass, "stiffness": right.stiffness, "force": right.force}
+    names = {"inertia": ("D1", "E1", "F1"), "stiffness": ("G1", "H1", "P1"), "force": ("Q1", "R1", "S1")}
+    return {
+        f"{symbol}, {name}": value / true
+        for name, symbols in names.items()
+        for symbol, value, true in zip(
+            symbols, found[name], (wanted[name].mean, wanted[name].cos[1], wanted[name].sin[1])
+        )
+        if abs(true) > ROUNDING
+    }
+
+
+def _over(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
+    """Return mean, cosine and sine of a quotient to first order."""
+    mean = part.mean / by.mean
+    return mean, *((x[1] - mean * y[1]) / by.mean for x, y in ((part.cos, by.cos), (part.sin, by.sin)))
+
+
+def expansion(sigma2: float) -> NDArray[np.float64]:
+    """Return the mean, first and second harmonic of S/I that (4.23) and (4.24) leave out, about the printed datum."""
+    parts = printed(ratios(with_crank(sigma2)))
+    kept, angle = convert(parts, Form.SERIES).spring, np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
+    left = FourierSeries.from_samples(parts.spring(angle) / parts.inertia(angle) - kept(angle), 2)
+    return np.abs(left.exponential[2:])
+
+
+def recurrence(equation: SliderEquation, mean: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return A and B of (4.33) by (4.34) and (4.35), with a ``mean`` damper in place of lambda_c: (4.32) if there is "
+    "none."""
+    s, d, k, f = (
+        equation.spring_factor,
+        equation.damping_factor,
+        equation.stiffness.to_order(2),
+        equation.force.to_order(2),
+    )
+    b00, (b11, b13), (b12, b14) = (
+        equation.spring * s.mean + k.mean,
+        equation.spring * s.cos[1:3] + k.cos[1:],
+        equation.spring * s.sin[1:3] + k.sin[1:],
+    )
+    (d11, d13), (d12, d14) = equation.damping * d.cos[1:3], equation.damping * d.sin[1:3]
+    a = [
+        [2 * b00, b11 - d12, b12 + d11, b13 - 2 * d14, b14 + 2 * d13],
+        [2 * b11, -2 + 2 * b00 + b13 - d14, 2 * mean + b14 + d13, b11 - 2 * d12, b12 + 2 * d11],
+        [2 * b12, -2 * mean + b14 + d13, -2 + 2 * b00 - b13 + d14, -b12 - 2 * d11, b11 - 2 * d12],
+        [2 * b13, b11 + d12, -b12 + d11, -8 + 2 * b00, 4 * mean],
+        [2 * b14, b12 - d11, b11 + d12, -4 * mean, -8 + 2 * b00],
+    ]
+    right = [2 * f.mean, 2 * f.cos[1], 2 * f.sin[1], 2 * f.cos[2], 2 * f.sin[2]]
+    return np.array(a), np.array(right)
+
+
+def balanced(omega_c: float, as_printed: bool = True) -> float:
+    """Return how far (4.34) is from the balance of (4.29), relative to its solution, at 25 rad/s and I4 = 1."""
+    equation = slider_equation(chapter_4(1.0, omega_c), 25.0, variant=Variant.PRINTED, form=Form.SERIES)
+    mean = equation.damping * (1.0 if as_printed else equation.damping_factor.mean)
+    found = np.linalg.solve(*recurrence(equation, mean))
+    series = two_harmonics(equation).series
+    true = np.array([series.cos[0], series.cos[1], series.sin[1], series.cos[2], series.sin[2]])
+    return float(np.abs(found - true).max() / np.abs(true).max())
+
+
+def compute() -> StudyResult:
+    """Judge the equations, and compute the coefficients of (4.21) over the crank angle."""
+    small, smaller = (deviations(s) for s in SHORT)
+    orders = [float(np.log2(x / y)) for x, y in zip(small, smaller)]
+    own = datum(SIGMA2)
+    left = np.log2(expansion(SHORT[0]) / expansion(SHORT[1]))
+    mechanism = chapter_4(1.0)
+    ways = {
+        "right": _quotients(slider_equation(mechanism, 1.0)),
+        "(4.21) as printed": _of(printed(ratios(mechanism))),
+        "listing of appendix 2": _of(listed(ratios(mechanism))),
+    }
+    columns = {"crank angle [deg]": np.degrees(TURN)}
+    for i, name in enumerate(("inertia M", "stiffness K", "force F")):
+        columns |= {f"{name}; {way} [1]": parts[i](TURN) for way, parts in ways.items()}
+    return StudyResult(
+        number="4.2",
+        claim="The equations (4.1) to (4.35), one by one, each against the plant or the equations before it.",
+        columns=columns,
+        statements=(
+            Statement(
+                "The angles [alpha] and [alpha3] are then calculated accordingly.",
+                text("4.1, eqs (4.1), (4.6), L2413-2417"),
+                "datum by (4.1) and the closure (4.6) at sigma2 = 0.05 beside that of appendices 2 to 4, ALF, ALF3, "
+                "ALF4 (L8404)",
+                "half a degree: the listings have whole ones",
+                tuple(
+                    near(
+                        name,
+                        f"{degrees(x):.0f}",
+                        degrees(y),
+                        unit="deg",
+                        why="it follows from sines and cosines that were rounded",
+                    )
+                    for name, x, y in zip(("alpha", "alpha3", "alpha4"), DATUM, own)
+                ),
+            ),
+            Statement(
+                "Substituting equations (4.6) into equations (4.5) we obtain: (4.7) and hence (4.8)",
+                text("4.1, eqs (4.2) to (4.8), L2421-2477"),
+                "order in the crank's length of the error of (4.8) against the closed linkage, the slider off by "
+                f"half of sigma2, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
+                "2, the first order that is neglected in (4.4), to 0.05",
+                tuple(near(name, 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
+            ),
+            Statement(
+                "[T]hen by application of the Lagrangian multiplier method stated in equation (2.5) the following "
+                "equations are obtained.",
+                text("4.2.1, eqs (4.9) to (4.20), L2501-2613"),
+                "residual in a motion of the plant without gravity, with the pin force at C for the multipliers, "
+                "relative to the greatest term",
+                f"{ROUNDING:g}, above rounding errors",
+                tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
+            ),
+            Statement(
+                "[T]he following linearised equation of motion of the slider may be obtained. [(4.21)]",
+                text("4.2.1, eq (4.21), L2620-2794"),
+                "coefficients over A1 + B1 cos + C1 sin, relative to the right ones, at I4 = 1 and sigma2 = "
+                f"{SHORT[1]:g}, about their own datum, massless coupler and centre of mass of the rocker on the "
+                "slider; the factor of zeta' without a damper relative to M'",
+                f"{LIMIT:g}, more than the terms of second order",
+                (
+                    *(
+                        Case(label=name, computed=None, why="its sign cannot be read, its size is right")
+                        if name.startswith("P1")
+                        else near(name, 1.0, x, LIMIT, why="three times too large")
+                        for name, x in coefficients(SHORT[1]).items()
+                    ),
+                    near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
+                ),
+            ),
+            Statement(
+                "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
+                "least a factor [...] in the worst cases.",
+                text("4.3, L2797-2801"),
+                why="the factor cannot be read",
+            ),
+            Statement(
+                "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
+                "[(4.23)]",
+                text("4.3, eqs (4.22) to (4.29), L2853-2930"),
+                "order of what (4.23) and (4.24) leave out of the quotient of the printed coefficients, from sigma2 "
+                f"= {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1",
+                "3, to 0.05",
+                tuple(
+                    at_least(name, 2.95, x, why="the mean has a part of second order too")
+                    for name, x in zip(("mean", "first harmonic", "second harmonic"), left)
+                ),
+            ),
+            Statement(
+                "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
+                "both sides of equation (4.31) we obtain the following recurrence relationships.",
+                text("4.4.1, 4.4.2, eqs (4.30) to (4.35), L2988-3103"),
+                "solution of (4.33) with (4.34) and (4.35) against the balance of two harmonics of (4.29), relative "
+                "to its greatest coefficient, at 25 rad/s and I4 = 1",
+                f"{ROUNDING:g}, above rounding errors",
+                (
+                    at_most("without a damper, (4.32)", ROUNDING, balanced(0.0)),
+                    at_most(
+                        "omega_c = 1.2 1/s",
+                        ROUNDING,
+                        balanced(1.2),
+                        why="2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
+                    ),
+                ),
+            ),
+        ),
+    )
+
+
+def _of(parts: Coefficients) -> tuple[FourierSeries, ...]:
+    """Return M, K and F of the thesis's coefficients to first order."""
+    return tuple(
+        FourierSeries(np.array([mean, c]), np.array([0.0, s]))
+        for mean, c, s in (_over(part, parts.spring) for part in (parts.inertia, parts.stiffness, parts.force))
+    )
+
+
+def _quotients(equation: SliderEquation) -> tuple[FourierSeries, ...]:
+    return equation.mass, equation.stiffness, equation.force
+
+
+def draw(result: StudyResult) -> Figure:
+    """Draw M, K and F over the crank angle."""
+    angle, *names = result.columns
+    panels: list[Panel] = []
+    for name in dict.fromkeys(column.partition(";")[0] for column in names):
+        chosen = {c: "" if panels else c.partition("; ")[2].partition(" [")[0] for c in names if c.startswith(name)}
+        curves = [replace(curve, line=line) for curve, line in zip(curves_of(result, angle, chosen), ("-", "--", ":"))]
+        panels.append(
+            Panel(
+                x_label=angle, y_label=f"{name}, I4 = 1", curves=curves, x_range=(0.0, 360.0), x_ticks=range(0, 361, 90)
+            )
+        )
+    return plot_curves(panels, title=result.heading, columns=2, size=(3.9, 2.9))
+
+
+#: The studies by number.
+STUDIES = {"4.2": Study("4.2", compute, draw)}

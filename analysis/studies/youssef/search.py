@@ -1,0 +1,387 @@
+"""The search of section 6.3 as the program of appendix 5 has it, for ellipse (a) with bounds on the lengths; Fig 6.2 and 6.3.
+
+The downhill simplex reflects its worst apex, moves doubly far if that is best, halves the move, or halves itself about its best
+apex (L9480 to L9610). Starting sets follow (6.11); a set outside its bounds is put onto them, and one whose links do not
+close moves back by quarters (L9697). The bounds of the lengths are printed, those of place and angles are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import mannwhitneyu
+
+from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
+from ...synthesis import Search, TimedPath, UntimedPath, area_between, evaluate, synthesize, turn
+from ...units import CM_PER_METRE
+from ..rules import ALIKE, SMALL
+from ..statements import Statement, at_least, at_most, near, text
+from ..study import Study, StudyResult, padded
+from .chapter_6 import PRINTED, TARGET, FloatArray, our_error, pairing_area
+from .problems import PROBLEMS, N, ellipse
+
+PROBLEM = "ellipse-a-bounded"
+#: Bounds of X0, Y0, l1 to l4, r (cm), a1, th20, a2 (rad).
+LOW = np.array([-20.0, -20.0, 10.0, 0.1, 10.0, 10.0, 0.0, -pi, -pi, -pi])
+HIGH = np.array([60.0, 60.0, 30.0, 10.0, 30.0, 30.0, 30.0, pi, pi, pi])
+#: Relative difference at which the search stops, the program's (L8962), and evaluations at which it is given up.
+EPS, MOST = 1e-2, 4000
+#: Searches of each kind; located minima in a fresh cycle; points and parameters to begin with: X0, Y0, l2, a1, th20.
+SEARCHES, INCLUDED, FEWER_POINTS, FEWER = 20, 4, 12, [0, 1, 3, 7, 8]
+#: Random sets by (6.11), and probability below which a difference is not taken for chance.
+SETS, CHANCE = 2000, 0.05
+
+Error = Callable[[FloatArray], float]
+
+
+class Found(NamedTuple):
+    """End of a search: the parameters, the error (cm2), and the evaluations that it took."""
+
+    parameters: FloatArray
+    error: float
+    evaluations: int
+
+
+def residuals(v: FloatArray, n: int = N) -> tuple[FloatArray, FloatArray]:
+    """Return the distances of P from the points of the ellipse at n crank angles (cm), along x and y, by either closure."""
+    x0, y0, l1, l2, l3, l4, r, a1, th20, a2 = v
+    pin = l2 * np.exp(1j * (turn(n) + th20))
+    reach = np.abs(l1 - pin)
+    turned = np.arccos(np.clip((l3**2 + reach**2 - l4**2) / (2.0 * l3 * reach), -1.0, 1.0))
+    target = CM_PER_METRE * ellipse(10.0, n) @ np.array([1.0, 1j])
+    points = (pin + r * np.exp(1j * (np.angle(l1 - pin) + side * turned + a2)) for side in (1.0, -1.0))
+    first, second = (x0 + 1j * y0 + np.exp(1j * a1) * p - target for p in points)
+    return np.concatenate([first.real, first.imag]), np.concatenate([second.real, second.imag])
+
+
+def error(v: FloatArray, n: int = N) -> float:
+    """Return the sum of the squared distances by the better closure (cm2)."""
+    return min(float(away @ away) for away in residuals(v, n))
+
+
+def closes(v: FloatArray) -> bool:
+    """Return whether the links close at all crank angles, by (6.14)."""
+    l1, l2, l3, l4 = v[2:6]
+    return all(4.0 * l4**2 * d**2 >= (l3**2 - l4**2 - d**2) ** 2 for d in (l1 + l2, l1 - l2))
+
+
+def admitted(v: FloatArray, towards: FloatArray) -> FloatArray:
+    """Return a set put onto its bounds and moved back by quarters until its links close."""
+    v = np.clip(v, LOW, HIGH)
+    while not closes(v):
+        v = np.clip(0.75 * v + 0.25 * towards, LOW, HIGH)
+    return v
+
+
+def drawn(random: np.random.Generator) -> FloatArray:
+    """Draw a set by (6.11)."""
+    return np.asarray(LOW + (HIGH - LOW) * np.sin(random.uniform(0.0, 2.0 * pi, LOW.size)) ** 2)
+
+
+def starting_sets(random: np.random.Generator, first: list[FloatArray]) -> FloatArray:
+    """Return a set more than there are parameters: the first ones, and more by (6.11)."""
+    sets = list(first)
+    while not sets:
+        sets = [v for v in [drawn(random)] if closes(v)]
+    while len(sets) <= LOW.size:
+        sets.append(admitted(drawn(random), np.mean(sets, axis=0)))
+    return np.array(sets)
+
+
+def downhill(of: Error, sets: FloatArray, free: list[int] | None = None) -> Found:
+    """Follow the simplex from its apexes until (6.15) holds, for each parameter by itself as in the program (L9669).
+
+    ``free`` are the parameters that it moves.
+    """
+    moves = np.arange(LOW.size) if free is None else np.array(free)
+    v = sets[: moves.size + 1].copy()
+    fixed = np.delete(np.arange(LOW.size), moves)
+    v[:, fixed] = v[0, fixed]
+    v[1:] = [admitted(x, v[0]) for x in v[1:]]
+    e = np.array([of(x) for x in v])
+    count = len(e)
+    while count < MOST:
+        worst, least = int(e.argmax()), int(e.argmin())
+        near_by = np.abs(v[worst] - v[least]) <= EPS * np.abs(v[least])
+        if e[worst] - e[least] <= EPS * e[least] and near_by.all():
+            break
+        centre = (v.sum(axis=0) - v[worst]) / moves.size
+        trial = admitted(2.0 * centre - v[worst], v[worst])
+        found = of(trial)
+        count += 1
+        if found < e[least]:
+            far = admitted(2.0 * trial - v[worst], trial)
+            further = of(far)
+            count += 1
+            v[worst], e[worst] = (far, further) if further < found else (trial, found)
+        elif found <= np.partition(e, -2)[-2]:
+            v[worst], e[worst] = trial, found
+        else:
+            if found <= e[worst]:
+                v[worst], e[worst] = trial, found
+            trial = admitted(0.5 * (centre + v[worst]), v[worst])
+            found = of(trial)
+            count += 1
+            if found <= e[worst]:
+                v[worst], e[worst] = trial, found
+            else:
+                v = np.array([admitted(x, v[least]) for x in 0.5 * (v + v[least])])
+                e = np.array([of(x) for x in v])
+                count += len(e)
+    return Found(v[e.argmin()], float(e.min()), count)
+
+
+@cache
+def searches() -> dict[str, tuple[Found, ...]]:
+    """Return the ends of the searches of each kind."""
+    random = np.random.default_rng(62)
+    plain = [downhill(error, starting_sets(random, [])) for _ in range(SEARCHES)]
+    fresh, fewer_points, fewer = [], [], []
+    for _ in range(SEARCHES):
+        known = [plain[i].parameters for i in random.choice(SEARCHES, INCLUDED, replace=False)]
+        fresh.append(downhill(error, starting_sets(random, known)))
+        first = downhill(lambda v: error(v, FEWER_POINTS), starting_sets(random, []))
+        fewer_points.append(downhill(error, starting_sets(random, [first.parameters])))
+        first = downhill(error, starting_sets(random, []), FEWER)
+        fewer.append(downhill(error, starting_sets(random, [first.parameters])))
+    kinds = {
+        "random sets": plain,
+        "with known minima": fresh,
+        "12 points first": fewer_points,
+        "5 parameters first": fewer,
+    }
+    return {name: tuple(found) for name, found in kinds.items()}
+
+
+def bottom(found: Found) -> float:
+    """Return the error of the minimum next to the end of a search (cm2), by least squares within the bounds."""
+    inside = np.clip(found.parameters, LOW + 1e-9, HIGH - 1e-9)
+    side = int(np.argmin([away @ away for away in residuals(inside)]))
+    result = least_squares(lambda v: residuals(v)[side], inside, bounds=(LOW, HIGH), xtol=1e-12, ftol=1e-12)
+    return 2.0 * float(result.cost)
+
+
+def minima(n: int) -> int:
+    """Return the number of different optima that 24 starts find for ellipse (a) timed at n points."""
+    task, p = TimedPath(points=ellipse(10.0, n)), PROBLEMS["ellipse-a"]
+    return len(synthesize(task, p.bounds, p.constraints, search=Search(starts=24, candidates=1 << 13)).solutions)
+
+
+def compute() -> StudyResult:
+    """Compute the ends of all searches, and judge the methods."""
+    found, least = searches(), our_error(PROBLEM)
+    errors = {name: np.sort([end.error for end in ends]) for name, ends in found.items()}
+    plain, *techniques = errors
+    reached = {name: float(np.mean(e <= (1.0 + SMALL) * least)) for name, e in errors.items()}
+    work = {name: float(np.median([end.evaluations for end in ends])) for name, ends in found.items()}
+    chance = {name: float(mannwhitneyu(errors[name], errors[plain], alternative="less").pvalue) for name in techniques}
+    at_bottom = float(np.mean([end.error <= (1.0 + SMALL) * bottom(end) for end in found[plain]]))
+    random = np.random.default_rng(611)
+    sets = np.array([drawn(random) for _ in range(SETS)])
+    outside = int(np.sum((sets < LOW) | (sets > HIGH)))
+    open_links = 1.0 - np.mean([closes(v) for v in sets])
+    luck = "they are no lower than chance makes them"
+    within = f"all, within {SMALL:g} of it, the rule for *small*"
+    short = (
+        f"the least error is {least:.2f} cm2; the best of these ends is at {min(e[0] for e in errors.values()):.2f} cm2"
+    )
+    columns = {"searches, of all [%]": 100.0 * (np.arange(SEARCHES) + 0.5) / SEARCHES}
+    columns |= {f"error; {name} [cm2]": e for name, e in errors.items()} | {
+        "least error [cm2]": np.full(SEARCHES, least)
+    }
+    return StudyResult(
+        number="6.2",
+        claim="The simplex begins at sets of random parameters within their bounds, and is repeated with what it found.",
+        assignment=(
+            f"The program of appendix 5, repeated, for ellipse (a) with bounds on the lengths: {SEARCHES} searches of each "
+            "kind. The bounds of place and angles are ours."
+        ),
+        columns=columns,
+        statements=(
+            Statement(
+                "The method stops when a convergence criterion is satisfied and is [said then] to have located a minimum.",
+                text("6.3.1, L4324"),
+                f"share of {SEARCHES} searches from random sets, stopped by (6.15) with the program's small number {EPS:g}, "
+                "whose error is that of the minimum next to it",
+                within,
+                (near("at a minimum", 1.0, at_bottom, 0.0, why="the simplex becomes flat before it is there"),),
+                "(6.15) divides by the parameters, which may be zero; the program compares each by itself",
+            ),
+            Statement(
+                "It is therefore necessary to begin the optimisation from as many initial points as possible.",
+                text("6.3.1, L4332"),
+                "greatest over least error at the ends of these searches",
+                f"above {1.0 + SMALL:g}",
+                (at_least("greatest over least", 1.0 + SMALL, errors[plain][-1] / errors[plain][0]),),
+            ),
+            Statement(
+                "It is found that the global optimum is always reached quickly if some of the minima already located are "
+                "included as initial values in a fresh optimisation cycle.",
+                text("6.3.1, L4341"),
+                f"share of {SEARCHES} searches whose sets include {INCLUDED} of the ends above that reach the least error; "
+                "number of evaluations over that of searches from random sets, medians",
+                f"{within}; below 1",
+                (
+                    near("reach the least error", 1.0, reached[techniques[0]], 0.0, why=short),
+                    at_most("evaluations", 1.0, work[techniques[0]] / work[plain]),
+                ),
+            ),
+            Statement(
+                "It is also found that the number of minima of the quality function increases with the number of specified "
+                "output points.",
+                text("6.3.1, L4345"),
+                "different minima that 24 starts with exact derivatives find for ellipse (a), at 72 points more than at 12",
+                "at least 1",
+                (
+                    at_least(
+                        "more minima", 1.0, minima(72) - minima(FEWER_POINTS), why="the same are found at either number"
+                    ),
+                ),
+            ),
+            Statement(
+                "A good technique is to find the optimum values of linkage parameters to yield a minimum error over a "
+                "decreased number of specified output points.",
+                text("6.3.1, L4349"),
+                f"probability that the errors at the end of {SEARCHES} searches which begin with {FEWER_POINTS} points are "
+                "so much lower than those of as many from random sets by chance (rank test)",
+                f"{CHANCE:g}, as is usual",
+                (at_most("by chance", CHANCE, chance[techniques[1]], why=luck),),
+            ),
+            Statement(
+                "Another useful technique is to perform the optimisation for a decreased number of linkage parameters and "
+                "to use the values obtained in the initial guesses of the complete optimisation programme.",
+                text("6.3.1, L4359"),
+                "the same of searches that begin with X0, Y0, l2, a1 and th20 alone",
+                f"{CHANCE:g}, as is usual",
+                (at_most("by chance", CHANCE, chance[techniques[2]], why=luck),),
+            ),
+            Statement(
+                "These techniques have, in all cases tried, located the global minimum quickly and efficiently.",
+                text("6.3.1, L4365"),
+                "share of the searches with either technique that reach the least error",
+                within,
+                tuple(near(name, 1.0, reached[name], 0.0, why=short) for name in techniques[1:]),
+            ),
+            Statement(
+                "This generates quickly and efficiently all the sets of required initial values and ensures that they "
+                "satisfy all the explicit externally imposed constraints described in equation (6.10).",
+                text("6.3.1, L4388"),
+                f"parameters outside their bounds in {SETS} sets by (6.11)",
+                "none of a count",
+                (near("parameters outside", 0.0, outside, 0.0),),
+                f"in {open_links:.0%} of the sets the links do not close, for which the thesis moves back by quarters",
+            ),
+        ),
+    )
+
+
+def draw(result: StudyResult) -> Figure:
+    """Draw the errors at the ends of the searches in order."""
+    c = result.columns
+    share = c["searches, of all [%]"]
+    names = [name for name in c if name.startswith("error; ")]
+    curves = [
+        Curve(x=share, y=c[name], label=name.removeprefix("error; ").removesuffix(" [cm2]"), marker=".", colour=colour)
+        for name, colour in zip(names, COLOURS)
+    ]
+    curves.append(Curve(x=share, y=c["least error [cm2]"], label="least error", colour=TARGET, line="--"))
+    panel = Panel(
+        x_label="searches that end below, of all [%]",
+        y_label="error at the end [cm$^2$]",
+        curves=curves,
+        logarithmic="y",
+        legend_at="outside",
+    )
+    return plot_curves([panel], title=result.heading, size=(6.4, 3.4))
+
+
+# --- 6.3: the area between curves, and the two closures
+
+#: Problems whose printed linkages have a coupler point.
+PATHS = ("ellipse-a", "ellipse-b", PROBLEM, "path-a", "path-b")
+#: Change of the crank's phase (rad) under which an area must not change.
+PHASE = 0.6
+
+
+def compute_closures() -> StudyResult:
+    """Compute the curves and errors by both closures, and the area by triangles."""
+    columns: dict[str, FloatArray] = {}
+    ratios, phases, triangles = [], [], []
+    for name in PATHS:
+        p = PROBLEMS[name]
+        right, other = (evaluate(p.task, replace(p.linkage, branch=branch)).error for branch in (1, -1))
+        ratios.append(at_least(name, 1.0, other / right))
+    for name in ("path-a", "path-b"):
+        p = PROBLEMS[name]
+        assert isinstance(p.task, UntimedPath)
+        points = np.asarray(p.task.path.points)
+        curve = p.linkage.path(turn(len(points)))
+        area = area_between(curve, p.task.path)
+        moved = replace(p.linkage, crank_phase=p.linkage.crank_phase + PHASE)
+        phases.append(near(name, 1.0, area_between(moved.path(turn(len(points))), p.task.path) / area, ALIKE))
+        triangles.append(near(name, 1.0, pairing_area(points, curve, window=3) / area, ALIKE))
+    p = PROBLEMS["path-a"]
+    shapes = {"target": np.asarray(p.task.path.points), "printed closure": p.linkage.path(turn(360))}  # type: ignore[union-attr]
+    shapes["other closure"] = replace(p.linkage, branch=-1).path(turn(360))
+    for name, xy in shapes.items():
+        columns |= {f"{name} {axis} [cm]": CM_PER_METRE * np.append(xy[:, k], xy[0, k]) for k, axis in enumerate("xy")}
+    branches = [p.linkage.branch for p in PROBLEMS.values() if "rocker" not in p.source]
+    same = f"{ALIKE:g}, the rule for *the same*"
+    return StudyResult(
+        number="6.3",
+        claim="The area between curves is that of triangles between their points; of two closures the better is taken.",
+        assignment="The plot has path (a), the printed linkage.",
+        columns=padded(columns),
+        statements=(
+            Statement(
+                "A finite approximation of this relation is obtained by taking a large and equal number of points on the "
+                "desired and actual curves.",
+                text("6.2.2, L4230"),
+                "area of the triangles between 360 points of each curve, as the program pairs them, over the area between "
+                "the curves; printed linkages",
+                same,
+                tuple(triangles),
+            ),
+            Statement(
+                "The linkage parameters sufficient for the optimisation in coupler path generation are the same as "
+                "mentioned earlier for coupler function generation although the parameter [theta20] is redundant; in this "
+                "case, it will be retained to maintain a consistency in presentation of results.",
+                text("6.4.1, L4696"),
+                f"area with theta20 greater by {PHASE:g} rad over that as printed",
+                same,
+                tuple(phases),
+            ),
+            Statement(
+                "Therefore in evaluating the quality function we must explore both closures and note the closure "
+                "corresponding to the minimum error in output generation.",
+                text("6.4.1, L4804"),
+                "error by the other closure over that by the closure of the printed linkage; printed linkages of each "
+                "closure",
+                "above 1; at least 1 of each",
+                (
+                    *ratios,
+                    at_least("linkages with C to the left of BD", 1.0, branches.count(1)),
+                    at_least("linkages with C to the right of BD", 1.0, branches.count(-1)),
+                ),
+            ),
+        ),
+    )
+
+
+def draw_closures(result: StudyResult) -> Figure:
+    """Draw the target and the curves of both closures."""
+    looks = {"target": TARGET, "printed closure": PRINTED, "other closure": COLOURS[2]}
+    c = result.columns
+    curves = [Curve(x=c[f"{n} x [cm]"], y=c[f"{n} y [cm]"], label=n, colour=colour) for n, colour in looks.items()]
+    panel = Panel(x_label="x [cm]", y_label="y [cm]", curves=curves, equal=True, legend_at="outside")
+    return plot_curves([panel], title=result.heading, size=(6.4, 3.4))
+
+
+#: The studies by number.
+STUDIES = {"6.2": Study("6.2", compute, draw), "6.3": Study("6.3", compute_closures, draw_closures)}
