@@ -1,4 +1,4 @@
-"""The analysis API of Linkwork: simulate, check against the FMU, and study linkages with two degrees of freedom.
+"""The analysis API of Linkwork: simulate linkages, check them against their FMUs, and study them.
 
 >>> from analysis import Inputs, find_orbit, simulate
 >>> run = simulate("table-3.1", Inputs(speed="300 rpm", force="2 N"), stop_time="0.4 s")

@@ -79,7 +79,9 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
         an angular speed, as a cycle is not a radian.
     """
     spelled = _PINT.get(unit, unit)
-    wanted = f"be a number in {unit}" if unit == "1" else f"be a number in {unit}, or a text with a unit of that kind"
+    wanted = f"be a number in {unit}"
+    if unit != "1":
+        wanted += f", or a text with a unit of that kind{f', such as {_USUAL[unit]}' if unit in _USUAL else ''}"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ParameterError(name, value, wanted)
     if isinstance(value, str):
@@ -169,20 +171,39 @@ _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·.]\s*|\s+){_FACTOR})*"
 _GRAMMAR = re.compile(rf"\s*({_NUMBER})\s*({_PRODUCT}(?:\s*/\s*\({_PRODUCT}\))?)?\s*")
 #: Longest text that is read.
 _LONGEST = 100
-#: Units by SI unit as machine builders spell them and pint does not: a pattern, and what it stands for.
+#: Turns a minute, and products written together, as machine builders spell them and pint does not.
+_TURNS = re.compile(r"(?<=[0-9.\s])(?:(?i:rpm|(?:r|rev|U)/min|min\s*(?:\^|\*\*)?\s*-1)|(?<=\s)1/min)(?=\s*$)")
+_WITH_NEWTON = re.compile(r"(?<![^\W\d_])([kmM]?N)([cm]?m)?(s)?(?![^\W\d_])")
+_WITH_GRAM = re.compile(r"(?<![^\W\d_])(k?g)([cm]?m)(?![^\W\d_])")
+#: By SI unit: how else it is spelled, and units in which it is usually given, for the error.
 _SPELLINGS = {
-    "rad/s": (re.compile(r"(?:(?<=[0-9.\s])(?:RPM|U/min)|(?<=\s)1/min)(?=\s*$)"), "rpm"),
-    "N.m": (re.compile(r"(?<=[0-9.\s])N(m?m)(?=\s*$)"), r"N*\1"),
+    "rad/s": _TURNS,
+    **dict.fromkeys(("N.m", "N.m/rad", "N.m.s/rad", "N.s/m"), _WITH_NEWTON),
+    "kg.m2": _WITH_GRAM,
+}
+_USUAL = {
+    "s": "s or ms",
+    "m": "mm, cm or in",
+    "m/s": "m/s or mm/s",
+    "rad": "deg",
+    "rad/s": "rpm or deg/s",
+    "kg": "kg or g",
+    "kg.m2": "kg*m^2 or g*cm^2",
+    "N": "N or kN",
+    "N.m": "N*m, N*cm or N*mm",
+    "N/m": "N/m or N/mm",
+    "N.s/m": "N*s/m or N*s/mm",
+    "N.m/rad": "N*m/rad or N*m/deg",
+    "N.m.s/rad": "N*m*s/rad",
 }
 _PLAIN = "write a number with a decimal point, without spaces or separators in it, and a unit"
 
 
 def _respelled(text: str, unit: str) -> str:
     """Return a quantity's text in pint's spelling: "200 U/min" becomes "200 rpm", "20 Nmm" becomes "20 N*mm"."""
-    if unit not in _SPELLINGS:
+    if (pattern := _SPELLINGS.get(unit)) is None:
         return text
-    pattern, spelling = _SPELLINGS[unit]
-    return pattern.sub(spelling, text)
+    return pattern.sub(lambda found: "*".join(part for part in found.groups() if part) or "rpm", text)
 
 
 def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
@@ -205,6 +226,10 @@ def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> floa
     try:
         of = re.sub(r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*"))  # m2 for m**2, as FMI has it
         return float(_registry().Quantity(number, of).to(spelled).magnitude)
+    except pint.UndefinedUnitError as error:
+        raise ParameterError(name, text, f"{wanted} ({error.args[0]!r} is no known unit)") from error
+    except pint.DimensionalityError as error:
+        raise ParameterError(name, text, f"{wanted} ({match[2]!r} is another kind of quantity)") from error
     except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, LookupError, SyntaxError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ParameterError(name, text, f"{wanted} ({reason})") from error

@@ -107,7 +107,7 @@ class LazyCommand(click.Command):
 )
 @click.version_option(__version__, prog_name="linkwork")
 def main() -> None:
-    """Linkages with two degrees of freedom: build and check the FMU, run cases, make the thesis's figures.
+    """Linkages of your own and of two theses: run them, find where they resonate, build and check their FMUs.
 
     \b
     Examples:

@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, unit_table
+from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, shown_units
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 from .style import BOLD, COLOURS, HAIR, LINE, MARK, PLAIN, SMALL, THIN, finish, spoken, styled, write_notes, write_title
 
 FloatArray = NDArray[np.float64]
 
-#: Units in which departures are shown where everything else is in SI, and their values in SI.
-_SHOWN = {"m": ("mm", 1e-3), "m/s": ("mm/s", 1e-3)}
 _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
 #: Greatest and middle departures over the turn: where their ratio is above this, the axis is cut at a multiple of the latter.
 _PEAK, _CUT = 12.0, 4.0
@@ -48,7 +46,7 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
     frame : int
         1 ground, 2 crank, 3 rod, 4 guide.
     units : str
-        One of `analysis.slider_crank.UNITS`.
+        One of `analysis.slider_crank.UNITS`. With "SI" lengths are shown in mm.
     title : str
 
     Raises
@@ -65,7 +63,7 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
     for name, joint in JOINTS.items():
         components = {f"{axis}{frame}": values for axis, values in zip("ijk", turn.vector(name, frame).T)}
         contents.append((joint.words, joint.unit, components))
-    known = unit_table(units)
+    known = shown_units(units)
     # zero but for rounding: against the largest of the same unit
     sizes = {name: _largest(curves.values()) for name, _, curves in contents}
     scales = {si: max(sizes[name] for name, other, _ in contents if other == si) for _, si, _ in contents}
@@ -154,9 +152,7 @@ def plot_tolerances(
         raise InputError(f"a band over the turn needs two angles at least, not {len(turn)}")
     at = found.place(quantity, angle)
     si = QUANTITIES[quantity]
-    unit, one = unit_table(units)[si]
-    if units == "SI":
-        unit, one = _SHOWN.get(si, (unit, one))
+    unit, one = shown_units(units)[si]
     name = quantity.replace(".", " ").replace("_", " ")
     most = int(found.not_assembled.max())
     lost = f"at worst {most / found.samples:.2%} of them cannot be assembled, and are left out"

@@ -113,7 +113,17 @@ MECHANISM = Mechanism(
     notes=({notes},),
     parameters=Parameters,
     initial=Initial,
-    published={{{quoted_name}: PublishedSet(Parameters(), Initial({started}), {{{driven}}}, {source})}},
+    published={{
+        {quoted_name}: PublishedSet(
+            Parameters(),
+            Initial({started}),
+            {{{driven}}},
+            {source},
+            origins={{
+{origins}
+            }},
+        )
+    }},
     freedoms=(
 {freedoms}
     ),
@@ -274,6 +284,7 @@ class Package:
             notes=quoted(f"Source: {d.source}."),
             started=", ".join(f"{start.name}={start.value!r}" for start in v.starts),
             driven=v.driven(),
+            origins=listed(v.origins(), 16),
             source=quoted(d.source),
             freedoms=listed(v.freedoms(), 8),
             channels=listed(v.channels(), 8),

@@ -26,6 +26,10 @@ class Made:
         body = length + 2.0 * self.overhang
         return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
 
+    def origin(self, weighed: bool) -> str:
+        """Return in words where a mass comes from that this gives, or whose centre and radius of gyration it gives."""
+        return f"{'weighed, shaped as a ' if weighed else 'of a '}{self.words}"
+
 
 def millimetres(*lengths: float) -> str:
     """Return lengths in SI as text in millimetres."""

@@ -117,6 +117,14 @@ class Variables:
         driven = [d for d in self.interface.drives if d.commanded]
         return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
 
+    def origins(self) -> Iterator[str]:
+        """Yield the entries that say where the masses come from."""
+        for name, body in self.description.bodies.items():
+            if body.section is not None:
+                yield f'"{name}.mass": {quoted(body.section.origin(body.mass is not None))}'
+            elif body.mass is not None:
+                yield f'"{name}.mass": "as given"'
+
     def freedoms(self) -> Iterator[str]:
         """Yield the freedoms."""
         for d in self.interface.drives:

@@ -158,7 +158,7 @@ class Settings:
     first, least, greatest : float
         Steps in scaled arc length, in which the range of the parameter has length 1.
     widest : float
-        Greatest step of the parameter itself, in its range.
+        Greatest step of the parameter itself, and of the unknowns that have ranges, in their scale.
     most_points : int
     greatest_turn, growing_turn : float
         Greatest angle between the tangents at neighbouring points (rad), and the angle up to which the step grows.
@@ -339,9 +339,8 @@ class Follower:
                 return Curve(tuple(points), tuple(steps), *end)
             if count < HARD and float(point.tangent @ last.tangent) > np.cos(settings.growing_turn):
                 length = min(length * GROWTH, settings.greatest)
-            length = min(
-                length, max(settings.widest / max(abs(float(point.tangent[-1])), settings.least), settings.least)
-            )
+            widths = np.abs(point.tangent[[*settings.bounds, -1]])
+            length = min(length, max(settings.widest / max(float(widths.max()), settings.least), settings.least))
         return Curve(
             tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
         )

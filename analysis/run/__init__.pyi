@@ -62,6 +62,7 @@ from .inputs import speed_ratio as speed_ratio
 from .masses import Mass as Mass
 from .masses import in_sentences as in_sentences
 from .masses import mass_origins as mass_origins
+from .masses import masses_of as masses_of
 from .masses import with_sections as with_sections
 from .prepared import outputs_of as outputs_of
 from .sampling import sample as sample

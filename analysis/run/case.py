@@ -66,5 +66,5 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
         inputs=inputs,
         stop_time=stop_time,
         step=step,
-        masses=mass_origins(entry.parameters, {}, entry.parameters, name),
+        masses=mass_origins(entry.parameters, {}, entry, name),
     )

@@ -228,7 +228,7 @@ def case_from(
         stop_time=stop_time,
         step=step,
         tolerance=run.tolerance,
-        masses=mass_origins(parameters, files.flattened(own), printed, str(named.get("published", ""))),
+        masses=mass_origins(parameters, files.flattened(own), published, str(named.get("published", ""))),
     )
 
 

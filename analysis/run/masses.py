@@ -9,7 +9,7 @@ from math import atan2, hypot, isclose
 from typing import Any, NamedTuple
 
 from linkwork.errors import ParameterError
-from linkwork.mechanism import Link, Mechanism
+from linkwork.mechanism import Link, Mechanism, PublishedSet
 from linkwork.parameters import field_name
 
 from ..files import Kinds, Quantity, unknown_name
@@ -129,7 +129,7 @@ def resolve_sections(mechanism: Mechanism, flat: Mapping[str, Any], base: Parame
 
 
 def mass_origins(
-    parameters: Parameters, flat: Mapping[str, Any], base: Parameters | None = None, source: str = ""
+    parameters: Parameters, flat: Mapping[str, Any], known: PublishedSet | None = None, source: str = ""
 ) -> tuple[Mass, ...]:
     """Tell where the masses of a case come from.
 
@@ -138,13 +138,14 @@ def mass_origins(
     parameters : parameters of a mechanism
     flat : mapping
         What the case gives, by dotted name, before `resolve_sections`.
-    base : parameters, optional
-        The published ones that stand where the case gives nothing.
+    known : PublishedSet, optional
+        Its parameters stand where the case gives nothing.
     source : str
-        Name of the published set.
+        Its name.
     """
     mechanism = mechanism_of(parameters)
     links = {link.mass: link for link in mechanism.links}
+    base = None if known is None else known.parameters
     get = partial(getattr, parameters)
     found = []
     for name, variable in mechanism.mechanism_variables.items():
@@ -153,21 +154,44 @@ def mass_origins(
         link, stale = links.get(name), ""
         table = {} if link is None else _section_of(link, flat)
         if table:
-            origin = f"{'weighed, shaped as a ' if name in flat else 'of a '}{Kinds(SECTIONS)(table, name).words}"
+            origin = Kinds(SECTIONS)(table, name).origin(name in flat)
         elif name in flat:
             origin = "as given"
-        elif base is None:
+        elif known is None:
             origin = "zero where nothing is given"
         else:
-            origin = f"of {source}"
+            origin = known.origins.get(name, f"of {source}")
         if link is not None and base is not None and not table:
             length, own = get(field_name(link.length)), getattr(base, field_name(link.length))
             kept = [n for n in (link.mass, *link.centre[:1], link.inertia) if n not in flat]
             if kept and not isclose(length, own):
                 now, then = millimetres(length), millimetres(own)
-                stale = f"{link.length} is {now} where {source} has {then}, whose {', '.join(kept)} stay"
+                verb = "stays" if len(kept) == 1 else "stay"
+                stale = f"{link.length} is {now} where {source} has {then}, whose {', '.join(kept)} {verb}"
         found.append(Mass(name, get(field_name(name)), origin, stale))
     return tuple(found)
+
+
+def masses_of(parameters: Parameters) -> tuple[Mass, ...]:
+    """Tell whose masses parameters have: those that are equal to the most similar published set's are taken to be of it.
+
+    Raises
+    ------
+    InputError
+        If they are those of no mechanism.
+    """
+    mechanism = mechanism_of(parameters)
+    own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
+
+    def others(known: PublishedSet) -> dict[str, Any]:
+        return {name: value for name, value in own.items() if value != getattr(known.parameters, field_name(name))}
+
+    source, known = min(mechanism.published.items(), key=lambda item: len(others(item[1])))
+    changed = others(known)
+    masses = [name for name, variable in mechanism.mechanism_variables.items() if variable.unit == "kg"]
+    if not any(own[name] for name in masses if name not in changed):  # zeros are nobody's
+        changed = own
+    return mass_origins(parameters, changed, known, source)
 
 
 def in_sentences(masses: tuple[Mass, ...]) -> tuple[str, list[str]]:

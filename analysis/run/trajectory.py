@@ -17,6 +17,7 @@ from ..display import Shown, format_count, format_range
 from ..files import unknown_name
 from ..libraries import require
 from ..mechanisms import MECHANISMS, Parameters, output_units
+from .masses import in_sentences, masses_of
 
 if TYPE_CHECKING:
     import pandas
@@ -88,7 +89,9 @@ class Trajectory(Shown):
         happened = f", {format_count(len(self.events), 'event')}" if self.events else ""
         moving = dict.fromkeys(n for m in MECHANISMS.values() for f in m.freedoms for n in (f.coordinate, f.rate))
         ranges = [f"{name} {format_range(self[name], self.units[name])}" for name in moving if name in self.names]
-        return f"<Trajectory: {len(self)} samples{over} by {self.source or 'hand'}, {ended}{happened}; {', '.join(ranges)}>"
+        masses = f"; {self.masses}" if self.masses else ""
+        source = self.source or "hand"
+        return f"<Trajectory: {len(self)} samples{over} by {source}, {ended}{happened}; {', '.join(ranges)}{masses}>"
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.values[:, self.column(name)]
@@ -101,6 +104,17 @@ class Trajectory(Shown):
         """Return the unit of each output."""
         known = output_units()
         return MappingProxyType({name: known[name] for name in self.names})
+
+    @property
+    def masses(self) -> str:
+        """Return a sentence on the masses of the mechanism that ran and whose they are; empty where it is not known.
+
+        It says, too, which links have other lengths than those of the published set whose masses they have.
+        """
+        if self.parameters is None:
+            return ""
+        masses = masses_of(self.parameters)
+        return "; ".join((in_sentences(masses)[0], *(mass.stale for mass in masses if mass.stale)))
 
     def column(self, name: str) -> int:
         """Return the column number of an output.

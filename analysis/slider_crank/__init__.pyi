@@ -36,6 +36,7 @@ from .mobility import singularities as singularities
 from .quantities import FRAMES as FRAMES
 from .quantities import JOINTS as JOINTS
 from .quantities import UNITS as UNITS
+from .quantities import shown_units as shown_units
 from .quantities import unit_table as unit_table
 from .sampling import PERCENTILES as PERCENTILES
 from .sampling import MonteCarlo as MonteCarlo

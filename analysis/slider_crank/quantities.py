@@ -44,7 +44,7 @@ JOINTS: Mapping[str, Joint] = MappingProxyType(
 #: Frames by number: of the ground, the crank, the rod and the guide.
 FRAMES: Mapping[int, str] = MappingProxyType({1: "ground", 2: "crank", 3: "rod", 4: "guide"})
 
-#: Units of files and figures: for each SI unit the name of the unit used, and its value in SI.
+#: Units by system: for each SI unit the name of the unit used, and its value in SI.
 UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
     {
         "SI": {unit: (unit, 1.0) for unit in ("rad", "m", "m/s", "m/s2", "N", "N.m")},
@@ -71,6 +71,18 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
     if units not in UNITS:
         raise InputError(f"there are no units {units!r}: they are {' or '.join(UNITS)}")
     return UNITS[units]
+
+
+def shown_units(units: str) -> Mapping[str, tuple[str, float]]:
+    """Return an entry of `UNITS` for tables and pictures, which have millimetres where it has metres.
+
+    Raises
+    ------
+    InputError
+        If there are no such units.
+    """
+    known = unit_table(units)
+    return {**known, "m": ("mm", 1e-3), "m/s": ("mm/s", 1e-3)} if units == "SI" else known
 
 
 def check_joint(name: str, frame: int) -> None:

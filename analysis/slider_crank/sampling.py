@@ -19,7 +19,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.workers import check_jobs, over_workers, worker_count
 from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
-from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, unit_table
+from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, shown_units
 from .tolerances import (
     ANGLE,
     FREE_OF_LOAD,
@@ -107,14 +107,14 @@ class MonteCarlo:
         Parameters
         ----------
         units : str
-            One of `UNITS`.
+            One of `UNITS`. With "SI" lengths are in mm.
 
         Raises
         ------
         InputError
             If there are no such units.
         """
-        known, turn = unit_table(units), self.turn
+        known, turn = shown_units(units), self.turn
         found = []
         if turn.unreachable.size:
             found.append(

@@ -1,4 +1,4 @@
-"""Linkwork's plants: linkages with two degrees of freedom, in plain Python.
+"""Linkwork's plants: the mechanisms' equations and their integrator, in plain Python.
 
 Only the standard library is used here, because this package travels inside the FMUs. Where the package `analysis` is installed
 beside it, its public names can be asked for here too: ``linkwork.simulate`` is ``analysis.simulate``, imported when it is first

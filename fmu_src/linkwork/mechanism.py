@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from math import degrees
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple
 
 from .errors import JammingError, LinkworkError
@@ -225,6 +225,8 @@ class PublishedSet(NamedTuple):
     at_rest : bool
         Whether it starts at rest but for what ``drive`` commands: where something else drives the mechanism it then starts at
         rest, unless a case file says otherwise.
+    origins : mapping of str to str
+        Where masses come from, in words by FMI parameter, such as "of a bar of 20 x 5 mm"; what is not there is as printed.
     """
 
     parameters: Any
@@ -232,6 +234,7 @@ class PublishedSet(NamedTuple):
     drive: Mapping[str, float]
     source: str
     at_rest: bool = False
+    origins: Mapping[str, str] = MappingProxyType({})
 
     @property
     def crank_speed(self) -> float:

@@ -26,6 +26,8 @@ from analysis.periodic import (
 )
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import grid as grids
+from analysis.periodic.chart.grid import Grid
+from analysis.run import heard_by
 from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
@@ -106,8 +108,20 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert {run.confirmation.verdict.stability for run in found.runs} == {Stability.STABLE, Stability.UNSTABLE}
     margins = 1.0 - found.grid.largest
     rows = points_to_confirm(found.grid)
-    assert float(margins[rows[0]]) == margins[1:-1, 1:-1].max()
-    assert float(margins[rows[1]]) == margins.min()
+    assert float(margins[rows[0]]) == margins[2:-2, 2:-2].max()
+    assert float(margins[rows[1]]) == margins[2:-2, 2:-2].min()
+
+
+def test_long_runs_are_off_the_edges_unless_only_these_are_unstable() -> None:
+    x = np.linspace(0.0, 1.0, 5)
+    largest = np.ma.masked_array(0.5 + 0.1 * x[:, None] + 0.2 * x)
+    found = Grid(
+        x=x, y=x, largest=largest, starts=np.zeros((5, 5, 2)), status=np.zeros((5, 5), dtype=np.int64), computed=5
+    )
+    assert points_to_confirm(found)[:2] == [(1, 1), (3, 3)]
+    assert all(0 < place < 4 for point in points_to_confirm(found) for place in point)
+    largest[4, 4] = 1.5
+    assert points_to_confirm(found)[1] == (4, 4)
 
 
 @pytest.mark.slow
@@ -235,3 +249,14 @@ def test_the_grid_is_shown_before_its_boundaries() -> None:
     assert not early.boundaries
     assert not early.runs
     assert chart.runs
+
+
+@pytest.mark.usefixtures("coarse")
+def test_progress_advances_within_a_line() -> None:
+    heard: list[tuple[str, float]] = []
+    with heard_by(lambda what, share: heard.append((what, share))):
+        stability_chart("rig-2-spring-c", ranges=((550.0 * RPM, 560.0 * RPM), (50.0, 60.0)), points=3)
+    shares = [share for what, share in heard if "branches" in what]
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 10
+    assert shares[-1] == 1.0

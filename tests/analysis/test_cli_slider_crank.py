@@ -66,8 +66,8 @@ class TestInfo:
     def test_units(self, linkwork):
         inch, si = linkwork("info", "--units", "inch").output, linkwork("info").output
         assert rows(inch)["shift S1"] == ["3.5 in"]
-        assert rows(si)["shift S1"] == ["0.0889 m"]
-        assert rows(si)["crank a1, rod a2"] == ["0.3048 m, 1.27 m"]
+        assert rows(si)["shift S1"] == ["88.9 mm"]
+        assert rows(si)["crank a1, rod a2"] == ["304.8 mm, 1270 mm"]
 
     def test_a_crank_that_cannot_turn_fully(self, linkwork):
         """At 270 deg and a4 = 30, S1 = 40 the pin is sqrt((12 c + 30)^2 + 40^2) from the guide: 50 at c = 0, 58 at c = 1."""
@@ -91,11 +91,11 @@ class TestParameterFiles:
         save_parameters(tmp_path / f"mine.{ending}", replace(parameters(30.0), rod_length=1.5))
         result = linkwork("info", f"mine.{ending}", "--shift", "1 in")
         assert result.exit_code == 0, result.output
-        assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 1.5 m"]
-        assert rows(result.output)["shift S1"] == ["0.0254 m"]
+        assert rows(result.output)["crank a1, rod a2"] == ["304.8 mm, 1500 mm"]
+        assert rows(result.output)["shift S1"] == ["25.4 mm"]
         result = linkwork("info", f"mine.{ending}", "--set", "rod.length=2 m")
-        assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 2 m"]
-        assert rows(result.output)["shift S1"] == ["0 m"]
+        assert rows(result.output)["crank a1, rod a2"] == ["304.8 mm, 2000 mm"]
+        assert rows(result.output)["shift S1"] == ["0 mm"]
 
     def test_what_a_file_does_not_say_is_told(self, linkwork, tmp_path):
         save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
@@ -282,13 +282,13 @@ class TestTolerances:
             500,
         )  # fmt: skip
         notes = [" ".join(linkwork(*arguments, "--units", units).stderr.split()) for units in ("inch", "SI")]
-        for note, figure, units in zip(notes, drawn, (("in", "in"), ("m", "mm"))):
-            said = re.search(rf"the linear estimate.* deviation is [\d.e-]+ {units[0]}, to second .*", note)[0]
+        for note, figure, units in zip(notes, drawn, ("in", "mm")):
+            said = re.search(rf"the linear estimate.* deviation is [\d.e-]+ {units}, to second .*", note)[0]
             foot = " ".join(" ".join(x.get_text() for x in figure.findobj(Text)).split())
             assert said[1:] in foot
-            assert f"error of slider position [{units[1]}]" in foot
+            assert f"error of slider position [{units}]" in foot
         numbers = [float(re.search(r"deviation is ([\d.e-]+) ", note)[1]) for note in notes]
-        assert numbers[0] * INCH == pytest.approx(numbers[1], rel=5e-3)
+        assert numbers[0] * 1e3 * INCH == pytest.approx(numbers[1], rel=5e-3)
 
     def test_a_seed_gives_the_same_samples(self, linkwork, tmp_path):
         found = []
@@ -359,7 +359,7 @@ class TestDual:
         linkwork("dual", "--two-rotations", "--published", "rahman-ideal", "--points", 13)
         columns = csv(tmp_path / "out" / "rahman-ideal-two-rotations.csv")
         assert columns["rotation residual [deg]"].max() < 1e-9
-        assert columns["off by [m]"].max() < 1e-12
+        assert columns["off by [mm]"].max() < 1e-9
 
 
 class TestPicture:

@@ -9,6 +9,8 @@ import pytest
 
 from analysis.numerics.continuation import ContinuationError, Reason
 from analysis.periodic import Crossing, CrossingCurve, Drive, Family, SpecialPoint, find_orbit, follow, follow_crossing
+from analysis.periodic.motion.discretisation import operating_point
+from analysis.periodic.motion.orbit import trial_orbit
 from analysis.units import RAD_S_PER_RPM
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SETS
@@ -76,6 +78,22 @@ def test_a_doubling_moves_with_the_damping() -> None:
         speeds = [s.parameter for s in single if s.kind is Crossing.PERIOD_DOUBLING]
         there = np.interp(damping, curve.points[order, 1], curve.points[order, 0])
         assert min(abs(there - speed) for speed in speeds) < 1e-4 * there
+
+
+@pytest.mark.slow
+def test_a_fold_of_a_motion_of_many_crank_lengths_is_followed_to_the_edges() -> None:
+    rig = SETS["rig-2-spring-c"].parameters
+
+    def at(speed: float, damping: float) -> tuple[FiveBarParameters, Drive]:
+        return replace(rig, slider_damping=damping), Drive(speed=speed)
+
+    place = 52.37244008, 0.55
+    near, _ = trial_orbit(operating_point(*at(*place)), np.array([-0.20560797, -5.64346183]), 1)
+    curve = follow_crossing(at, near, Crossing.FOLD, place, x=(18.4, 153.3), y=(0.55, 11.0))
+    assert [end.reason for end in curve.ends] == [Reason.BOX, Reason.BOX]
+    assert curve.points[[0, -1], 1] == pytest.approx(0.55)
+    assert sorted(curve.points[[0, -1], 0]) == pytest.approx([52.3724, 55.5287], abs=1e-3)
+    assert curve.points[:, 1].max() == pytest.approx(2.032, abs=2e-3)
 
 
 def test_an_orbit_far_from_any_crossing_is_refused() -> None:

@@ -68,7 +68,16 @@ from linkwork.errors import InputError, Interrupted, MissingParameterError, Para
         ("200 RPM", "rad/s", 20.0 * pi / 3.0),
         ("200 U/min", "rad/s", 20.0 * pi / 3.0),
         ("200 1/min", "rad/s", 20.0 * pi / 3.0),
+        ("200 Rpm", "rad/s", 20.0 * pi / 3.0),
+        ("200 r/min", "rad/s", 20.0 * pi / 3.0),
+        ("200 min-1", "rad/s", 20.0 * pi / 3.0),
         ("20 Nmm", "N.m", 0.02),
+        ("20 Ncm", "N.m", 0.2),
+        ("2 kNm", "N.m", 2000.0),
+        ("3 Nm/rad", "N.m/rad", 3.0),
+        ("3 Nms/rad", "N.m.s/rad", 3.0),
+        ("3 Ns/mm", "N.s/m", 3000.0),
+        ("3 kgm2", "kg.m2", 3.0),
         ("20 Nm", "N.m", 20.0),
         (0.25, "m", 0.25),
         (3, "1", 3.0),
@@ -95,6 +104,14 @@ def test_quantities_in_their_units(text, unit, value):
 def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
     with pytest.raises(ParameterError, match=r"crank\.length"):
         quantity(text, unit, "crank.length")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "right"), [("2 Kg", "kg", "kg"), ("9 rots", "rad/s", "rpm"), ("2 kg", "m", "mm")]
+)
+def test_a_wrong_unit_is_answered_with_right_ones(text, unit, right):
+    with pytest.raises(ParameterError, match=rf"such as .*\b{right}\b"):
+        quantity(text, unit, "x")
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from analysis import Inputs, linkages, simulate, variant
 from analysis.mechanisms import PUBLISHED
-from analysis.run import case_from, in_sentences, parameters_from, with_sections
+from analysis.run import case_from, in_sentences, load_case, parameters_from, with_sections
 from analysis.sections import Bar, Rod
 from linkwork.errors import LinkworkError, ParameterError
 
@@ -100,6 +102,33 @@ def test_origins_of_masses_and_lengths_that_leave_them():
     assert "coupler.length is 180 mm where table-3.1 has 150 mm" in warning
     given = {"length": "180 mm", "mass": 0.2, "inertia": 1e-3, "cog_distance": "90 mm"}
     assert not any(mass.stale for mass in _case(coupler=given).masses)
+
+
+def test_masses_of_a_described_linkage_are_those_of_its_sections(tmp_path):
+    rod = 'section = { kind = "rod", diameter = "12 mm", material = "steel" }'
+    text = linkages.TEXT.format(file="own.toml").replace('mass = "0.4 kg" ', f'mass = "0.4 kg"\n{rod}')
+    kept = [line for line in text.splitlines() if not line.startswith(("cog =", "inertia ="))]
+    (tmp_path / "own.toml").write_text("\n".join(kept))
+    origin = {mass.name: mass.origin for mass in load_case(tmp_path / "own.toml").masses}
+    assert origin["crank.mass"].startswith("of a bar of 20 x 5 mm")
+    assert origin["coupler.mass"].startswith("weighed, shaped as a rod of 12 mm")
+    assert origin["rocker.mass"].startswith("of a rod of 12 mm")
+    (tmp_path / "plain.toml").write_text(text.replace(rod, ""))
+    origin = {mass.name: mass.origin for mass in load_case(tmp_path / "plain.toml").masses}
+    assert origin["coupler.mass"] == "as given"
+    changed = {mass.name: mass for mass in load_case(tmp_path / "own.toml", {"crank.length": "60 mm"}).masses}
+    assert "crank.length is 60 mm where my-linkage has 50 mm" in changed["crank.mass"].stale
+
+
+def test_a_run_says_whose_masses_it_has():
+    run = simulate(variant("table-3.1", coupler_length="155 mm", slider_mass="1 kg"), stop_time="2 ms")
+    assert "coupler.mass 0.209 kg" in repr(run)
+    assert "slider.mass 1 kg (as given)" in run.masses
+    assert "coupler.length is 155 mm where table-3.1 has 150 mm" in repr(run)
+    own = with_sections("table-3.1", **dict.fromkeys(("crank", "coupler", "rocker"), Bar("20 mm", "5 mm", "steel")))
+    run = simulate(variant(own, slider_mass="1 kg"), Inputs(speed="420 rpm"), stop_time="2 ms")
+    assert "table-3.1" not in run.masses
+    assert not replace(run, parameters=None).masses
 
 
 def test_lengths_with_a_thesis_masses_are_noted_at_the_shell(linkwork):

@@ -2,45 +2,66 @@
 
 from __future__ import annotations
 
-from functools import cache
+import cmath
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from analysis.mechanisms import FIVE_BAR
-from analysis.run import constants, traced
+from analysis.mechanisms import FIVE_BAR, mechanism_of
+from analysis.numerics.symbolic import ELEMENTARY
+from analysis.numerics.tracing import rebound
+from analysis.run import traced
 from linkwork import friction
 from linkwork.five_bar import dynamics, kinematics
-from tests.strategies import seeded
+from tests import slider_cranks, strategies
 
 casadi = pytest.importorskip("casadi")
 
 
-@cache
-def jacobian() -> Any:
-    """CasADi's derivative of the accelerations with respect to the state, of state, inputs and constants."""
-    x, u = casadi.SX.sym("x", 6), casadi.SX.sym("u", 6)
-    p, k = constants(FIVE_BAR)
-    derivative = traced(FIVE_BAR).derivative(tuple(casadi.vertsplit(x)), dynamics.Inputs(*casadi.vertsplit(u)), k)
-    return casadi.Function("jacobian", [x, u, p], [casadi.densify(casadi.jacobian(casadi.vertcat(*derivative), x))])
+def atan2(y: complex, x: complex) -> complex:
+    """As cmath has none: for parts beside the real axis so small that their squares vanish."""
+    slope = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
+    return complex(math.atan2(y.real, x.real), slope)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_jacobian_is_that_of_differences(seed: int) -> None:
-    case = seeded(seed)
-    p = case.parameters.constants()
-    exact = np.asarray(jacobian()(*(casadi.DM(list(a)) for a in (case.state, case.torque_inputs, p))))
-    differences = np.empty((6, 6))
-    for j, scale in enumerate((1e-5, 1e-6, 1e-3, 1e-6, 1.0, 1.0)):
-        sides = []
-        for sign in (1.0, -1.0):
-            x = list(case.state)
-            x[j] += sign * scale
-            sides.append(np.array(dynamics.derivative(tuple(x), case.torque_inputs, p)))
-        differences[:, j] = (sides[0] - sides[1]) / (2.0 * scale)
+#: The functions of `ELEMENTARY` that the equations use, on the complex plane.
+COMPLEX = {
+    **{name: getattr(cmath, name) for name in ELEMENTARY if hasattr(cmath, name)},
+    "atan2": atan2,
+    "fabs": lambda z: z if z.real >= 0.0 else -z,
+    "hypot": lambda a, b: cmath.sqrt(a * a + b * b),
+}
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("kind", [strategies, slider_cranks], ids=["five-bar", "slider-crank"])
+def test_derivatives_are_exact(kind: Any, seed: int) -> None:
+    """Against a complex step of 1e-30, which subtracts nothing: the same functions by another differentiation."""
+    case = kind.seeded(seed)
+    mechanism, p = mechanism_of(case.parameters), case.parameters.constants()
+    x = np.array(case.state, float)
+    u = np.random.default_rng(seed).normal(size=len(mechanism.channels))
+    flags = (0.0,) * len(mechanism.modes)
+    state = casadi.SX.sym("x", len(x))
+    ours = traced(mechanism)
+    of_state = casadi.vertcat(
+        *ours.of(mechanism.equations.derivative)(
+            tuple(casadi.vertsplit(state)), mechanism.equations.applied(flags, tuple(u), p), p
+        )
+    )
+    exact = np.array(casadi.Function("jacobian", [state], [casadi.densify(casadi.jacobian(of_state, state))])(x))
+    derivative = rebound(mechanism.modules, COMPLEX).of(mechanism.equations.derivative)
+    stepped = np.empty((len(x), len(x)))
+    for j in range(len(x)):
+        shifted = x.astype(complex)
+        shifted[j] += 1e-30j
+        at = derivative(tuple(shifted.tolist()), mechanism.equations.applied(flags, tuple(u.tolist()), p), p)
+        stepped[:, j] = np.array([complex(value).imag for value in at]) / 1e-30
     size = np.abs(exact).max(axis=1, keepdims=True)
-    assert np.all(np.abs(exact - differences) <= 1e-4 * size + 1e-9)
+    assert size.max() > 1.0
+    assert np.all(np.abs(exact - stepped) <= 1e-11 * size)
 
 
 def test_nothing_of_the_plain_modules_is_changed() -> None:

@@ -34,11 +34,11 @@ _NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
 class Units:
-    """Numbers as texts in the units of the output; angles are in degrees in either system."""
+    """Numbers as texts in the units of the output; in SI lengths are in millimetres, and in either system angles in degrees."""
 
     def __init__(self, system: str) -> None:
         self.system = system
-        self._table = {**sc.UNITS[system], "rad": sc.UNITS["inch"]["rad"]}
+        self._table = {**sc.shown_units(system), "rad": sc.UNITS["inch"]["rad"]}
 
     def name(self, si: str) -> str:
         """Return the name of the unit."""
@@ -250,7 +250,7 @@ _MECHANISM_OPTIONS = (
         type=click.Choice(["SI", "inch"]),
         default="SI",
         show_default=True,
-        help="Units of the output and of errors; inch: inches, pounds force and degrees.",
+        help="Units of the output, in which SI has millimetres, and of errors; inch: inches, pounds force and degrees.",
     ),
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")

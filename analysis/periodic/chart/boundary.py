@@ -33,7 +33,7 @@ from .coexistence import Coexistence, coexistence
 from .grid import Grid
 
 #: Steps of the differences, relative to the scales: the multipliers are good to about 1e-10. They steer Newton's method only.
-_DIFFERENCE = 1e-5
+_DIFFERENCE = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -65,7 +65,8 @@ def follow_crossing(
     x: tuple[float, float],
     y: tuple[float, float],
     first: float = 2e-3,
-    greatest: float = 4e-2,
+    greatest: float = 0.3,
+    widest: float = 4e-2,
     most_points: int = 300,
 ) -> CrossingCurve:
     """Follow a crossing of the unit circle through a plane, to both sides, up to the edges of a box.
@@ -81,8 +82,9 @@ def follow_crossing(
         The point of the plane at which the orbit is.
     x, y : (float, float)
         The box.
-    first, greatest : float
-        Steps in scaled arc length: each side of the box has length 1, and the crank's length counts as 1.
+    first, greatest, widest : float
+        First and greatest step in scaled arc length: each side of the box has length 1, and the crank's length counts as 1;
+        and the greatest step along either side.
     most_points : int
         Points at most to either side.
 
@@ -92,7 +94,9 @@ def follow_crossing(
         If no point of the curve is near the orbit.
     """
     n = len(orbit.start)
-    settings = Settings(low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, most_points=most_points)
+    settings = Settings(
+        low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, widest=widest, most_points=most_points
+    )
     unknowns = np.append(orbit.scale, x[1] - x[0])
     follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)
     begin = follower.start(np.append(orbit.start, place[0]), place[1], 1)
@@ -139,7 +143,14 @@ POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 
 
 def line_branches(
-    operation: Plane, x: tuple[float, float], y: float, *, name: str, unit: str, start: ArrayLike | None = None
+    operation: Plane,
+    x: tuple[float, float],
+    y: float,
+    *,
+    name: str,
+    unit: str,
+    start: ArrayLike | None = None,
+    watch: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[Branch], Coexistence, list[str]]:
     """Find all motions on the line y = const and follow them to both sides, until branches pass through all of them.
 
@@ -157,6 +168,8 @@ def line_branches(
         Of x.
     start : array_like, shape (n,), optional
         See `coexistence`.
+    watch : callable, optional
+        Called with the share of the line that is done.
 
     Returns
     -------
@@ -170,7 +183,8 @@ def line_branches(
     found = coexistence(operation, xs, [y], start=start)
     branches: list[Branch] = []
     lost: list[str] = []
-    for value, starts, largest in zip(xs.tolist(), found.starts[0], found.largest[0].filled(np.inf)):
+    line = zip(xs.tolist(), found.starts[0], found.largest[0].filled(np.inf))
+    for number, (value, starts, largest) in enumerate(line, start=1):
         parameters, drive = operation(value, y)
         family = Family(parameters=parameters, drive=drive, vary=lambda v: operation(v, y), name=name, unit=unit)
         for motion in starts[largest < GREATEST]:
@@ -192,6 +206,7 @@ def line_branches(
                 lost.append(f"{family.format_value(value)}: {error}")
             else:
                 branches.append(branch)
+        watch(number / POINTS)
     return branches, found, lost
 
 

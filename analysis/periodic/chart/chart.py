@@ -387,17 +387,25 @@ class _Survey:
         """Follow the branches of all motions on the lines y = const, and the boundaries from their special points."""
         lost: list[str] = []
         with shown(progress and bool(ys), float(len(ys)), what) as show:
-            for number, y in enumerate(ys, start=1):
+            for number, y in enumerate(ys):
+                # half of a line is its branches, half the boundaries from them
                 branches, found, failed = line_branches(
-                    self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start
+                    self.operation,
+                    self.box.x,
+                    y,
+                    name=self.axes[0].name,
+                    unit=self.axes[0].si,
+                    start=self.start,
+                    watch=lambda share, number=number: show(number + 0.5 * share),  # type: ignore[misc]
                 )
                 self.lines.append(y)
                 self.most = max(self.most, int(found.stable.max()))
                 lost += [f"{self.axes[1].format_value(y)}, {failure}" for failure in failed]
-                for branch in branches:
-                    for special in branch.special:
-                        self._follow_special(special, (special.parameter, y))
-                show(float(number))
+                specials = [special for branch in branches for special in branch.special]
+                for done, special in enumerate(specials, start=1):
+                    self._follow_special(special, (special.parameter, y))
+                    show(number + 0.5 + 0.5 * done / len(specials))
+                show(number + 1.0)
         if lost:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 

@@ -392,8 +392,8 @@ MEASURABLE = 1e-2
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Choose three points of a grid for long runs: the most stable, the least stable, and the one nearest to a boundary.
 
-    The first lies off the edges if there is such a point, where the picture shows it whole. The last has the least margin, to
-    either side, that a long run can still measure.
+    They lie off the edges, where the picture shows them whole, unless an unstable point is on the edges only. The last has the
+    least margin, to either side, that a long run can still measure.
 
     Returns
     -------
@@ -404,14 +404,17 @@ def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     if margin.count() == 0:
         return []
     edges = np.ones(margin.shape, dtype=bool)
-    edges[1:-1, 1:-1] = False
+    row, column = (max(1, count // 20) for count in margin.shape)
+    edges[row:-row, column:-column] = False
     inner = np.ma.masked_where(edges, margin)
-    stable = inner if inner.count() else margin
-    places = list(dict.fromkeys((int(stable.argmax()), int(margin.argmin()))))
-    size = np.ma.abs(margin)
+    if inner.count() == 0:
+        inner = margin
+    worst = margin if margin.min() < 0.0 < inner.min() else inner
+    places = list(dict.fromkeys((int(inner.argmax()), int(worst.argmin()))))
+    size = np.ma.abs(inner)
     size.ravel()[places] = np.ma.masked
     near = np.ma.masked_where(size < MEASURABLE, size)
     if near.count():
         places.append(int(near.argmin()))
-    row, column = np.unravel_index(places, margin.shape)
-    return list(zip(row.tolist(), column.tolist()))
+    rows, columns = np.unravel_index(places, margin.shape)
+    return list(zip(rows.tolist(), columns.tolist()))
