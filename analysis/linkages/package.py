@@ -267,7 +267,7 @@ class Package:
             fields=listed(v.fields(), end=""),
             values=listed(v.constants().values(), 12),
             initial=listed((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
-            variables=listed([*v.parameters(), *v.inputs(), *(o.variable for o in self.outputs.all() if o.variable)]),
+            variables=listed([*v.parameters(), *v.inputs(), *self.outputs.variables()]),
             quoted_name=quoted(d.name),
             quoted_title=quoted(title),
             fmu=quoted("".join(part[:1].upper() + part[1:] for part in re.split(r"[^A-Za-z0-9]+", d.name))),

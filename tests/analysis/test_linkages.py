@@ -434,3 +434,19 @@ stop_time = "0.5 s"
         "swing", "A", start="20 deg", driven=False
     )
     assert built.mechanism() is load_linkage(tmp_path / "bar.toml")
+
+
+def test_the_clearance_to_the_limit_of_assembly_is_an_output(tmp_path):
+    """The sine of the transmission angle of a four-bar; its variables have symbols."""
+    made = Package(described(changed("name", "four-bar-clearance"))).mechanism(tmp_path)
+    known = made.published[made.name]
+    p, idle = known.parameters.constants(), made.idle(known.parameters.constants())
+    for angle in (0.0, 1.0, 4.0):
+        found = dict(zip(made.output_names, made.equations.outputs((angle, 3.0, 0.0, 0.0), idle, 0.0, p)))
+        assert found["assembly.clearance"] == pytest.approx(np.sin(found["C.transmission_angle"]), rel=1e-12)
+    variables = {v.name: v for v in made.variables}
+    assert (variables["assembly.clearance"].unit, variables["assembly.clearance"].level) == ("1", "position")
+    without = {name for name, v in variables.items() if v.kind == "Real" and not v.symbol}
+    assert without == {"solver.tolerance", *(name for name in variables if name.startswith("energy."))}
+    assert variables["rocker.length"].symbol == r"l_{\mathrm{rocker}}"
+    assert variables["crank.acceleration"].symbol == r"\ddot\theta_{\mathrm{crank}}"
