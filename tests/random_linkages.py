@@ -210,7 +210,8 @@ class Maker:
         if not owned:
             body = next(iter(data["bodies"]))
             owned = [(body, self.pin(body))]
-        data["loads"] = [owned[int(rng.integers(len(owned)))][1]]
+        point = owned[int(rng.integers(len(owned)))][1]
+        data["loads"] = [{"point": point, "frame": "body"} if rng.uniform() < 0.5 else point]
 
 
 def random_linkage(

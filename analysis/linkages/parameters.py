@@ -12,7 +12,7 @@ from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
-from .description import GROUND, Body, Description, LinkageError, Spring, given
+from .description import BODY, GROUND, Body, Description, LinkageError, Spring, given
 from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
@@ -307,11 +307,15 @@ def _loads(
 ) -> Iterator[Load]:
     """Yield the inputs that drive no freedom."""
     moving = {own for body in description.bodies for own in points[body]}
-    for own in description.loads:
+    for load in description.loads:
+        own = load.point
         if own not in moving:
             raise unknown_name(own, sorted(moving), f"point {own}, of linkage.loads")
-        fixed = own in description.ground
-        yield from (Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}", "" if fixed else f"{own}.{c}") for c in "xy")
+        turns = load.frame == BODY
+        of = f" of the {next(body for body in description.bodies if own in points[body])}" if turns else ""
+        fixed = turns or own in description.ground
+        for c in "xy":
+            yield Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}{of}", "" if fixed else f"{own}.{c}")
     for body in description.torques:
         if body not in description.bodies:
             raise unknown_name(body, description.bodies, f"body {body}, of linkage.torques")

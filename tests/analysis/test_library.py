@@ -72,7 +72,7 @@ def test_a_linkage_of_the_library_moves_as_with_multipliers(path):
         m = equations.motion(x, i, p)
         frames = [getattr(m.places, f"{body}_frame") for body in d.bodies]
         q = np.array([c for f in frames for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
-        wanted = oracle.solve(q, np.array(x[n : 2 * n]), np.zeros(n), commanded, dict.fromkeys(d.loads, (0.0, 0.0)), {})
+        wanted = oracle.solve(q, np.array(x[n : 2 * n]), np.zeros(n), commanded, {load.point: (0.0, 0.0) for load in d.loads}, {})
         scale = 1.0 + np.abs(wanted.accelerations).max()
         np.testing.assert_allclose(m.accelerations, wanted.accelerations, atol=1e-8 * scale)
         np.testing.assert_allclose(m.loads, wanted.loads, atol=1e-8 * (1.0 + np.abs(wanted.loads).max()))

@@ -92,7 +92,7 @@ def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes:
                 loads[c.freedom] = u[k]
         forces = {name: values[f"{name}.torque"] for name in d.torques}
         forces |= {name: values[f"{name}.force"] for name, s in d.springs.items() if s.driven}
-        points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in d.loads}
+        points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in (load.point for load in d.loads)}
         if made.equations.clearance(x, i, p) < 0.0:  # friction may jam the linkage
             continue
         wanted = oracle.solve(q, rates, loads, commanded, points, forces)
@@ -337,6 +337,8 @@ MISTAKES = [
     ("name", "../x", "linkage.name"),
     ("name", "five-bar", "linkage.name"),
     ("loads", ["C", "C"], "linkage.loads has C twice"),
+    ("loads", [{"point": "C", "frame": "link"}], "linkage.loads[0].frame"),
+    ("loads", [{"point": "C"}, "C"], "linkage.loads has C twice"),
     ("torques", ["rocker", "rocker"], "linkage.torques has rocker twice"),
     ("freedoms", ["A"], "linkage.freedoms"),
     ("freedoms", {"coupler": "A"}, "linkage.freedoms.coupler"),

@@ -227,8 +227,13 @@ class Multipliers:
             force -= pull * casadi.gradient(measure, self.q)
         for name in self.d.torques:
             force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
+        frames = {load.point: load.frame for load in self.d.loads}
         for own, (fx, fy) in points.items():
             x, y = self.at(self.moving(own), own)
+            if frames[own] == "body":
+                angle = self.pose(self.moving(own))[2]
+                c, s = casadi.cos(angle), casadi.sin(angle)
+                fx, fy = c * fx - s * fy, s * fx + c * fy
             force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
         inertia_of = casadi.jacobian(momentum, self.v)
         return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
