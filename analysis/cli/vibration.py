@@ -50,7 +50,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 @click.option(
     "--vary",
     metavar="NAME",
-    help="What varies, by its FMI name; by default the crank speed, of several the first, to which the others keep their ratios.",
+    help="What varies, by its FMI name; by default the crank speed; of several commanded cranks the first, whose ratios stay.",
 )
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."

@@ -18,6 +18,8 @@ class Reach(NamedTuple):
     Attributes
     ----------
     freedom : int
+    unit : str
+        Of its coordinate, rad or m.
     low, high : float
         Ends of the range (rad, m): dead centres, or the ends of a turn.
     turns : bool
@@ -27,6 +29,7 @@ class Reach(NamedTuple):
     """
 
     freedom: int
+    unit: str
     low: float
     high: float
     turns: bool
@@ -45,9 +48,10 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     samples : int
         Places looked at to either side.
     """
-    period = mechanism.freedoms[freedom].period
+    coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
+    unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
     if most is None:
-        most = 0.5 * period or (pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0)
+        most = 0.5 * period or (pi if unit == "rad" else 1.0)
     known = mechanism.first_set
     p = known.parameters.constants()
     acting, x = mechanism.idle(p), list(mechanism.state(known.initial))
@@ -72,4 +76,4 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
             least, before = min(least, value + LIMIT_SINE), float(q)
         ends.append(before)
     whole = bool(period) and ends[1] - ends[0] > period * (1.0 - 1e-9)
-    return Reach(freedom, ends[0], ends[1], whole, least)
+    return Reach(freedom, unit, ends[0], ends[1], whole, least)

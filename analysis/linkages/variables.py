@@ -55,7 +55,9 @@ class Variables:
             direction = "self.ground_gravity_direction"
             found |= {"gx": f"self.gravity * cos({direction})", "gy": f"self.gravity * sin({direction})"}
         if self.description.friction:
-            found["rough"] = " + ".join(f"self.{p.field}" for p in self.interface.parameters if ".friction_" in p.name)
+            levels = {f"{name}_friction" for name in self.description.springs}
+            rough = [p.field for p in self.interface.parameters if p.role == "friction" and p.field not in levels]
+            found["rough"] = " + ".join(f"self.{field}" for field in rough)
         return found or {"nothing": "0.0"}
 
     def rules(self) -> str:
@@ -98,9 +100,7 @@ class Variables:
 
     def placing(self) -> list[str]:
         """Return the parameters that set the places of the bodies at the start."""
-        placing = (".direction", ".ratio", ".phase", ".radius", ".offset")
-        names = [p.name for p in self.interface.parameters if p.unit in ("m", "") or p.name.endswith(placing)]
-        names = [name for name in names if not any(part in name for part in (".cog_", ".free_", ".friction_"))]
+        names = [p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and not p.role]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:

@@ -72,7 +72,9 @@ def test_a_linkage_of_the_library_moves_as_with_multipliers(path):
         m = equations.motion(x, i, p)
         frames = [getattr(m.places, f"{body}_frame") for body in d.bodies]
         q = np.array([c for f in frames for c in (f.origin.x, f.origin.y, np.arctan2(f.turn.s, f.turn.c))])
-        wanted = oracle.solve(q, np.array(x[n : 2 * n]), np.zeros(n), commanded, {load.point: (0.0, 0.0) for load in d.loads}, {})
+        wanted = oracle.solve(
+            q, np.array(x[n : 2 * n]), np.zeros(n), commanded, {load.point: (0.0, 0.0) for load in d.loads}, {}
+        )
         scale = 1.0 + np.abs(wanted.accelerations).max()
         np.testing.assert_allclose(m.accelerations, wanted.accelerations, atol=1e-8 * scale)
         np.testing.assert_allclose(m.loads, wanted.loads, atol=1e-8 * (1.0 + np.abs(wanted.loads).max()))
@@ -329,6 +331,15 @@ def test_a_linkage_that_was_found_is_described_and_runs(found, direction):
 def test_two_cranks_alone_have_tables_without_a_natural_frequency():
     tables = tables_of(load_linkage(FOLDER / "hybrid-press.toml"))
     assert (tables["natural"], tables["damping"]) == (None, "sheet.damping")
+
+
+def test_the_studio_sorts_parameters_by_their_roles():
+    given = {row["name"]: row for row in tables_of(load_linkage(FOLDER / "hybrid-press.toml"))["given"]}
+    sections = {
+        name: given[name]["section"] for name in ("sheet.free_position", "gravity", "rod.cog_x", "initial.motor_angle")
+    }
+    assert list(sections.values()) == ["Spring, damper, friction", "Gravity", "Masses", "Start"]
+    assert [name for name, row in given.items() if row.get("role") == "stiffness"] == ["sheet.stiffness"]
 
 
 @in_browser
