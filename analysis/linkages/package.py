@@ -8,6 +8,7 @@ import re
 import sys
 from math import isfinite
 from pathlib import Path
+from traceback import extract_tb
 
 from linkwork import planar
 from linkwork.errors import AssemblyError, LinkworkError
@@ -213,8 +214,10 @@ class Package:
         try:
             made.check_assembly(start.parameters, made.state(start.initial))
         except AssemblyError as error:
-            signs = ", the assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
-            raise LinkageError(f"{error}: the start{signs} or the lengths must be others") from None
+            signs = ", linkage.assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
+            raise LinkageError(
+                f"{error}{self._apart(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
+            ) from None
         self._check_motion(made)
         MECHANISMS.pop(name, None)
         try:
@@ -224,6 +227,19 @@ class Package:
                 MECHANISMS[name] = known
             raise
         return made
+
+    def _apart(self, made: Mechanism) -> str:
+        """Return in words the two bodies that do not reach each other at the start; empty where all do."""
+        start = made.published[made.name]
+        try:
+            made.modules[-1].places(made.state(start.initial), start.parameters.constants())
+        except (ValueError, ArithmeticError) as error:
+            lines = [at.line or "" for at in extract_tb(error.__traceback__) if at.name == "places"]
+            for dyad in self.structure.dyads:
+                if any(f"margin_{dyad.inner.name} =" in line for line in lines):
+                    bodies = " and ".join(f"linkage.bodies.{side.body}" for side in dyad.sides)
+                    return f", {bodies}, joined at {dyad.inner.name}"
+        return ""
 
     def _check_motion(self, made: Mechanism) -> None:
         """Raise LinkageError where the accelerations at the start are no finite numbers."""
