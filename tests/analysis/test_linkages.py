@@ -68,9 +68,11 @@ def assembled(
     raise AssertionError("no assembly gives the places")
 
 
-def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes: Any) -> list[str]:
-    """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return its kinds of dyads."""
-    package, places = assembled(seed, folder, kinds, **changes)
+def compared(
+    seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, dyads: tuple[int, int] = (1, 4), **changes: Any
+) -> Package:
+    """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return it."""
+    package, places = assembled(seed, folder, kinds, dyads, **changes)
     d, made = package.description, imported(package, folder).MECHANISM
     check(made)
     oracle, rng = Multipliers(d), np.random.default_rng(seed)
@@ -91,7 +93,8 @@ def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes:
             if c.kind == "force" and c.freedom >= 0 and c.freedom not in commanded:
                 loads[c.freedom] = u[k]
         forces = {name: values[f"{name}.torque"] for name in d.torques}
-        forces |= {name: values[f"{name}.force"] for name, s in d.springs.items() if s.driven}
+        names = [name for name, s in d.springs.items() if s.driven]
+        forces |= {name: values.get(f"{name}.force", values.get(f"{name}.torque")) for name in names}
         points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in (load.point for load in d.loads)}
         if made.equations.clearance(x, i, p) < 0.0:  # friction may jam the linkage
             continue
@@ -111,12 +114,21 @@ def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes:
             found = [out[f"{r.name}.{c}"] for c in (("fx", "fy") if pin else ("force", "moment"))]
             sign = 1.0 if (r.on == r.joint.bodies[0]) == pin else -1.0
             np.testing.assert_allclose(found, sign * wanted.forces[r.joint.name], atol=near * scale, err_msg=r.name)
-    return [dyad.kind for dyad in package.structure.dyads]
+    return package
 
 
 def test_random_linkages_move_as_with_multipliers(tmp_path):
-    kinds = [kind for seed in range(16) for kind in compared(seed, tmp_path)]
-    assert set(kinds) == {"RRR", "RRP", "PRP", "RPR", "RPP"}
+    """Of all kinds of dyads, with laws, drives between points and at joints, and shafts between bodies."""
+    found = [compared(seed, tmp_path) for seed in range(16)]
+    assert {dyad.kind for package in found for dyad in package.structure.dyads} == {"RRR", "RRP", "PRP", "RPR", "RPP"}
+    springs = [spring for package in found for spring in package.description.springs.values()]
+    acting = {("between" if s.between else "at" if s.at else "of", s.driven, bool(s.law)) for s in springs}
+    assert acting >= {("between", True, True), ("at", True, False), ("at", False, True), ("of", False, False)}
+
+
+def test_random_linkages_of_twelve_bodies_move_as_with_multipliers(tmp_path):
+    for seed in (21, 25):
+        assert len(compared(seed, tmp_path, dyads=(4, 6)).description.bodies) == 12
 
 
 def test_random_racks_move_as_with_multipliers(tmp_path):
@@ -192,7 +204,7 @@ def test_period_of_a_crank_brings_gears_and_racks_back(tmp_path, change, turns):
 @pytest.mark.parametrize("first", range(16, 316, 50))
 def test_many_random_linkages_move_as_with_multipliers(tmp_path, first):
     for seed in range(first, first + 50):
-        compared(seed, tmp_path)
+        compared(seed, tmp_path, dyads=(1, 4) if seed % 3 else (3, 6))
 
 
 @pytest.mark.parametrize("seed", [0, 3, 4])
@@ -254,11 +266,11 @@ MISTAKES = [
     ("bodies/crank/points", {"P_1": [0, 0]}, "P_1"),
     ("bodies/crank/section", {"kind": "rod"}, "linkage.bodies.crank.section"),
     ("bodies/crank/section", {"kind": "beam"}, "linkage.bodies.crank.section.kind"),
-    ("bodies/dangling", {"points": {"Q": [0, 0]}, "mass": 1.0}, "dangling"),
+    ("bodies/dangling", {"points": {"Q": [0, 0]}, "mass": 1.0}, "linkage.bodies.dangling"),
     ("bodies/extra", {"bar": ["C", "Q"], "length": 0.1, "mass": 1.0}, "2 freedoms"),
-    ("bodies/brace", {"bar": ["B", "D"], "length": 0.1, "mass": 1.0}, "0 freedoms"),
+    ("bodies/brace", {"bar": ["B", "D"], "length": 0.1, "mass": 1.0}, "without linkage.bodies.brace it has 1"),
     ("bodies/my_link", {"bar": ["C", "Q"], "length": 0.1}, "my_link"),
-    ("bodies", {}, "freedoms"),
+    ("bodies", {}, "linkage.bodies has none"),
     ("ground", None, "linkage.ground"),
     ("ground/A", [0], "linkage.ground.A"),
     ("ground/A", "here", "linkage.ground.A"),
@@ -285,7 +297,7 @@ MISTAKES = [
     ("slides/G", {"body": "block", "through": "A"}, "linkage.slides.G"),
     ("slides/G", {"body": "ground", "through": "A"}, "linkage.slides.G.body"),
     ("slides/G", {"body": "rocker"}, "linkage.slides.G.through"),
-    ("slides/C", {"body": "rocker", "through": "A"}, "C"),
+    ("slides/C", {"body": "rocker", "through": "A"}, "linkage.slides.C"),
     ("slides/G", {"body": "rocker", "through": "A", "direction": "1 m"}, "linkage.slides.G.direction"),
     ("slots/S", {"pin": "Z", "on": "rocker", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "lever", "through": "D"}, "linkage.slots.S"),
@@ -293,7 +305,7 @@ MISTAKES = [
     ("gears/X", {"bodies": ["crank"], "ratio": -1}, "linkage.gears.X.bodies"),
     ("gears/X", {"bodies": ["crank", "wheel"], "ratio": -1}, "linkage.gears.X"),
     ("gears/X", {"bodies": ["crank", "rocker"]}, "linkage.gears.X.ratio"),
-    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": -1}, "0 freedoms"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": -1}, "without linkage.gears.X it has 1"),
     ("racks/R", {"gear": "crank", "rack": "rocker"}, "linkage.racks.R.radius"),
     ("racks/R", {"gear": "crank", "rack": "bar", "radius": 0.1}, "linkage.racks.R"),
     ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0.1}, "linkage.racks.R"),
@@ -328,8 +340,16 @@ MISTAKES = [
         "section.corners",
     ),
     ("bodies/ground", {"points": {"Q": [0, 0]}, "mass": 1.0}, "linkage.bodies.ground"),
-    ("bodies/double", {"bar": ["A", "B"], "length": "50 mm", "mass": 1.0}, "4 at A, 2 at D, 4 at B"),
-    ("bodies/rocker/length", "10 mm", "crank angle 0 rad"),
+    (
+        "bodies/double",
+        {"bar": ["A", "B"], "length": "50 mm", "mass": 1.0},
+        "4 at A, 2 at D, 4 at B, 2 at C: it must have 1 to 4; without linkage.bodies.double",
+    ),
+    (
+        "bodies/rocker/length",
+        "10 mm",
+        "crank angle 0 rad (0.0000 deg): they do not reach each other, linkage.bodies.coupler and ",
+    ),
     ("bodies", {"crank": {"bar": ["A", "B"], "length": 1.0}}, "linkage.bodies have no mass"),
     ("ground", {}, "linkage.ground"),
     ("ground/A", [float("inf"), 0], "linkage.ground.A"),
@@ -366,6 +386,21 @@ def test_mistakes_are_named(tmp_path, path, value, named):
     with pytest.raises(LinkworkError) as error:
         Package(described(changed(path, value))).mechanism(tmp_path)
     assert named in str(error.value)
+    assert "linkage." in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ('[linkage]\nname = "a"\n[linkage.ground]\nA = [0, 0]\nB = [0, 1]\nA = [1, 1]\n', "linkage.ground.A"),
+        ('[linkage]\nname = "a"\nname = "b"\n', "linkage.name"),
+        ("[linkage.bodies.rod]\nmass = 1\n[linkage.bodies.rod]\nmass = 2\n", "linkage.bodies.rod"),
+    ],
+)
+def test_what_a_file_has_twice_is_named(tmp_path, text, place):
+    (tmp_path / "twice.toml").write_text(text)
+    with pytest.raises(LinkworkError, match=f"at line .*: {place} is there twice"):
+        load_linkage(tmp_path / "twice.toml")
 
 
 def test_a_free_body_without_mass_is_named(tmp_path):
