@@ -14,7 +14,7 @@ import pytest
 
 import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
-from analysis.linkages import Package, described, load_linkage, load_package, reach
+from analysis.linkages import Package, dead_centres, described, load_linkage, load_package, reach
 from analysis.linkages.structure import Pin
 from analysis.mechanisms import mechanism_of
 from analysis.numerics.fourier import FourierSeries
@@ -368,6 +368,22 @@ def test_ranges_of_motion():
     # O C = 2 x 90 cos(angle/2) mm is at least 200 - 80 mm, where upper and inner link are in line
     assert not found.turns
     assert found.high == pytest.approx(2.0 * np.arccos(120.0 / 180.0), abs=1e-4)
+
+
+def test_dead_centres():
+    """A rocker stands still where crank and coupler are in line, a slider where its crank and rod are."""
+    found = {centre.at for centre in dead_centres(load_package(FOLDER / "watt-1.toml")) if centre.name == "rocker"}
+    angles = []
+    for reached, turn in ((0.18 + 0.05, 0.0), (0.18 - 0.05, np.pi)):
+        inner = np.arccos((0.2**2 + reached**2 - 0.14**2) / (2.0 * 0.2 * reached))
+        angles.append(np.remainder(inner + turn, 2.0 * np.pi))
+    np.testing.assert_allclose(sorted(np.remainder(list(found), 2.0 * np.pi)), sorted(angles), atol=1e-9)
+    press = dead_centres(load_package(FOLDER / "toggle-press.toml"))
+    run_of = run("toggle-press", **{"run.step": "1 ms"})
+    turns = np.flatnonzero(np.diff(np.sign(run_of["G.velocity"])))
+    seen = np.remainder(run_of["crank.angle"][turns], 2.0 * np.pi)
+    at = np.remainder([centre.at for centre in press if centre.name == "G"], 2.0 * np.pi)
+    np.testing.assert_allclose(np.sort(seen), np.sort(at), atol=0.02)
 
 
 FOUR_BAR = {
