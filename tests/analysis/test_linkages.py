@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import itertools
 import math
 import sys
@@ -12,8 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.files import entry_names
 from analysis.linkages import Dyad, Package, Racked, described, linkage, load_linkage
-from analysis.linkages.description import Slot
+from analysis.linkages.builder import Builder
+from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.run import Inputs, Trajectory, load_case, simulate
@@ -487,3 +490,45 @@ def test_the_clearance_to_the_limit_of_assembly_is_an_output(tmp_path):
     assert without == {"solver.tolerance", *(name for name in variables if name.startswith("energy."))}
     assert variables["rocker.length"].symbol == r"l_{\mathrm{rocker}}"
     assert variables["crank.acceleration"].symbol == r"\ddot\theta_{\mathrm{crank}}"
+
+
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    [
+        ("body", Body),
+        ("slide", Slide),
+        ("slot", Slot),
+        ("gear", Gear),
+        ("rack", Rack),
+        ("spring", Spring),
+        ("freedom", FreedomTable),
+    ],
+)
+def test_the_builder_knows_every_entry(method, kind):
+    """What an editor completes is what a file may have."""
+    assert {*inspect.signature(getattr(Builder, method)).parameters} - {"self", "name"} == {*entry_names(kind)}
+
+
+def test_pins_and_drives_of_the_builder(tmp_path):
+    """A four-bar by pins and a drive is the one by names of points; a cylinder is driven by a force."""
+    built = linkage("four-bar-test", ground={})
+    for name, entries in FOUR_BAR["bodies"].items():
+        built.body(name, **{key: entry for key, entry in entries.items() if key not in ("bar", "length")})
+    built.pin("A", ground=(0, 0), crank=(0, 0)).pin("D", ground=("150 mm", 0), rocker=(0, 0))
+    built.pin("B", crank=("50 mm", 0), coupler=(0, 0)).pin("C", coupler=("150 mm", 0), rocker=("120 mm", 0))
+    for body, length in (("crank", "50 mm"), ("coupler", "150 mm"), ("rocker", "120 mm")):
+        built.tables["bodies"][body]["cog"] = [f"{0.5 * float(length.split()[0])} mm", 0]
+    built.drive("crank", "A", speed="300 rpm").drive("ram", between=("A", "C"))
+    one, other = built.mechanism(), Package(described(FOUR_BAR)).mechanism(tmp_path)
+    assert "ram.force" in one.input_names
+    x = (0.7, 20.0, 0.0, 0.0)
+    (p, q), i = (m.first_set.parameters.constants() for m in (one, other)), (0.0,) * 4
+    found, wanted = (
+        m.equations.derivative(x, m.equations.applied((0.0,), i[: len(m.channels)], c), c)
+        for m, c in ((one, p), (other, q))
+    )
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
+    with pytest.raises(LinkworkError, match="the drive ram has"):
+        built.drive("ram")
+    with pytest.raises(LinkworkError, match="body wheel, of the pin A"):
+        built.pin("A", wheel=(0, 0))
