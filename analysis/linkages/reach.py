@@ -134,6 +134,6 @@ def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list
         if np.abs(values).max() < 1e-9:
             continue
         for n in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-            place = brentq(lambda q, name=name: coefficient(q, name), at[n], at[n + 1], xtol=1e-12)  # type: ignore[misc]
+            place = brentq(lambda q, name=name: coefficient(q, name), at[n], at[n + 1], xtol=1e-12)
             centres.append(DeadCentre(name, float(place)))
     return centres

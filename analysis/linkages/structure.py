@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkwork.errors import LinkworkError
 
@@ -260,9 +260,9 @@ def _excess(description: Description) -> str:
     for table in ("racks", "gears", "slots", "slides", "bodies"):
         entries = getattr(description, table)
         for name in reversed(entries):
-            others = {own: entry for own, entry in entries.items() if own != name}
+            others: Any = {table: {own: entry for own, entry in entries.items() if own != name}}
             try:
-                count = _count(replace(description, **{table: others}))
+                count = _count(replace(description, **others))
             except LinkworkError:  # something else needs it
                 continue
             if 1 <= count <= MOST_FREEDOMS:
