@@ -246,6 +246,11 @@ def wrapping_outputs() -> frozenset[str]:
     return frozenset(v.name for mechanism in MECHANISMS.values() for v in mechanism.variables if v.wraps)
 
 
+def residual_outputs() -> frozenset[str]:
+    """Return the names of the outputs that are zero but for error."""
+    return frozenset(name for mechanism in MECHANISMS.values() for name in mechanism.names("residual"))
+
+
 def input_units(mechanism: Mechanism) -> dict[str, str]:
     """Return the units of the inputs of a mechanism by their arguments, those of rates left out."""
     units = {v.name: v.unit for v in mechanism.variables}

@@ -259,11 +259,16 @@ def linkage_pictures() -> Iterator[Picture]:
 
     from analysis.figures import plot, plot_schemes
     from analysis.linkages import TEXT, load_linkage
+    from analysis.systems import load_system, run_system
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "four-bar.toml"
         path.write_text(TEXT.format(file=path.name), encoding="utf-8")
         yield "four-bar", plot(load_linkage(path)), 90
+        page = (HERE / "linkages.md").read_text(encoding="utf-8")
+        motor = path.with_name("motor.toml")
+        motor.write_text(page.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+        yield "motor-four-bar", plot(run_system(load_system(motor).wiring())), 70
     files = sorted((HERE.parent / "examples" / "linkages").glob("*.toml"))
     yield "linkage-library", plot_schemes([load_linkage(path) for path in files]), 90
 

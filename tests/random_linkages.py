@@ -210,7 +210,26 @@ class Maker:
         if not owned:
             body = next(iter(data["bodies"]))
             owned = [(body, self.pin(body))]
-        data["loads"] = [owned[int(rng.integers(len(owned)))][1]]
+        point = owned[int(rng.integers(len(owned)))][1]
+        data["loads"] = [{"point": point, "frame": "body"} if rng.uniform() < 0.5 else point]
+        self.drives()
+
+    def drives(self) -> None:
+        """Laws and drives of the springs, a motor at a pin that is no freedom, and a shaft between two bodies."""
+        rng, data = self.rng, self.data
+        for spring in data["springs"].values():
+            if rng.uniform() < 0.4:
+                spring |= {"law": "40*x**3 + a*tanh(3*v)", "constants": {"a": "0.5 N"}}
+            spring["driven"] = bool(rng.uniform() < 0.4)
+        owners = [data["ground"], *(body["points"] for body in data["bodies"].values())]
+        taken = {table["joint"] for table in data["freedoms"].values()} | {s["pin"] for s in data["slots"].values()}
+        points = sorted({own for table in owners for own in table} - taken)
+        pins = [own for own in points if sum(own in table for table in owners) == 2]
+        if pins and rng.uniform() < 0.6:
+            data["springs"][self.name("k")] = {"at": str(rng.choice(pins)), "driven": True}
+        if len(data["bodies"]) > 1 and rng.uniform() < 0.6:
+            pair = [str(body) for body in rng.choice(sorted(data["bodies"]), 2, replace=False)]
+            data["springs"][self.name("k")] = {"bodies": pair, "stiffness": 20.0, "damping": 0.1, "free": 0.4}
 
 
 def random_linkage(

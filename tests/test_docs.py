@@ -162,12 +162,19 @@ def says(found, stated):
 def run_page(name, tmp_path):
     """Run each command and each piece of Python of a page in turn; what the page then shows must be among what was printed.
 
+    A file that the page shows with its name is written first.
+
     Gives the number of commands, the number of lines checked, and the words of what was printed, line by line.
     """
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     python, printed, checked, commands = "", [], 0, 0
-    for kind, block in re.findall(r"```(python|sh|text)\n(.*?)```", page, flags=re.DOTALL):
+    for kind, block in re.findall(r"```(python|sh|text|toml)\n(.*?)```", page, flags=re.DOTALL):
+        if kind == "toml":
+            # a first line that is the name of a file says that the reader saves it
+            if named := re.match(r"# (\S+\.toml)\n", block):
+                (tmp_path / named[1]).write_text(block, encoding="utf-8")
+            continue
         if kind == "text":
             # a first line of headings is the page's own
             lines = block.strip().splitlines()
@@ -232,7 +239,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
             0,
             ("examples/linkages/jansen.toml", "out/jansen-linkage.png", "out/toggle-press.csv"),
         ),
-        ("linkages.md", 6, 1, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu")),
+        ("linkages.md", 7, 2, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu", "out/motor.png")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
         ("systems.md", 17, 6, ("out/motor-crank.ssp", "out/press-check.png", "motor-crank.ssp", "runs/samples.npy")),
         ("real-time.md", 2, 0, ("out/motor-tracking-host/system.h", "out/motor-tracking-host/host")),

@@ -40,7 +40,7 @@ class Chosen:
 
     def drive(self, speed: str | None = None) -> Any:
         """Return the drive of the case with its constant forces; a given speed replaces the drive of the crank."""
-        from ..periodic import VaryingInputError, drive_of
+        from ..periodic import NothingFreeError, VaryingInputError, drive_of
 
         speed = speed or self.speed
         value = None if speed is None else quantity(speed, "rad/s", "--speed")
@@ -51,6 +51,12 @@ class Chosen:
             # that something is free is asked first
             drive.flow(mechanism_of(self.case.parameters))
             return drive
+        except NothingFreeError as error:
+            one = error.force and f"; --set {error.force}=0 leaves one free, --set {error.force}=VALUE drives it so"
+            raise InputError(
+                f"{self.case.title}: all freedoms are commanded, and nothing is left that could vibrate: linkwork run has "
+                f"what the drives need{one}"
+            ) from None
         except InputError as error:
             torque = isinstance(error, VaryingInputError) and error.channel == "torque"
             hint = "; --speed prescribes the speed instead" if torque else ""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--animation", is_flag=True, help="Write an animation too.")
 @handled
 def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
-    """Describe the linkage of a FILE: structure, freedoms, dyads in order, range of motion; and draw it.
+    """Describe the linkage of a FILE: structure, freedoms, dyads in order, range of motion, dead centres; and draw it.
 
     \b
     Examples:
@@ -40,6 +40,7 @@ def linkage(file: str, equations: bool, out: str, animation: bool) -> None:
         return
     _print_structure(package)
     _print_reach(made)
+    _print_dead_centres(package)
     from ..figures import animate, plot
     from ..files import save_figure
 
@@ -85,10 +86,27 @@ def _print_reach(made: Mechanism) -> None:
     rows = []
     for number, freedom in enumerate(made.freedoms):
         found = reach(made, number)
-        factor, unit = (degrees(1.0), "deg") if freedom.coordinate.endswith("angle") else (1e3, "mm")
+        factor, unit = (degrees(1.0), "deg") if found.unit == "rad" else (1e3, "mm")
         span = "turns" if found.turns else f"{factor * found.low:.4g} to {factor * found.high:.4g} {unit}"
         rows.append((freedom.coordinate, span, f"{degrees(asin(min(1.0, found.least))):.3g}"))
     columns = ("freedom", "range of motion", "least transmission angle [deg]")
     show_table(
         "range of motion, the other freedoms at their start", columns, rows, words=("freedom", "range of motion")
     )
+
+
+def _print_dead_centres(package: Package) -> None:
+    """Print the places of each freedom at which a body on the ground stands still."""
+    from ..linkages import dead_centres
+    from ..units import display_of
+
+    rows = []
+    for number, freedom in enumerate(package.interface.drives):
+        unit, factor = display_of(freedom.unit)
+        rows += [
+            (freedom.coordinate, centre.name, f"{factor * centre.at:.4f} {unit}")
+            for centre in dead_centres(package, number)
+        ]
+    if rows:
+        columns = ("freedom", "stands still", "at")
+        show_table("dead centres", columns, rows, words=columns)

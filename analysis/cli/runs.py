@@ -43,8 +43,6 @@ from .common import (
     visible,
 )
 
-#: Outputs in the plot of a check beside the freedoms, of those that the mechanism has.
-COMPARED = ("drive.applied_torque", "pin.C.fx", "pin.C.fy", "slider_pin.fx", "slider_pin.fy")
 #: Share of the largest value in the same unit below which a value is rounding, and printed as zero.
 _ROUNDING = 1e-12
 #: Where the FMUs of the mechanisms are looked for.
@@ -350,12 +348,13 @@ def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) 
 
     in_process.to_csv(f"{stem}-in-process.csv")
     through_fmu.to_csv(f"{stem}-fmu.csv")
-    freedoms = mechanism_of(case.parameters).freedoms
+    mechanism = mechanism_of(case.parameters)
+    freedoms, joints = mechanism.freedoms, list(mechanism.joints.values())
     of_freedoms = [name for f in (freedoms[1:] or freedoms) for name in (f.coordinate, f.rate)]
     figure = figures.plot_comparison(
         in_process,
         through_fmu,
-        [name for name in (*of_freedoms, *COMPARED) if name in in_process.names],
+        [*of_freedoms, *mechanism.names("drive"), *(joints[len(joints) // 2] if joints else ())],
         title=case.title,
         labels=(f"in process ({in_process.source})", "FMU"),
     )

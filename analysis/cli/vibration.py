@@ -47,7 +47,11 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 
 @click.command()
 @about_a_case
-@click.option("--vary", metavar="NAME", help="What varies, by its FMI name; by default the crank speed.")
+@click.option(
+    "--vary",
+    metavar="NAME",
+    help="What varies, by its FMI name; by default the crank speed; of several commanded cranks the first, whose ratios stay.",
+)
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
 )
@@ -117,7 +121,8 @@ def resonance(
 
     parameters, title = chosen.case.parameters, chosen.case.title
     mechanism = mechanism_of(parameters)
-    vary = vary or default_variable(mechanism)
+    # of several cranks the case says which are commanded; they keep the ratios of their speeds
+    vary = vary or default_variable(mechanism, chosen.drive() if len(mechanism.cyclic) > 1 else None)
     over_speed = vary in speed_names(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(

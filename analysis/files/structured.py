@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -56,11 +57,25 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     except RecursionError:
         raise InputError(f"{path} has tables or lists inside each other, deeper than {_DEPTH}") from None
     except ValueError as error:  # wrong syntax, or a whole number with thousands of digits
-        raise InputError(f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}") from error
+        raise InputError(
+            f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}{_twice(text, error)}"
+        ) from error
     if not isinstance(data, dict):
         raise InputError(f"{path} must hold tables, not {type(data).__name__}")
     _check(path, data)
     return data
+
+
+def _twice(text: str, error: ValueError) -> str:
+    """Return in words the entry or table of a TOML file that is there twice, where this is the error."""
+    if not re.match("Cannot (overwrite|declare)", str(error)):
+        return ""
+    last = re.search(r"at line (\d+)", str(error))
+    lines = text.splitlines()[: int(last[1]) if last else None]
+    tables = [found[1] for line in lines if (found := re.match(r"\s*\[+([^]]+)", line))]
+    key = re.match(r"\s*([^=\[]+?)\s*=", lines[-1])
+    places = [*tables[-1:], *([key[1]] if key else [])]
+    return f": {'.'.join(place.strip() for place in places)} is there twice" if places else ""
 
 
 def _check(path: Path, data: dict[str, Any]) -> None:

@@ -8,7 +8,9 @@ from .builder import with_linkage as with_linkage
 from .description import Description as Description
 from .description import LinkageError as LinkageError
 from .package import Package as Package
+from .reach import DeadCentre as DeadCentre
 from .reach import Reach as Reach
+from .reach import dead_centres as dead_centres
 from .reach import reach as reach
 from .sections import SECTIONS as SECTIONS
 from .sections import Made as Made

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,8 @@ from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
 from .. import files
-from .description import Description
+from ..files import unknown_name
+from .description import GROUND, Description
 from .package import Package
 
 LINKAGE = "linkage"
@@ -82,8 +83,17 @@ def load_package(path: str | Path) -> Package:
     return _package(tables)
 
 
+#: A number in SI, or a text with a unit such as "50 mm".
+Amount = float | str
+#: Coordinates x, y; 0 stands for one that is always zero.
+Place = Sequence[Amount]
+
+
 class Builder:
     """A description in the making: each method adds an entry of the table of that name, as a file has it.
+
+    Amounts are numbers in SI or texts with a unit, such as ``"50 mm"``. What is left out has the default of the file. Every
+    method returns the builder.
 
     Examples
     --------
@@ -94,43 +104,225 @@ class Builder:
     ('swing.angle', 'swing.speed')
     """
 
-    def __init__(self, name: str, ground: Mapping[str, Any], **entries: Any) -> None:
-        self.tables: dict[str, Any] = {"name": name, "ground": _plain(ground), "bodies": {}, **_plain(entries)}
+    def __init__(self, name: str, ground: Mapping[str, Place], **entries: Any) -> None:
+        self.tables: dict[str, Any] = {"name": name, "ground": _plain(ground), "bodies": {}, **_given(entries)}
 
     def __repr__(self) -> str:
         return f"<linkage {self.tables['name']}: {', '.join(self.tables['bodies']) or 'no bodies yet'}>"
 
-    def _add(self, table: str, name: str, entries: Mapping[str, Any]) -> Builder:
-        self.tables.setdefault(table, {})[name] = _plain(entries)
+    def _add(self, table: str, name: str, **entries: Any) -> Builder:
+        self.tables.setdefault(table, {})[name] = _given(entries)
         return self
 
-    def body(self, name: str, **entries: Any) -> Builder:
-        """Add a moving body: ``bar`` and ``length`` or ``points``, and ``mass``, ``cog``, ``inertia`` or ``section``."""
-        return self._add("bodies", name, entries)
+    def body(
+        self,
+        name: str,
+        *,
+        bar: Sequence[str] | None = None,
+        length: Amount | None = None,
+        points: Mapping[str, Place] | None = None,
+        mass: Amount | None = None,
+        cog: Place | None = None,
+        inertia: Amount | None = None,
+        section: Mapping[str, Any] | None = None,
+    ) -> Builder:
+        """Add a moving body; bodies that have a point of the same name are pinned to each other there.
 
-    def slide(self, name: str, **entries: Any) -> Builder:
-        """Add a slide: ``body``, ``on``, ``through``, ``direction``."""
-        return self._add("slides", name, entries)
+        Parameters
+        ----------
+        name : str
+        bar : (str, str), optional
+            Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
+        length : optional
+            Of the bar (m).
+        points : mapping of str to (x, y), optional
+            Further points, or all of a body that is no bar (m).
+        mass, cog, inertia : optional
+            Mass (kg), centre of mass (m), by default the middle of the bar, and moment of inertia about it (kg.m2).
+        section : mapping, optional
+            From which these follow: ``kind`` (``"bar"`` with ``width`` and ``thickness``, ``"rod"`` with ``diameter``,
+            ``"tube"`` with ``outer`` and ``inner``, ``"plate"`` with ``thickness`` and ``corners``) and a ``material``.
+        """
+        return self._add(
+            "bodies", name, bar=bar, length=length, points=points, mass=mass, cog=cog, inertia=inertia, section=section
+        )
 
-    def slot(self, name: str, **entries: Any) -> Builder:
-        """Add a pin in a slot: ``pin``, ``on``, ``through``, ``direction``."""
-        return self._add("slots", name, entries)
+    def pin(self, name: str, **places: Place) -> Builder:
+        """Pin bodies to each other, and to the ground, at a point of each.
 
-    def gear(self, name: str, **entries: Any) -> Builder:
-        """Add a pair of gears: ``bodies``, ``ratio``, ``phase``."""
-        return self._add("gears", name, entries)
+        Parameters
+        ----------
+        name : str
+            Of the joint and of the points.
+        **places : (x, y)
+            Own coordinates of the point in each body, by the body's name, or ``ground`` (m).
 
-    def rack(self, name: str, **entries: Any) -> Builder:
-        """Add a toothed rack: ``gear``, ``rack``, ``radius``, ``offset``."""
-        return self._add("racks", name, entries)
+        Raises
+        ------
+        InputError
+            If there is no such body yet.
 
-    def spring(self, name: str, **entries: Any) -> Builder:
-        """Add a spring with damper and friction: ``at`` or ``between``, ``stiffness``, ``free``, ``damping``, ``friction``."""
-        return self._add("springs", name, entries)
+        Examples
+        --------
+        >>> swing = linkage("example-pin", ground={}).body("rod", points={"end": (0.5, 0)}, mass=1.0, inertia=0.1)
+        >>> swing.pin("A", ground=(0, 0), rod=(0, 0)).freedom("swing", "A", driven=False).mechanism().name
+        'example-pin'
+        """
+        for body, place in places.items():
+            if body != GROUND and body not in self.tables["bodies"]:
+                raise unknown_name(body, (GROUND, *self.tables["bodies"]), f"body {body}, of the pin {name}")
+            own = self.tables["bodies"].get(body)
+            points = self.tables["ground"] if own is None else own.setdefault("points", {})
+            points[name] = _plain(place)
+        return self
 
-    def freedom(self, name: str, joint: str, **entries: Any) -> Builder:
-        """Add a freedom: the coordinate of a joint, with ``start``, ``speed``, ``driven``."""
-        return self._add("freedoms", name, {"joint": joint, **entries})
+    def slide(
+        self, name: str, *, body: str, through: str, on: str | None = None, direction: Amount | None = None
+    ) -> Builder:
+        """Add a body that slides on another along a line without turning against it.
+
+        Parameters
+        ----------
+        name : str
+            Of the joint.
+        body : str
+            The block: its origin is on the line, and its x axis along it.
+        through : str
+            A point on the line, of the body that has it; positions are counted from it.
+        on : str, optional
+            That body, by default the ground.
+        direction : optional
+            Of the line in that body (rad).
+        """
+        return self._add("slides", name, body=body, on=on, through=through, direction=direction)
+
+    def slot(self, name: str, *, pin: str, on: str, through: str, direction: Amount | None = None) -> Builder:
+        """Add a straight slot of the body ``on`` in a ``direction`` (rad) through a point of it, and a ``pin`` of another."""
+        return self._add("slots", name, pin=pin, on=on, through=through, direction=direction)
+
+    def gear(self, name: str, *, bodies: Sequence[str], ratio: Amount, phase: Amount | None = None) -> Builder:
+        """Add a pair of gears, each pinned to the same third body.
+
+        Parameters
+        ----------
+        name : str
+        bodies : (str, str)
+        ratio : float
+            Speed of the second by that of the first, seen from the third body; negative for external gears.
+        phase : optional
+            Angle of the second at which that of the first is zero (rad).
+        """
+        return self._add("gears", name, bodies=bodies, ratio=ratio, phase=phase)
+
+    def rack(self, name: str, *, gear: str, rack: str, radius: Amount, offset: Amount | None = None) -> Builder:
+        """Add a toothed rack: a body that slides on the one to which its ``gear`` is pinned.
+
+        ``radius`` is the travel by the angle of the gear (m), of either sign; ``offset`` the position at the angle 0 (m).
+        """
+        return self._add("racks", name, gear=gear, rack=rack, radius=radius, offset=offset)
+
+    def spring(
+        self,
+        name: str,
+        *,
+        between: Sequence[str] | None = None,
+        at: str | None = None,
+        bodies: Sequence[str] | None = None,
+        stiffness: Amount | None = None,
+        damping: Amount | None = None,
+        free: Amount | None = None,
+        friction: Amount | None = None,
+        law: str | Sequence[Sequence[float]] | None = None,
+        constants: Mapping[str, Amount] | None = None,
+        driven: bool | None = None,
+    ) -> Builder:
+        """Add a spring with damper, dry friction and law: between two points, at a joint, or between two bodies.
+
+        Parameters
+        ----------
+        name : str
+        between : (str, str), optional
+            Two points; or
+        at : str, optional
+            a pin or a slide; or
+        bodies : (str, str), optional
+            two bodies, that twist it.
+        stiffness, damping : optional
+            In N/m and N.s/m; about a pin or of bodies in N.m/rad and N.m.s/rad.
+        free : optional
+            Length, position (m) or angle (rad) at which it is free.
+        friction : optional
+            Level of Coulomb friction (N, N.m).
+        law : str or sequence of (x, force), optional
+            A further force against the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or a table of it (SI).
+        constants : mapping, optional
+            Of the law, by their names in it.
+        driven : bool, optional
+            Whether an input drives it, as of a cylinder or a motor at a joint that is no freedom.
+        """
+        return self._add(
+            "springs", name, between=between, at=at, bodies=bodies, stiffness=stiffness, damping=damping, free=free,
+            friction=friction, law=law, constants=constants, driven=driven,
+        )  # fmt: skip
+
+    def freedom(
+        self,
+        name: str,
+        joint: str,
+        *,
+        start: Amount | None = None,
+        speed: Amount | None = None,
+        driven: bool | None = None,
+    ) -> Builder:
+        """Add a freedom: the angle of a pin, or the position of a slide.
+
+        Parameters
+        ----------
+        name : str
+        joint : str
+        start : optional
+            At the start (rad, m).
+        speed : optional
+            Commanded (rad/s, m/s); of a freedom that is not driven its rate at the start.
+        driven : bool, optional
+            Whether its rate can be commanded, by default the first freedom's.
+        """
+        return self._add("freedoms", name, joint=joint, start=start, speed=speed, driven=driven)
+
+    def drive(
+        self,
+        name: str,
+        joint: str | None = None,
+        *,
+        between: Sequence[str] | None = None,
+        speed: Amount | None = None,
+        start: Amount | None = None,
+    ) -> Builder:
+        """Drive a joint, whose coordinate becomes a freedom, or two points by a force, as a cylinder does.
+
+        Parameters
+        ----------
+        name : str
+            Of the freedom, or of the cylinder.
+        joint : str, optional
+            A pin or a slide; its ``speed`` is commanded (rad/s, m/s), or else a torque or force is an input; or
+        between : (str, str), optional
+            two points, between which a force acts that is an input.
+        speed, start : optional
+            Of a joint: see `freedom`.
+
+        Raises
+        ------
+        InputError
+            If there are both a joint and points, or neither.
+        """
+        if (joint is None) == (between is None):
+            raise InputError(
+                f"the drive {name} has the joint {joint} and the points {between}: it must have one of these"
+            )
+        if joint is not None:
+            return self.freedom(name, joint, start=start, speed=speed, driven=True)
+        return self.spring(name, between=between, driven=True)
 
     def mechanism(self) -> Mechanism:
         """Compile the linkage; its name is that of a published set, too, so that every function takes it.
@@ -142,16 +334,39 @@ class Builder:
         return Package(described(self.tables)).mechanism()
 
 
-def linkage(name: str, ground: Mapping[str, Any], **entries: Any) -> Builder:
+def linkage(
+    name: str,
+    ground: Mapping[str, Place],
+    *,
+    title: str | None = None,
+    source: str | None = None,
+    gravity: Amount | None = None,
+    gravity_direction: Amount | None = None,
+    assembly: Mapping[str, int] | None = None,
+    friction: Mapping[str, Amount] | None = None,
+    loads: Sequence[str | Mapping[str, str]] | None = None,
+    torques: Sequence[str] | None = None,
+) -> Builder:
     """Begin the description of a planar linkage.
 
     Parameters
     ----------
     name : str
+        Letters, digits and hyphens.
     ground : mapping of str to (x, y)
         Points of the ground: numbers in metres, texts with a unit, or 0 for what is always zero.
-    **entries
-        Further entries of `Description`, such as ``gravity``, ``loads`` and ``assembly``.
+    title, source : str, optional
+        What it is, and where it is from.
+    gravity, gravity_direction : optional
+        Acceleration of gravity (m/s2), by default none, and its direction (rad), by default downwards.
+    assembly : mapping of str to int, optional
+        +1 or -1 by the joint between the two bodies of a dyad, +1 by default.
+    friction : mapping, optional
+        Friction that grows with the force in a joint: the friction radius of a pin (m), the coefficient of a slide or slot.
+    loads : sequence, optional
+        Points on which forces can act; ``{"point": "P", "frame": "body"}`` for a force in the axes of the body.
+    torques : sequence of str, optional
+        Bodies on which torques can act.
 
     Examples
     --------
@@ -163,7 +378,15 @@ def linkage(name: str, ground: Mapping[str, Any], **entries: Any) -> Builder:
     >>> bool(abs(run["energy.residual"]).max() < 1e-6)
     True
     """
-    return Builder(name, ground, **entries)
+    return Builder(
+        name, ground, title=title, source=source, gravity=gravity, gravity_direction=gravity_direction, assembly=assembly,
+        friction=friction, loads=loads, torques=torques,
+    )  # fmt: skip
+
+
+def _given(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries that are given, as a file has them."""
+    return {key: _plain(value) for key, value in entries.items() if value is not None}
 
 
 def _plain(value: Any) -> Any:

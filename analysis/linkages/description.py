@@ -19,6 +19,8 @@ from .laws import constants, law
 from .sections import SECTIONS
 
 GROUND = "ground"
+#: Frame of a load whose components are along the axes of the body on which it acts.
+BODY = "body"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*")
 
 
@@ -218,6 +220,27 @@ class Spring:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PointLoad:
+    """A force at a point, an input.
+
+    Attributes
+    ----------
+    point : str
+        Of a moving body; where several are pinned it acts on the first.
+    frame : str
+        Whose axes its components have: ``ground``, or ``body``, the one on which it acts.
+    """
+
+    point: str = entry(_name)
+    frame: str = entry(files.Choice((GROUND, BODY)), GROUND)
+
+
+def _load(value: Any, name: str) -> PointLoad:
+    """Read a load: a table, or its point alone."""
+    return files.read(PointLoad, {"point": value} if isinstance(value, str) else value, name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FreedomTable:
     """A joint whose coordinate is a freedom.
 
@@ -266,8 +289,10 @@ class Description:
     friction : mapping
         Friction that grows with the force in a joint, by its name: of a pin the friction radius (m), coefficient times its
         radius; of a slide or a slot the coefficient.
-    loads, torques : tuple of str
-        Points on which forces, and bodies on which torques can act.
+    loads : tuple of PointLoad
+        Forces that can act on points, in the axes of the ground where only the point is named.
+    torques : tuple of str
+        Bodies on which torques can act.
     gravity : float
         Acceleration of gravity (m/s2).
     gravity_direction : float
@@ -287,7 +312,7 @@ class Description:
     freedoms: Mapping[str, FreedomTable] = entry(_named(_freedom), factory=dict)
     assembly: Mapping[str, int] = entry(_named(files.Whole()), factory=dict)
     friction: Mapping[str, Any] = entry(_named(files.unchanged), factory=dict)
-    loads: tuple[str, ...] = entry(Many(_name), ())
+    loads: tuple[PointLoad, ...] = entry(Many(_load), ())
     torques: tuple[str, ...] = entry(Many(_name), ())
     gravity: float = entry(Quantity("m/s2", least=0.0), 0.0)
     gravity_direction: float = entry(Quantity("rad"), -0.5 * pi)

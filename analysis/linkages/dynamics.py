@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .description import GROUND, Description, Spring, given
+from .description import BODY, GROUND, Description, Spring, given
 from .laws import with_constants
 from .parameters import Interface
 from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step, sliders
@@ -132,9 +132,9 @@ class Motion:
                 lost.append(f"{name}_resistance * s.{name}_rate")
             total = " + ".join(filter(None, (pulls, f"{name}_resistance" if resists else ""))) or "0.0"
             if spring.driven:
-                load = next(load for load in self.interface.loads if load.name.partition(".")[0] == name)
-                total += f" - i.{load.field}"
-                gained.append(f"i.{load.field} * s.{name}_rate")
+                drive = next(load for load in self.interface.loads if load.name.partition(".")[0] == name)
+                total += f" - i.{drive.field}"
+                gained.append(f"i.{drive.field} * s.{name}_rate")
             rows.append(f"{name}_force = {total}")
             if name in self.along:
                 along[self.along[name]].append(f"- {name}_force")
@@ -156,9 +156,14 @@ class Motion:
                 else:
                     line, f = f"b.{spring.at}_line", f"{sign}{name}_force"
                     on[body].append(f"force({f} * {line}.c, {f} * {line}.s, b.{second}_frame.origin)")
-        for own in self.description.loads:
-            on[self.owner(own)].append(f"force(i.{own}_load_x, i.{own}_load_y, b.at_{own})")
-            gained += [f"i.{own}_load_x * b.at_{own}.vx", f"i.{own}_load_y * b.at_{own}.vy"]
+        for load in self.description.loads:
+            own = load.point
+            if load.frame == BODY:
+                turn = self.interface.turn(self.owner(own), "b.")
+                rows.append(f"{own}_load_x, {own}_load_y = directed({turn}, i.{own}_load_x, i.{own}_load_y)")
+            x, y = (f"{'' if load.frame == BODY else 'i.'}{own}_load_{axis}" for axis in "xy")
+            on[self.owner(own)].append(f"force({x}, {y}, b.at_{own})")
+            gained += [f"{x} * b.at_{own}.vx", f"{y} * b.at_{own}.vy"]
         for body in self.description.torques:
             on[body].append(f"torque(i.{body}_torque)")
             gained.append(f"i.{body}_torque * b.{body}_frame.turn.w")

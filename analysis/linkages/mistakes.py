@@ -28,7 +28,9 @@ def check_entries(description: Description) -> None:
         for own in body.all_points:
             owners.setdefault(own, set()).add(name)
     found = chain(_bodies(d), _gears(d, owners), _slots(d, owners), _springs(d, owners), _freedoms(d, owners))
-    for where, wrong, right in chain(found, _twice("loads", d.loads), _twice("torques", d.torques)):
+    for where, wrong, right in chain(
+        found, _twice("loads", [load.point for load in d.loads]), _twice("torques", d.torques)
+    ):
         raise LinkageError(f"linkage.{where} {wrong}: {right}")
 
 

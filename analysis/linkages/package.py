@@ -8,6 +8,7 @@ import re
 import sys
 from math import isfinite
 from pathlib import Path
+from traceback import extract_tb
 
 from linkwork import planar
 from linkwork.errors import AssemblyError, LinkworkError
@@ -223,8 +224,10 @@ class Package:
         try:
             made.check_assembly(start.parameters, made.state(start.initial))
         except AssemblyError as error:
-            signs = ", the assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
-            raise LinkageError(f"{error}: the start{signs} or the lengths must be others") from None
+            signs = ", linkage.assembly" if any(dyad.assembled for dyad in self.structure.dyads) else ""
+            raise LinkageError(
+                f"{error}{self._apart(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
+            ) from None
         self._check_motion(made)
         MECHANISMS.pop(name, None)
         try:
@@ -234,6 +237,19 @@ class Package:
                 MECHANISMS[name] = known
             raise
         return made
+
+    def _apart(self, made: Mechanism) -> str:
+        """Return in words the two bodies that do not reach each other at the start; empty where all do."""
+        start = made.published[made.name]
+        try:
+            made.modules[-1].places(made.state(start.initial), start.parameters.constants())
+        except (ValueError, ArithmeticError) as error:
+            lines = [at.line or "" for at in extract_tb(error.__traceback__) if at.name == "places"]
+            for dyad in self.structure.dyads:
+                if any(f"margin_{dyad.inner.name} =" in line for line in lines):
+                    bodies = " and ".join(f"linkage.bodies.{side.body}" for side in dyad.sides)
+                    return f", {bodies}, joined at {dyad.inner.name}"
+        return ""
 
     def _check_motion(self, made: Mechanism) -> None:
         """Raise LinkageError where the accelerations at the start are no finite numbers."""
@@ -277,7 +293,7 @@ class Package:
             fields=listed(v.fields(), end=""),
             values=listed(v.constants().values(), 12),
             initial=listed((f"{start.name}: float = {start.rest!r}" for start in v.starts), end=""),
-            variables=listed([*v.parameters(), *v.inputs(), *(o.variable for o in self.outputs.all() if o.variable)]),
+            variables=listed([*v.parameters(), *v.inputs(), *self.outputs.variables()]),
             quoted_name=quoted(d.name),
             quoted_title=quoted(title),
             fmu=quoted("".join(part[:1].upper() + part[1:] for part in re.split(r"[^A-Za-z0-9]+", d.name))),

@@ -12,7 +12,7 @@ from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
-from .description import GROUND, Body, Description, LinkageError, Spring, given
+from .description import BODY, GROUND, Body, Description, LinkageError, Spring, given
 from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
@@ -196,10 +196,10 @@ def interface(description: Description, structure: Structure) -> Interface:
     points: dict[str, dict[str, tuple[str, str]]] = {GROUND: {}}
     centres: dict[str, tuple[str, str]] = {}
 
-    def expression(name: str, value: float, text: str, rule: str = "free") -> str:
+    def expression(name: str, value: float, text: str, rule: str = "free", role: str = "") -> str:
         if value == 0 and isinstance(value, int):
             return "0.0"
-        found.append(Parameter(name, "m", text, float(value), rule))
+        found.append(Parameter(name, "m", text, float(value), rule, role))
         return f"p.{found[-1].field}"
 
     def place(body: str, own: str, at: tuple[float, float]) -> tuple[str, str]:
@@ -231,7 +231,7 @@ def interface(description: Description, structure: Structure) -> Interface:
                 text = f"Moment of inertia of the {name} about its centre of mass"
                 found.append(Parameter(f"{name}.inertia", "kg.m2", text, mass.inertia))
             x, y = (
-                expression(f"{name}.cog_{axis}", value, f"Centre of mass of the {name}, {axis}")
+                expression(f"{name}.cog_{axis}", value, f"Centre of mass of the {name}, {axis}", role="centre of mass")
                 for axis, value in zip("xy", mass.centre)
             )
             centres[name] = (x, y)
@@ -243,9 +243,9 @@ def interface(description: Description, structure: Structure) -> Interface:
     for name, spring in description.springs.items():
         found += _spring(name, spring, structure, by_joint.get(spring.at))
     if description.gravity:
-        found.append(Parameter("gravity", "m/s2", "Acceleration of gravity", description.gravity))
+        found.append(Parameter("gravity", "m/s2", "Acceleration of gravity", description.gravity, role="gravity"))
         direction = description.gravity_direction
-        found.append(Parameter("ground.gravity_direction", "rad", "Direction of gravity", direction, "free"))
+        found.append(Parameter("ground.gravity_direction", "rad", "Direction of gravity", direction, "free", "gravity"))
     found += _assemblies(description, structure)
     _check_names(found)
     loads = tuple(_loads(description, structure, points))
@@ -284,7 +284,8 @@ def _friction(description: Description, structure: Structure) -> Iterator[Parame
             own, unit, text = "friction_radius", "m", f"Friction radius of the pin {name}: coefficient times its radius"
         else:
             own, unit, text = "friction_coefficient", "1", f"Coefficient of friction of {name}"
-        yield Parameter(f"{name}.{own}", unit, text, Quantity(unit, least=0.0)(value, f"linkage.friction.{name}"))
+        number = Quantity(unit, least=0.0)(value, f"linkage.friction.{name}")
+        yield Parameter(f"{name}.{own}", unit, text, number, role="friction")
 
 
 def _assemblies(description: Description, structure: Structure) -> Iterator[Parameter]:
@@ -307,11 +308,15 @@ def _loads(
 ) -> Iterator[Load]:
     """Yield the inputs that drive no freedom."""
     moving = {own for body in description.bodies for own in points[body]}
-    for own in description.loads:
+    for load in description.loads:
+        own = load.point
         if own not in moving:
             raise unknown_name(own, sorted(moving), f"point {own}, of linkage.loads")
-        fixed = own in description.ground
-        yield from (Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}", "" if fixed else f"{own}.{c}") for c in "xy")
+        turns = load.frame == BODY
+        of = f" of the {next(body for body in description.bodies if own in points[body])}" if turns else ""
+        fixed = turns or own in description.ground
+        for c in "xy":
+            yield Load(f"{own}.load_{c}", "N", f"Load on {own}, {c}{of}", "" if fixed else f"{own}.{c}")
     for body in description.torques:
         if body not in description.bodies:
             raise unknown_name(body, description.bodies, f"body {body}, of linkage.torques")
@@ -383,18 +388,18 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
         ("stiffness", spring.stiffness, "N.m/rad" if about else "N/m", f"Stiffness of {name}", "", "stiffness"),
         ("damping", spring.damping, "N.m.s/rad" if about else "N.s/m", f"Viscous damping of {name}", "", "damping"),
         ("friction", spring.friction, "N.m" if about else "N", f"Level of Coulomb friction of {name}", "", "friction"),
-        (f"free_{kind}", spring.free, unit, f"The {kind} at which {name} is free", "free", ""),
+        (f"free_{kind}", spring.free, unit, f"The {kind} at which {name} is free", "free", "spring"),
     )
     for own, value, in_unit, text, rule, role in rows:
         if given(value):
             reader = Quantity(in_unit) if rule else Quantity(in_unit, least=0.0)
             number = reader(value, f"{where}.{own.removesuffix(f'_{kind}')}")
             yield Parameter(
-                f"{name}.{own}", in_unit, text, number, rule, role, of if role and role != "friction" else ""
+                f"{name}.{own}", in_unit, text, number, rule, role, of if role in ("stiffness", "damping") else ""
             )
     for own, (number, in_unit) in spring.constants.items():
         text = f"Constant {own.replace('_', ' ')} of the law of {name}"
-        yield Parameter(f"{name}.{own}", in_unit, text, number, "free")
+        yield Parameter(f"{name}.{own}", in_unit, text, number, "free", "spring")
 
 
 def _check_names(found: list[Parameter]) -> None:
@@ -409,8 +414,6 @@ def _check_names(found: list[Parameter]) -> None:
 
 def size(found: Interface) -> tuple[float, float]:
     """Return a length (m), the greatest coordinate of a point, and the mass of all bodies (kg); 1 where there is none."""
-    lengths = [
-        abs(p.value) for p in found.parameters if p.unit == "m" and "free" not in p.name and "friction" not in p.name
-    ]
+    lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

@@ -1,4 +1,4 @@
-"""How far a linkage can move: where its bodies can be joined as one freedom runs through its range."""
+"""How far a linkage can move as one freedom runs through its range, and where what it drives stands still."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ from scipy.optimize import brentq
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
+from .description import GROUND
+from .package import Package
+from .structure import Pin, Slider
+
 
 class Reach(NamedTuple):
     """The range of a freedom about its start in which the bodies can be joined, the other freedoms at their start.
@@ -18,6 +22,8 @@ class Reach(NamedTuple):
     Attributes
     ----------
     freedom : int
+    unit : str
+        Of its coordinate, rad or m.
     low, high : float
         Ends of the range (rad, m): dead centres, or the ends of a turn.
     turns : bool
@@ -27,6 +33,7 @@ class Reach(NamedTuple):
     """
 
     freedom: int
+    unit: str
     low: float
     high: float
     turns: bool
@@ -45,9 +52,10 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     samples : int
         Places looked at to either side.
     """
-    period = mechanism.freedoms[freedom].period
+    coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
+    unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
     if most is None:
-        most = 0.5 * period or (pi if mechanism.freedoms[freedom].coordinate.endswith(".angle") else 1.0)
+        most = 0.5 * period or (pi if unit == "rad" else 1.0)
     known = mechanism.first_set
     p = known.parameters.constants()
     acting, x = mechanism.idle(p), list(mechanism.state(known.initial))
@@ -72,4 +80,60 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
             least, before = min(least, value + LIMIT_SINE), float(q)
         ends.append(before)
     whole = bool(period) and ends[1] - ends[0] > period * (1.0 - 1e-9)
-    return Reach(freedom, ends[0], ends[1], whole, least)
+    return Reach(freedom, unit, ends[0], ends[1], whole, least)
+
+
+class DeadCentre(NamedTuple):
+    """A place at which what a freedom drives stands still while the freedom goes on.
+
+    Attributes
+    ----------
+    name : str
+        Of the body that is pinned to the ground, or of the slide on it.
+    at : float
+        Coordinate of the freedom (rad, m).
+    """
+
+    name: str
+    at: float
+
+
+def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list[DeadCentre]:
+    """Find the places in the range of a freedom at which a body pinned to the ground, or sliding on it, stands still.
+
+    The other freedoms are at their start. A place is found where the velocity coefficient changes its sign.
+    """
+    made, joints = package.mechanism(), package.structure.joints.values()
+    found, known = reach(made, freedom), made.first_set
+    p, x = known.parameters.constants(), list(made.state(known.initial))
+    own = {drive.joint for drive in package.interface.drives}
+    driven = [joint for joint in joints if GROUND in joint.bodies and joint.name not in own]
+    outputs: dict[str, Pin | Slider] = {}
+    for joint in driven:
+        for body in joint.bodies:
+            if body in package.description.bodies:
+                outputs[body if isinstance(joint, Pin) else joint.name] = joint
+
+    def coefficient(q: float, name: str) -> float:
+        x[freedom] = q
+        places, joint = made.modules[-1].places(tuple(x), p), outputs[name]
+        if isinstance(joint, Pin):
+            return float(getattr(places, f"{name}_frame").turn.columns[freedom])
+        line, origin = getattr(places, f"{name}_line"), getattr(places, f"{joint.bodies[1]}_frame").origin
+        return float(line.c * origin.columns[freedom][0] + line.s * origin.columns[freedom][1])
+
+    span = found.high - found.low
+    # clear of the ends, where the bodies cannot be joined; a turn ends where it begins
+    margin = 0.0 if found.turns else 1e-6 * span
+    at = np.linspace(found.low + margin, found.high - margin, samples + 1) + (
+        0.37 * span / samples if found.turns else 0.0
+    )
+    centres = []
+    for name in outputs:
+        values = np.array([coefficient(float(q), name) for q in at])
+        if np.abs(values).max() < 1e-9:
+            continue
+        for n in np.flatnonzero(values[:-1] * values[1:] < 0.0):
+            place = brentq(lambda q, name=name: coefficient(q, name), at[n], at[n + 1], xtol=1e-12)
+            centres.append(DeadCentre(name, float(place)))
+    return centres

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from linkwork.errors import LinkworkError
 
 from ..files import unknown_name
 from .description import GROUND, Description, FreedomTable, LinkageError, Rack
@@ -181,8 +183,12 @@ def joints(description: Description) -> dict[str, Joint]:
     found: dict[str, Joint] = {name: Pin(name, tuple(of)) for name, of in owners.items() if len(of) > 1}
     lines = {name: Slider(name, (s.on, s.body), s.through, s.direction != 0) for name, s in description.slides.items()}
     lines |= {name: Slider(name, (s.on, name), s.through, s.direction != 0) for name, s in description.slots.items()}
-    for name in lines.keys() & found.keys():
-        raise LinkageError(f"{name} is a point and a slide: each joint must have a name of its own")
+    for name in lines:
+        if name in found:
+            table = "slides" if name in description.slides else "slots"
+            raise LinkageError(
+                f"linkage.{table}.{name} has the name of a point: each joint must have a name of its own"
+            )
     found |= lines
     for name, gear in description.gears.items():
         for part in gear.bodies:
@@ -196,7 +202,7 @@ def joints(description: Description) -> dict[str, Joint]:
     for own in description.bodies:
         if not any(own in joint.bodies for joint in found.values()):
             raise LinkageError(
-                f"the body {own} is joined to nothing: it must share a point with another, or slide on one"
+                f"linkage.bodies.{own} is joined to nothing: it must share a point with another, or slide on one"
             )
     return found
 
@@ -243,6 +249,27 @@ def lost_freedoms(description: Description, found: Mapping[str, Joint]) -> dict[
     return lost | dict.fromkeys((*description.gears, *description.racks), 1)
 
 
+def _count(description: Description) -> int:
+    """Count the freedoms of a linkage by Gruebler's rule."""
+    moving = len(description.bodies) + len(description.slots)
+    return 3 * moving - sum(lost_freedoms(description, joints(description)).values())
+
+
+def _excess(description: Description) -> str:
+    """Return in words an entry without which a linkage that cannot move can; empty where there is no such entry."""
+    for table in ("racks", "gears", "slots", "slides", "bodies"):
+        entries = getattr(description, table)
+        for name in reversed(entries):
+            others: Any = {table: {own: entry for own, entry in entries.items() if own != name}}
+            try:
+                count = _count(replace(description, **others))
+            except LinkworkError:  # something else needs it
+                continue
+            if 1 <= count <= MOST_FREEDOMS:
+                return f"; without linkage.{table}.{name} it has {count}"
+    return ""
+
+
 def analyse(description: Description) -> Structure:
     """Find the order in which the bodies of a linkage follow from its freedoms, in closed form.
 
@@ -252,16 +279,19 @@ def analyse(description: Description) -> Structure:
         If the number of freedoms is not the linkage's, or the bodies are no chain of dyads from these freedoms; the error
         names the bodies that are left, and other choices of freedoms that would do.
     """
+    if not description.bodies:
+        raise LinkageError("linkage.bodies has none: one at least must move")
     found = joints(description)
     lost, moving = lost_freedoms(description, found), len(description.bodies) + len(description.slots)
-    count = 3 * moving - sum(lost.values())
+    count = _count(description)
     freedoms = dict(description.freedoms)
     says = (
         f"{description.name} has {count} freedoms by Gruebler's count, 3 of each of {moving} bodies less "
         f"{', '.join(f'{taken} at {name}' for name, taken in lost.items())}"
     )
     if not 1 <= count <= MOST_FREEDOMS:
-        raise LinkageError(f"{says}: it must have 1 to {MOST_FREEDOMS}")
+        hint = _excess(description) if count < 1 else "; more joints in linkage.slides or common points take some away"
+        raise LinkageError(f"{says}: it must have 1 to {MOST_FREEDOMS}{hint}")
     if not freedoms:
         freedoms = _proposed(description, found, count)
     if len(freedoms) != count:

@@ -22,7 +22,8 @@ title = "A four-bar linkage"
 name = "my-linkage"                       # letters, digits, hyphens
 source = "proportions chosen here"        # where the numbers are from
 gravity = "9.81 m/s^2"                    # left out: none; gravity_direction = "-90 deg"
-# loads = ["P"]                           # points on which forces act: inputs P.load_x, P.load_y
+# loads = ["P"]                           # points on which forces act: inputs P.load_x, P.load_y; in the axes of the body
+#                                         # instead of the ground: {{ point = "P", frame = "body" }}
 # torques = ["rocker"]                    # bodies on which a torque acts: input rocker.torque
 
 [linkage.ground]                          # points of the ground, [x, y]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from .description import given
 from .parameters import Drive, Interface
 from .structure import Pin, sliders
+from .symbols import symbol
 from .writing import quoted
 
 
@@ -54,7 +55,9 @@ class Variables:
             direction = "self.ground_gravity_direction"
             found |= {"gx": f"self.gravity * cos({direction})", "gy": f"self.gravity * sin({direction})"}
         if self.description.friction:
-            found["rough"] = " + ".join(f"self.{p.field}" for p in self.interface.parameters if ".friction_" in p.name)
+            levels = {f"{name}_friction" for name in self.description.springs}
+            rough = [p.field for p in self.interface.parameters if p.role == "friction" and p.field not in levels]
+            found["rough"] = " + ".join(f"self.{field}" for field in rough)
         return found or {"nothing": "0.0"}
 
     def rules(self) -> str:
@@ -76,27 +79,28 @@ class Variables:
     def parameters(self) -> Iterator[str]:
         """Yield the variables of parameters, modes and start."""
         for p in self.interface.parameters:
+            sign = quoted(symbol(p.name, p.unit))
             if p.rule == "sign":
-                yield f'Variable("{p.name}", "parameter", "", "{p.text}: +1 or -1", "", {p.value}, "Integer", -1, 1)'
+                yield f'Variable("{p.name}", "parameter", "", "{p.text}: +1 or -1", {sign}, {p.value}, "Integer", -1, 1)'
                 continue
             least = "" if p.rule == "free" else ", minimum=0.0"
             role = f', role="{p.role}"' if p.role else ""
             of = f', of="{p.of}"' if p.of else ""
             rest = f"{least}{display(p.unit)}{role}{of}"
-            yield f'Variable("{p.name}", "parameter", "{p.unit}", {quoted(p.text)}, "", {p.value!r}{rest})'
+            yield f'Variable("{p.name}", "parameter", "{p.unit}", {quoted(p.text)}, {sign}, {p.value!r}{rest})'
         for d in self.interface.drives:
             if d.table:
                 text = f"0: {d.table}.{d.load} acts; 1: the rate is {d.table}.speed"
                 yield f'Variable("{d.table}.mode", "parameter", "", "{text}", "", {int(d.commanded)}, "Integer", 0, 1)'
         for s in self.starts:
-            yield f'Variable("initial.{s.name}", "parameter", "{s.unit}", "At the start", "", {s.value!r}{display(s.unit)})'
+            sign = quoted(symbol(s.name.replace("_", "."), s.unit, "0"))
+            own = f'"initial.{s.name}", "parameter", "{s.unit}", "At the start", {sign}'
+            yield f"Variable({own}, {s.value!r}{display(s.unit)})"
         yield "tolerance_parameter()"
 
     def placing(self) -> list[str]:
         """Return the parameters that set the places of the bodies at the start."""
-        placing = (".direction", ".ratio", ".phase", ".radius", ".offset")
-        names = [p.name for p in self.interface.parameters if p.unit in ("m", "") or p.name.endswith(placing)]
-        names = [name for name in names if not any(part in name for part in (".cog_", ".free_", ".friction_"))]
+        names = [p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and not p.role]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:
@@ -151,13 +155,20 @@ class Variables:
         """Yield the variables of the inputs."""
         for d in self.interface.drives:
             table, what = d.table or d.name, "Torque" if d.turns else "Force"
-            yield f'Variable("{table}.{d.load}", "input", "{d.load_unit}", "{what} along the freedom {d.name}")'
+            yield _input(f"{table}.{d.load}", d.load_unit, f"{what} along the freedom {d.name}")
             if d.table:
-                rate, text = f"{d.unit}/s", f"Commanded rate of {d.name}"
-                yield f'Variable("{table}.speed", "input", "{rate}", "{text}", "", {d.speed!r}{display(rate)})'
-                yield f'Variable("{table}.acceleration", "input", "{rate}2", "Rate of the commanded rate over a step")'
+                rate = f"{d.unit}/s"
+                shown = f", {d.speed!r}{display(rate)}"
+                yield _input(f"{table}.speed", rate, f"Commanded rate of {d.name}", d.rate, shown)
+                text = "Rate of the commanded rate over a step"
+                yield _input(f"{table}.acceleration", f"{rate}2", text, f"{d.name}.acceleration")
         for load in self.interface.loads:
-            yield f'Variable("{load.name}", "input", "{load.unit}", {quoted(load.text)})'
+            yield _input(load.name, load.unit, load.text)
+
+
+def _input(name: str, unit: str, text: str, of: str = "", rest: str = "") -> str:
+    """Return the variable of an input; its symbol is that of the variable ``of`` if one is given."""
+    return f'Variable("{name}", "input", "{unit}", {quoted(text)}, {quoted(symbol(of or name, unit))}{rest})'
 
 
 def _last(drive: Drive, name: str) -> str:

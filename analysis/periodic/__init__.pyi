@@ -32,6 +32,7 @@ from .motion.discretisation import OrbitAssemblyError as OrbitAssemblyError
 from .motion.discretisation import OrbitError as OrbitError
 from .motion.discretisation import period_from as period_from
 from .motion.drive import Drive as Drive
+from .motion.drive import NothingFreeError as NothingFreeError
 from .motion.drive import VaryingInputError as VaryingInputError
 from .motion.drive import drive_of as drive_of
 from .motion.drive import scale_of as scale_of

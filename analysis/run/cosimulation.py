@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..files import unknown_name
-from ..mechanisms import InitialState, Parameters, output_units, wrapping_outputs
+from ..mechanisms import InitialState, Parameters, output_units, residual_outputs, wrapping_outputs
 from ..numerics.workers import interruptible
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
@@ -357,16 +357,17 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
 def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float:
     """Return the smallest scale of an output, from the largest magnitudes of outputs of the same kind."""
 
+    residuals = residual_outputs()
+
     def like(unit: str) -> float:
-        residuals = ("closure.residual", "energy.residual")
         return max((size for n, size in largest.items() if units[n] == unit and n not in residuals), default=0.0)
 
-    if name.endswith(".angle"):
+    if units[name] == "rad":
         return 1.0
     lengths, speed = like("m"), next((size for n, size in largest.items() if units[n] == "rad/s"), 0.0)
-    if name == "closure.residual":
+    if name in residuals and units[name] == "m":
         return lengths
-    if name == "energy.residual":
+    if name in residuals and units[name] == "J":
         # where there are no energies among the outputs, those of what turns and what is pushed
         return like("J") or like("N.m") or 1.0
     scales = {

@@ -15,14 +15,12 @@ from ..export import Entry, build_web, crank_number, interface
 from ..mechanisms import name_in_files
 from ..periodic import crank_of, damping_name, of_the_motor, stiffness_name
 
-#: Parameters by what they are about, by a word in the name or by the unit; the first that fits.
-_SECTIONS = (
-    ("Start", ("initial.",), ()),
-    ("Gravity", ("gravity", "inclination"), ()),
-    ("Spring, damper, friction", ("stiffness", "spring", "damping", "friction"), ()),
-    ("Masses", ("cog", "product"), ("kg", "kg.m2")),
-    ("Dimensions", ("",), ()),
-)
+#: Sections of parameters by role, and by unit; all others are dimensions.
+_SECTIONS = {
+    "gravity": "Gravity",
+    **dict.fromkeys(("stiffness", "damping", "friction", "spring"), "Spring, damper, friction"),
+    **dict.fromkeys(("centre of mass", "kg", "kg.m2"), "Masses"),
+}
 DRIVE = "Drive and loads"
 #: Of a motor that nobody has given, by the field: no torque, a usual slip, and four poles at 50 Hz (rad/s).
 NO_MOTOR = {"breakdown_torque": 0.0, "breakdown_slip": 0.2, "synchronous_speed": 50.0 * math.pi}
@@ -113,13 +111,15 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
         "reference": reference,
         "text": variable.description,
         "start": float(variable.start),
-        "section": DRIVE if mode or channel else _section(variable),
+        "section": DRIVE if mode or channel else _section(mechanism, variable),
         **_unit(variable),
     }
     if variable.minimum is not None:
         row["least"] = float(variable.minimum)
     if variable.nominal is not None:
         row["nominal"] = variable.nominal
+    if variable.role:
+        row["role"] = variable.role
     if mode is not None:
         row["choices"] = {str(value): words for value, words in enumerate(mode.values)}
         row["arguments"] = list(mode.arguments)
@@ -166,12 +166,10 @@ def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int
     return reference.get(stiffness_name(mechanism), -1)
 
 
-def _section(variable: Variable) -> str:
-    return next(
-        name
-        for name, words, units in _SECTIONS
-        if variable.unit in units or any(word in variable.name for word in words)
-    )
+def _section(mechanism: Mechanism, variable: Variable) -> str:
+    if variable in mechanism.initial_variables.values():
+        return "Start"
+    return _SECTIONS.get(variable.role) or _SECTIONS.get(variable.unit, "Dimensions")
 
 
 def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
+from ..mechanisms import FIVE_BAR
 from ..numerics.boundaries import Test
 from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, plane_test, verdict
 from ..run import takes_published
@@ -72,5 +73,6 @@ def linear_motion(
 
     The mapping is empty where no linear equation exists: for a drive by torque and with friction that is not viscous.
     """
-    friction = parameters != without_friction(parameters) or any("friction" in name for name in names)
+    rough = set(FIVE_BAR.names("friction"))
+    friction = parameters != without_friction(parameters) or not rough.isdisjoint(names)
     return {"linear equation": linear_monodromy} if drive.speed_drive and not friction else {}

@@ -452,6 +452,11 @@ def force(x: float, y: float, at: Vector) -> Wrench:
     return Wrench(x, y, at.x * y - at.y * x)
 
 
+def directed(t: Turn, x: float, y: float) -> tuple[float, float]:
+    """Return the components of a force in the ground's axes from those in the axes of a body of direction ``t``."""
+    return t.c * x - t.s * y, t.s * x + t.c * y
+
+
 def torque(moment: float) -> Wrench:
     """Return a torque."""
     return Wrench(0.0, 0.0, moment)

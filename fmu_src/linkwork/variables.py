@@ -48,10 +48,14 @@ ROLES = {
     "stiffness": ("parameter", "stiffness of a spring along a coordinate"),
     "damping": ("parameter", "viscous damping along a coordinate"),
     "friction": ("parameter", "level or coefficient of dry friction, which changes fast about rest"),
+    "spring": ("parameter", "length, position or angle at which a spring is free, or a constant of its law"),
+    "centre of mass": ("parameter", "coordinate of a centre of mass"),
+    "gravity": ("parameter", "acceleration of gravity, or a direction that it has"),
     "drive": ("output", "torque or force with which a freedom is driven"),
     "joint force": ("output", "component of the force in a joint, in the order of the axes"),
     "guide force": ("output", "force of a guide across it"),
     "transmission": ("output", "transmission angle: the links lock where its sine is zero"),
+    "residual": ("output", "zero but for error"),
 }
 
 
@@ -172,7 +176,7 @@ def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Vari
         output("energy.potential", "J", f"Potential energy of {potential}", "", "state"),
         output("energy.dissipated", "J", f"Work lost in {dissipated} since the start", "", "state"),
         output("energy.supplied", "J", f"Work of {supplied} since the start", "", "speed"),
-        output("energy.residual", "J", balance, "", "speed"),
+        output("energy.residual", "J", balance, "", "speed", role="residual"),
     )
 
 

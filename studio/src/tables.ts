@@ -7,6 +7,8 @@ export interface Given {
   text: string;
   start: number;
   section: string;
+  /** What it is to the analyses, where they ask for it, such as a stiffness. */
+  role?: string;
   unit: string;
   factor: number;
   least?: number;

@@ -26,7 +26,7 @@ export function tuningPart({ mechanism, state, begin }: TuningForm, first: State
   const ticks = Object.entries(wishes).map(([name, text], n) => ({ name, box: tick(text, n === 0) }));
   const may = mechanism.given
     .filter((given) => SECTIONS.includes(given.section) && !given.choices)
-    .map((given) => ({ given, box: tick(called(given), given.name.endsWith("stiffness")) }));
+    .map((given) => ({ given, box: tick(called(given), given.role === "stiffness") }));
   const wanted = (): object => {
     const range = [low(), high()];
     if (!(range[0] < range[1]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import itertools
 import math
 import sys
@@ -12,8 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.files import entry_names
 from analysis.linkages import Dyad, Package, Racked, described, linkage, load_linkage
-from analysis.linkages.description import Slot
+from analysis.linkages.builder import Builder
+from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
 from analysis.run import Inputs, Trajectory, load_case, simulate
@@ -68,9 +71,11 @@ def assembled(
     raise AssertionError("no assembly gives the places")
 
 
-def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes: Any) -> list[str]:
-    """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return its kinds of dyads."""
-    package, places = assembled(seed, folder, kinds, **changes)
+def compared(
+    seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, dyads: tuple[int, int] = (1, 4), **changes: Any
+) -> Package:
+    """Compare accelerations, loads and joint forces of a random linkage with the multipliers'; return it."""
+    package, places = assembled(seed, folder, kinds, dyads, **changes)
     d, made = package.description, imported(package, folder).MECHANISM
     check(made)
     oracle, rng = Multipliers(d), np.random.default_rng(seed)
@@ -91,8 +96,9 @@ def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes:
             if c.kind == "force" and c.freedom >= 0 and c.freedom not in commanded:
                 loads[c.freedom] = u[k]
         forces = {name: values[f"{name}.torque"] for name in d.torques}
-        forces |= {name: values[f"{name}.force"] for name, s in d.springs.items() if s.driven}
-        points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in d.loads}
+        names = [name for name, s in d.springs.items() if s.driven]
+        forces |= {name: values.get(f"{name}.force", values.get(f"{name}.torque")) for name in names}
+        points = {own: (values[f"{own}.load_x"], values[f"{own}.load_y"]) for own in (load.point for load in d.loads)}
         if made.equations.clearance(x, i, p) < 0.0:  # friction may jam the linkage
             continue
         wanted = oracle.solve(q, rates, loads, commanded, points, forces)
@@ -111,12 +117,21 @@ def compared(seed: int, folder: Path, kinds: tuple[str, ...] = KINDS, **changes:
             found = [out[f"{r.name}.{c}"] for c in (("fx", "fy") if pin else ("force", "moment"))]
             sign = 1.0 if (r.on == r.joint.bodies[0]) == pin else -1.0
             np.testing.assert_allclose(found, sign * wanted.forces[r.joint.name], atol=near * scale, err_msg=r.name)
-    return [dyad.kind for dyad in package.structure.dyads]
+    return package
 
 
 def test_random_linkages_move_as_with_multipliers(tmp_path):
-    kinds = [kind for seed in range(16) for kind in compared(seed, tmp_path)]
-    assert set(kinds) == {"RRR", "RRP", "PRP", "RPR", "RPP"}
+    """Of all kinds of dyads, with laws, drives between points and at joints, and shafts between bodies."""
+    found = [compared(seed, tmp_path) for seed in range(16)]
+    assert {dyad.kind for package in found for dyad in package.structure.dyads} == {"RRR", "RRP", "PRP", "RPR", "RPP"}
+    springs = [spring for package in found for spring in package.description.springs.values()]
+    acting = {("between" if s.between else "at" if s.at else "of", s.driven, bool(s.law)) for s in springs}
+    assert acting >= {("between", True, True), ("at", True, False), ("at", False, True), ("of", False, False)}
+
+
+def test_random_linkages_of_twelve_bodies_move_as_with_multipliers(tmp_path):
+    for seed in (21, 25):
+        assert len(compared(seed, tmp_path, dyads=(4, 6)).description.bodies) == 12
 
 
 def test_random_racks_move_as_with_multipliers(tmp_path):
@@ -192,7 +207,7 @@ def test_period_of_a_crank_brings_gears_and_racks_back(tmp_path, change, turns):
 @pytest.mark.parametrize("first", range(16, 316, 50))
 def test_many_random_linkages_move_as_with_multipliers(tmp_path, first):
     for seed in range(first, first + 50):
-        compared(seed, tmp_path)
+        compared(seed, tmp_path, dyads=(1, 4) if seed % 3 else (3, 6))
 
 
 @pytest.mark.parametrize("seed", [0, 3, 4])
@@ -254,11 +269,11 @@ MISTAKES = [
     ("bodies/crank/points", {"P_1": [0, 0]}, "P_1"),
     ("bodies/crank/section", {"kind": "rod"}, "linkage.bodies.crank.section"),
     ("bodies/crank/section", {"kind": "beam"}, "linkage.bodies.crank.section.kind"),
-    ("bodies/dangling", {"points": {"Q": [0, 0]}, "mass": 1.0}, "dangling"),
+    ("bodies/dangling", {"points": {"Q": [0, 0]}, "mass": 1.0}, "linkage.bodies.dangling"),
     ("bodies/extra", {"bar": ["C", "Q"], "length": 0.1, "mass": 1.0}, "2 freedoms"),
-    ("bodies/brace", {"bar": ["B", "D"], "length": 0.1, "mass": 1.0}, "0 freedoms"),
+    ("bodies/brace", {"bar": ["B", "D"], "length": 0.1, "mass": 1.0}, "without linkage.bodies.brace it has 1"),
     ("bodies/my_link", {"bar": ["C", "Q"], "length": 0.1}, "my_link"),
-    ("bodies", {}, "freedoms"),
+    ("bodies", {}, "linkage.bodies has none"),
     ("ground", None, "linkage.ground"),
     ("ground/A", [0], "linkage.ground.A"),
     ("ground/A", "here", "linkage.ground.A"),
@@ -285,7 +300,7 @@ MISTAKES = [
     ("slides/G", {"body": "block", "through": "A"}, "linkage.slides.G"),
     ("slides/G", {"body": "ground", "through": "A"}, "linkage.slides.G.body"),
     ("slides/G", {"body": "rocker"}, "linkage.slides.G.through"),
-    ("slides/C", {"body": "rocker", "through": "A"}, "C"),
+    ("slides/C", {"body": "rocker", "through": "A"}, "linkage.slides.C"),
     ("slides/G", {"body": "rocker", "through": "A", "direction": "1 m"}, "linkage.slides.G.direction"),
     ("slots/S", {"pin": "Z", "on": "rocker", "through": "D"}, "linkage.slots.S"),
     ("slots/S", {"pin": "B", "on": "lever", "through": "D"}, "linkage.slots.S"),
@@ -293,7 +308,7 @@ MISTAKES = [
     ("gears/X", {"bodies": ["crank"], "ratio": -1}, "linkage.gears.X.bodies"),
     ("gears/X", {"bodies": ["crank", "wheel"], "ratio": -1}, "linkage.gears.X"),
     ("gears/X", {"bodies": ["crank", "rocker"]}, "linkage.gears.X.ratio"),
-    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": -1}, "0 freedoms"),
+    ("gears/X", {"bodies": ["crank", "rocker"], "ratio": -1}, "without linkage.gears.X it has 1"),
     ("racks/R", {"gear": "crank", "rack": "rocker"}, "linkage.racks.R.radius"),
     ("racks/R", {"gear": "crank", "rack": "bar", "radius": 0.1}, "linkage.racks.R"),
     ("racks/R", {"gear": "crank", "rack": "rocker", "radius": 0.1}, "linkage.racks.R"),
@@ -328,8 +343,16 @@ MISTAKES = [
         "section.corners",
     ),
     ("bodies/ground", {"points": {"Q": [0, 0]}, "mass": 1.0}, "linkage.bodies.ground"),
-    ("bodies/double", {"bar": ["A", "B"], "length": "50 mm", "mass": 1.0}, "4 at A, 2 at D, 4 at B"),
-    ("bodies/rocker/length", "10 mm", "crank angle 0 rad"),
+    (
+        "bodies/double",
+        {"bar": ["A", "B"], "length": "50 mm", "mass": 1.0},
+        "4 at A, 2 at D, 4 at B, 2 at C: it must have 1 to 4; without linkage.bodies.double",
+    ),
+    (
+        "bodies/rocker/length",
+        "10 mm",
+        "crank angle 0 rad (0.0000 deg): they do not reach each other, linkage.bodies.coupler and ",
+    ),
     ("bodies", {"crank": {"bar": ["A", "B"], "length": 1.0}}, "linkage.bodies have no mass"),
     ("ground", {}, "linkage.ground"),
     ("ground/A", [float("inf"), 0], "linkage.ground.A"),
@@ -337,6 +360,8 @@ MISTAKES = [
     ("name", "../x", "linkage.name"),
     ("name", "five-bar", "linkage.name"),
     ("loads", ["C", "C"], "linkage.loads has C twice"),
+    ("loads", [{"point": "C", "frame": "link"}], "linkage.loads[0].frame"),
+    ("loads", [{"point": "C"}, "C"], "linkage.loads has C twice"),
     ("torques", ["rocker", "rocker"], "linkage.torques has rocker twice"),
     ("freedoms", ["A"], "linkage.freedoms"),
     ("freedoms", {"coupler": "A"}, "linkage.freedoms.coupler"),
@@ -364,6 +389,21 @@ def test_mistakes_are_named(tmp_path, path, value, named):
     with pytest.raises(LinkworkError) as error:
         Package(described(changed(path, value))).mechanism(tmp_path)
     assert named in str(error.value)
+    assert "linkage." in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ('[linkage]\nname = "a"\n[linkage.ground]\nA = [0, 0]\nB = [0, 1]\nA = [1, 1]\n', "linkage.ground.A"),
+        ('[linkage]\nname = "a"\nname = "b"\n', "linkage.name"),
+        ("[linkage.bodies.rod]\nmass = 1\n[linkage.bodies.rod]\nmass = 2\n", "linkage.bodies.rod"),
+    ],
+)
+def test_what_a_file_has_twice_is_named(tmp_path, text, place):
+    (tmp_path / "twice.toml").write_text(text)
+    with pytest.raises(LinkworkError, match=f"at line .*: {place} is there twice"):
+        load_linkage(tmp_path / "twice.toml")
 
 
 def test_a_free_body_without_mass_is_named(tmp_path):
@@ -434,3 +474,61 @@ stop_time = "0.5 s"
         "swing", "A", start="20 deg", driven=False
     )
     assert built.mechanism() is load_linkage(tmp_path / "bar.toml")
+
+
+def test_the_clearance_to_the_limit_of_assembly_is_an_output(tmp_path):
+    """The sine of the transmission angle of a four-bar; its variables have symbols."""
+    made = Package(described(changed("name", "four-bar-clearance"))).mechanism(tmp_path)
+    known = made.published[made.name]
+    p, idle = known.parameters.constants(), made.idle(known.parameters.constants())
+    for angle in (0.0, 1.0, 4.0):
+        found = dict(zip(made.output_names, made.equations.outputs((angle, 3.0, 0.0, 0.0), idle, 0.0, p)))
+        assert found["assembly.clearance"] == pytest.approx(np.sin(found["C.transmission_angle"]), rel=1e-12)
+    variables = {v.name: v for v in made.variables}
+    assert (variables["assembly.clearance"].unit, variables["assembly.clearance"].level) == ("1", "position")
+    without = {name for name, v in variables.items() if v.kind == "Real" and not v.symbol}
+    assert without == {"solver.tolerance", *(name for name in variables if name.startswith("energy."))}
+    assert variables["rocker.length"].symbol == r"l_{\mathrm{rocker}}"
+    assert variables["crank.acceleration"].symbol == r"\ddot\theta_{\mathrm{crank}}"
+
+
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    [
+        ("body", Body),
+        ("slide", Slide),
+        ("slot", Slot),
+        ("gear", Gear),
+        ("rack", Rack),
+        ("spring", Spring),
+        ("freedom", FreedomTable),
+    ],
+)
+def test_the_builder_knows_every_entry(method, kind):
+    """What an editor completes is what a file may have."""
+    assert {*inspect.signature(getattr(Builder, method)).parameters} - {"self", "name"} == {*entry_names(kind)}
+
+
+def test_pins_and_drives_of_the_builder(tmp_path):
+    """A four-bar by pins and a drive is the one by names of points; a cylinder is driven by a force."""
+    built = linkage("four-bar-test", ground={})
+    for name, entries in FOUR_BAR["bodies"].items():
+        built.body(name, **{key: entry for key, entry in entries.items() if key not in ("bar", "length")})
+    built.pin("A", ground=(0, 0), crank=(0, 0)).pin("D", ground=("150 mm", 0), rocker=(0, 0))
+    built.pin("B", crank=("50 mm", 0), coupler=(0, 0)).pin("C", coupler=("150 mm", 0), rocker=("120 mm", 0))
+    for body, length in (("crank", "50 mm"), ("coupler", "150 mm"), ("rocker", "120 mm")):
+        built.tables["bodies"][body]["cog"] = [f"{0.5 * float(length.split()[0])} mm", 0]
+    built.drive("crank", "A", speed="300 rpm").drive("ram", between=("A", "C"))
+    one, other = built.mechanism(), Package(described(FOUR_BAR)).mechanism(tmp_path)
+    assert "ram.force" in one.input_names
+    x = (0.7, 20.0, 0.0, 0.0)
+    (p, q), i = (m.first_set.parameters.constants() for m in (one, other)), (0.0,) * 4
+    found, wanted = (
+        m.equations.derivative(x, m.equations.applied((0.0,), i[: len(m.channels)], c), c)
+        for m, c in ((one, p), (other, q))
+    )
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
+    with pytest.raises(LinkworkError, match="the drive ram has"):
+        built.drive("ram")
+    with pytest.raises(LinkworkError, match="body wheel, of the pin A"):
+        built.pin("A", wheel=(0, 0))

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import casadi
 import numpy as np
 import pint
+from scipy.integrate import solve_ivp
 
 from analysis.linkages.description import GROUND, Description
 from linkwork.friction import FRICTION_FORCE, FRICTION_RATE, FRICTION_SPEED
@@ -129,6 +130,8 @@ class Multipliers:
         """What a spring measures."""
         if s.at:
             return self.coordinate(s.at)
+        if s.bodies:
+            return self.pose(s.bodies[1])[2] - self.pose(s.bodies[0])[2]
         (ax, ay), (bx, by) = (self.at(self.moving(own), own) for own in s.between)
         return casadi.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
 
@@ -217,18 +220,30 @@ class Multipliers:
         for name in self.bodies:
             for component, c in zip(g, self.centre(name)):
                 force += self.mass(name)[0] * component * casadi.gradient(c, self.q)
+        freed = {freedom.joint for freedom in self.d.freedoms.values()}
         for name, s in self.d.springs.items():
             measure = self.stretch(s)
             x, v = measure - number(s.free), casadi.jtimes(measure, self.q, self.v)
-            law = eval(s.law, {"x": x, "v": v, "fabs": casadi.fabs}) if s.law else 0.0
-            slow = FRICTION_RATE if s.at and s.at not in self.d.slides else FRICTION_SPEED
+            about = s.bodies or s.at in self.owners
+            if about and s.at not in freed:
+                # an angle that nothing counts is known up to whole turns
+                x = casadi.atan2(casadi.sin(x), casadi.cos(x))
+            known = {own: value for own, (value, _) in s.constants.items()}
+            functions = {"fabs": casadi.fabs, "tanh": casadi.tanh}
+            law = eval(s.law, {"x": x, "v": v, **functions, **known}) if s.law else 0.0
+            slow = FRICTION_RATE if about else FRICTION_SPEED
             law += number(s.friction) * casadi.tanh(v / slow)
             pull = number(s.stiffness) * x + number(s.damping) * v + law - forces.get(name, 0.0)
             force -= pull * casadi.gradient(measure, self.q)
         for name in self.d.torques:
             force += forces[name] * casadi.gradient(self.pose(name)[2], self.q)
+        frames = {load.point: load.frame for load in self.d.loads}
         for own, (fx, fy) in points.items():
             x, y = self.at(self.moving(own), own)
+            if frames[own] == "body":
+                angle = self.pose(self.moving(own))[2]
+                c, s = casadi.cos(angle), casadi.sin(angle)
+                fx, fy = c * fx - s * fy, s * fx + c * fy
             force += fx * casadi.gradient(x, self.q) + fy * casadi.gradient(y, self.q)
         inertia_of = casadi.jacobian(momentum, self.v)
         return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
@@ -298,3 +313,48 @@ class Multipliers:
         all_loads = loads.copy()
         all_loads[held] = multipliers[size:]
         return Solution(accelerations, all_loads, joints, float(energy[0, 0]))
+
+    def on_bodies(self, forces: Mapping[str, np.ndarray], q: np.ndarray) -> dict[tuple[str, str], np.ndarray]:
+        """Force of each pin on each of its bodies (x, y), of all the others together; those of slots among them."""
+        found: dict[tuple[str, str], np.ndarray] = {}
+
+        def add(own: str, body: str, force: np.ndarray) -> None:
+            found[own, body] = found.get((own, body), np.zeros(2)) + force
+
+        for own, of in self.owners.items():
+            for body in of[1:]:
+                force = forces[own if len(of) == 2 else f"{own} of {body}"]
+                add(own, of[0], force)
+                add(own, body, -force)
+        for name, slot in self.d.slots.items():
+            normal = casadi.Function("n", [self.q], [casadi.vertcat(*self.line(slot)[0])])(q)
+            add(slot.pin, self.owners[slot.pin][0], float(forces[name][0]) * np.asarray(normal).ravel())
+        return found
+
+    def run(
+        self,
+        coordinates: np.ndarray,
+        rates: np.ndarray,
+        guess: np.ndarray,
+        time: np.ndarray,
+        *,
+        commanded: tuple[int, ...] = (),
+        loads: np.ndarray | None = None,
+        forces: Mapping[str, float] | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Integrate from time[0] under constant loads; returns coordinates and rates of the freedoms at all times.
+
+        ``commanded`` freedoms keep their rates; ``guess`` is near the places of the bodies at the start.
+        """
+        n, last = len(coordinates), [guess]
+        points = {load.point: (0.0, 0.0) for load in self.d.loads}
+        acting = np.zeros(n) if loads is None else loads
+
+        def derivative(t: float, z: np.ndarray) -> np.ndarray:
+            last[0] = self.placed(z[:n], last[0])
+            found = self.solve(last[0], z[n:], acting, dict.fromkeys(commanded, 0.0), points, forces or {})
+            return np.concatenate([z[n:], found.accelerations])
+
+        start, span = np.concatenate([coordinates, rates]), (time[0], time[-1])
+        z = solve_ivp(derivative, span, start, method="DOP853", t_eval=time, rtol=1e-11, atol=1e-12).y
+        return z[:n], z[n:]

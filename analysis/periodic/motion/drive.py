@@ -36,6 +36,15 @@ class VaryingInputError(InputError):
         )
 
 
+class NothingFreeError(InputError):
+    """Every freedom is commanded; ``force`` is the input that would leave one free, if there is one."""
+
+    def __init__(self, mechanism: str, force: str) -> None:
+        self.force = force
+        other = force and f", or another freedom by a force, such as {force} = 0"
+        super().__init__(f"nothing of the {mechanism} is free at a prescribed speed: drive it by a torque{other}")
+
+
 @in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units, speeds=variable_units)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
@@ -179,11 +188,9 @@ class Drive:
             if number in ratios and number not in (*made.free, *made.commanded):
                 raise InputError(f"{name} has a ratio, but is neither commanded nor free")
         if made.size == 0:
-            other = next((c.name for c in forces_of(mechanism).values() if c.freedom >= 0), "")
-            other = other and f", or another freedom by a force, such as {other} = 0"
-            raise InputError(
-                f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque{other}"
-            )
+            acting = forces_of(mechanism).values()
+            others = (c.name for c in acting if c.freedom >= 0 and c.freedom != crank.freedom)
+            raise NothingFreeError(mechanism.name, next(others, ""))
         return made
 
     def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:

@@ -46,15 +46,43 @@ PARAMETERS = (
     ),
     _parameter("coupler.inertia", "kg.m2", "Moment of inertia of the coupler about its centre of mass", "I_{G3}"),
     _parameter("rocker.inertia", "kg.m2", "Moment of inertia of the rocker about its centre of mass", "I_{G4}"),
-    _parameter("crank.cog_distance", "m", "Centre of mass of the crank, distance from A", "l_{G2}"),
-    _parameter("coupler.cog_distance", "m", "Centre of mass of the coupler, distance from the crank pin B", "l_{G3}"),
-    _parameter("rocker.cog_distance", "m", "Centre of mass of the rocker, distance from the slider pin D", "l_{G4}"),
-    _parameter("crank.cog_angle", "rad", "Direction of the crank's centre of mass from A to B", "\\nu_2"),
-    _parameter("coupler.cog_angle", "rad", "Direction of the coupler's centre of mass from B to C", "\\nu_3"),
-    _parameter("rocker.cog_angle", "rad", "Direction of the rocker's centre of mass from D to C", "\\nu_4"),
+    _parameter(
+        "crank.cog_distance", "m", "Centre of mass of the crank, distance from A", "l_{G2}", role="centre of mass"
+    ),
+    _parameter(
+        "coupler.cog_distance",
+        "m",
+        "Centre of mass of the coupler, distance from the crank pin B",
+        "l_{G3}",
+        role="centre of mass",
+    ),
+    _parameter(
+        "rocker.cog_distance",
+        "m",
+        "Centre of mass of the rocker, distance from the slider pin D",
+        "l_{G4}",
+        role="centre of mass",
+    ),
+    _parameter(
+        "crank.cog_angle", "rad", "Direction of the crank's centre of mass from A to B", "\\nu_2", role="centre of mass"
+    ),
+    _parameter(
+        "coupler.cog_angle",
+        "rad",
+        "Direction of the coupler's centre of mass from B to C",
+        "\\nu_3",
+        role="centre of mass",
+    ),
+    _parameter(
+        "rocker.cog_angle",
+        "rad",
+        "Direction of the rocker's centre of mass from D to C",
+        "\\nu_4",
+        role="centre of mass",
+    ),
     _parameter("slider.guide_angle", "rad", "Direction of the slider's guide from the ground link", "\\alpha"),
     _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "k", "stiffness", _SLIDE),
-    _parameter("slider.spring_free_position", "m", "Slider position at which the spring is free", "u_0"),
+    _parameter("slider.spring_free_position", "m", "Slider position at which the spring is free", "u_0", role="spring"),
     _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "\\mu", "damping", _SLIDE),
     _parameter(
         "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", "F_c", "friction"
@@ -78,8 +106,10 @@ PARAMETERS = (
     ),
     _parameter("coupler.point_distance", "m", "Coupler point P, distance from the crank pin B", "r"),
     _parameter("coupler.point_angle", "rad", "Direction of the coupler point P from B to C", "a_2"),
-    _parameter("gravity", "m/s2", "Acceleration of gravity", "g"),
-    _parameter("ground.inclination", "rad", "Angle of the ground link above the horizontal", "\\alpha_1"),
+    _parameter("gravity", "m/s2", "Acceleration of gravity", "g", role="gravity"),
+    _parameter(
+        "ground.inclination", "rad", "Angle of the ground link above the horizontal", "\\alpha_1", role="gravity"
+    ),
     choice(
         "assembly.branch",
         "Assembly: sign of sin(rocker.angle - coupler.angle), +1 or -1",
@@ -173,7 +203,9 @@ OUTPUTS = (
         "damper, guide and pins",
         "crank torque, slider force and load",
     ),
-    output("closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0),
+    output(
+        "closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0, role="residual"
+    ),
     output(
         "transmission.angle",
         "rad",

@@ -37,22 +37,42 @@ PARAMETERS = (
     _parameter("rod.mass", "kg", "Mass of the rod", "m_2"),
     _parameter("slider.mass", "kg", "Mass of the slider", "m_3"),
     _parameter("crank.inertia", "kg.m2", "Moment of inertia of the crank about its axis; greater than zero"),
-    _parameter("crank.cog_x", "m", "Centre of mass of the crank, from the axis towards the crank pin"),
-    _parameter("crank.cog_y", "m", "Centre of mass of the crank, across axis and crank"),
-    _parameter("crank.cog_z", "m", "Centre of mass of the crank, along the axis from the plane of the crank pin"),
+    _parameter(
+        "crank.cog_x", "m", "Centre of mass of the crank, from the axis towards the crank pin", role="centre of mass"
+    ),
+    _parameter("crank.cog_y", "m", "Centre of mass of the crank, across axis and crank", role="centre of mass"),
+    _parameter(
+        "crank.cog_z",
+        "m",
+        "Centre of mass of the crank, along the axis from the plane of the crank pin",
+        role="centre of mass",
+    ),
     _parameter("crank.product_xz", "kg.m2", "Product of inertia of the crank: integral of x z over its mass"),
     _parameter("crank.product_yz", "kg.m2", "Product of inertia of the crank: integral of y z over its mass"),
     _parameter("rod.inertia", "kg.m2", "Moment of inertia of the rod, transverse, about its centre of mass"),
-    _parameter("rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin"),
     _parameter(
-        "slider.cog_x", "m", "Centre of mass of the slider from its pin, along the common normal (i of frame 4)"
+        "rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin", role="centre of mass"
     ),
-    _parameter("slider.cog_y", "m", "Centre of mass of the slider from its pin, across guide and common normal (j)"),
     _parameter(
-        "slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide against its position (k)"
+        "slider.cog_x",
+        "m",
+        "Centre of mass of the slider from its pin, along the common normal (i of frame 4)",
+        role="centre of mass",
+    ),
+    _parameter(
+        "slider.cog_y",
+        "m",
+        "Centre of mass of the slider from its pin, across guide and common normal (j)",
+        role="centre of mass",
+    ),
+    _parameter(
+        "slider.cog_z",
+        "m",
+        "Centre of mass of the slider from its pin, along the guide against its position (k)",
+        role="centre of mass",
     ),
     _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", "", "stiffness", "slider.position"),
-    _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free"),
+    _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free", role="spring"),
     _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", "", "damping", "slider.position"),
     _parameter(
         "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", "", "friction"
@@ -60,13 +80,15 @@ PARAMETERS = (
     _parameter(
         "shift.stiffness", "N/m", "Stiffness of the spring on the axial shift", "", "stiffness", "shift.position"
     ),
-    _parameter("shift.spring_free_position", "m", "Axial shift at which its spring is free"),
+    _parameter("shift.spring_free_position", "m", "Axial shift at which its spring is free", role="spring"),
     _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift", "", "damping", "shift.position"),
     _parameter("groove.amplitude", "m", "Amplitude of the shift that a groove makes; axial.mode 2", "S_{S1}"),
     _parameter("groove.ratio", "1", "Periods of that shift in a turn of the crank; axial.mode 2", "\\alpha"),
-    _parameter("gravity.x", "m/s2", "Acceleration of gravity along x of the ground frame"),
-    _parameter("gravity.y", "m/s2", "Acceleration of gravity along y of the ground frame"),
-    _parameter("gravity.z", "m/s2", "Acceleration of gravity along z of the ground frame, the crank axis"),
+    _parameter("gravity.x", "m/s2", "Acceleration of gravity along x of the ground frame", role="gravity"),
+    _parameter("gravity.y", "m/s2", "Acceleration of gravity along y of the ground frame", role="gravity"),
+    _parameter(
+        "gravity.z", "m/s2", "Acceleration of gravity along z of the ground frame, the crank axis", role="gravity"
+    ),
     choice(
         "assembly.branch",
         "Assembly: on which side of the crank pin's foot on the guide the slider is, +1 or -1",
@@ -180,7 +202,9 @@ OUTPUTS = (
         "dampers and guide",
         "crank torque, axial force and slider load",
     ),
-    output("closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0),
+    output(
+        "closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0, role="residual"
+    ),
     output(
         "transmission.angle",
         "rad",
