@@ -6,8 +6,9 @@ that it cannot be out of date. Every function has the form
 
     f(t, a, b, c, d, out)        t a float, the others arrays of floats
 
-so that a kernel, compiled once, works with the functions of any mechanism. Kernels are kept on disk in a folder whose name is
-a hash of all their sources.
+so that a kernel, compiled once, works with the functions of any mechanism. In lanes each number of an array is a vector of
+doubles, one of each lane, and the functions of `lanes` take the place of the C library's. Kernels are kept on disk in a folder
+whose name is a hash of all their sources.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from threading import RLock
 from types import CodeType, ModuleType
@@ -38,6 +39,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from linkwork.errors import LinkworkError
 
+from . import lanes as vectors
 from . import linking
 from .cache import alone, code_folder, keep
 
@@ -45,7 +47,7 @@ VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
 CUBE = float64[:, :, ::1]
 
-_DOUBLE = ir.DoubleType()
+_DOUBLE = vectors.DOUBLE
 _ARGUMENTS = [_DOUBLE, *[_DOUBLE.as_pointer()] * 5]
 
 # Machine code of functions
@@ -63,6 +65,9 @@ class MachineCode:
     functions : sequence of casadi.Function
         Of SX, with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in ``out``, matrices column
         by column.
+    lanes : int
+        How many arguments each call takes at once: with more than one, arrays have so many numbers for each of theirs, and t
+        is the same for all.
 
     Attributes
     ----------
@@ -77,17 +82,17 @@ class MachineCode:
         If an operation has no counterpart here, or an output is not dense.
     """
 
-    def __init__(self, functions: Sequence[Any]) -> None:
+    def __init__(self, functions: Sequence[Any], lanes: int = 1) -> None:
         _prepare()
         triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
         features = binding.get_host_cpu_features().flatten()
-        digest = hashlib.sha256(f"{llvmlite.__version__} {triple} {cpu} {features}".encode() + _own_source())
+        digest = hashlib.sha256(f"{llvmlite.__version__} {triple} {cpu} {features} {lanes}".encode() + _own_source())
         digest.update(" ".join(function.serialize() for function in functions).encode())
         self.fingerprint = digest.hexdigest()
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = _kept(self.fingerprint, lambda: _compile(functions, triple, machine))
+        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, triple, machine))
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -95,12 +100,12 @@ class MachineCode:
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
-def _compile(functions: Sequence[Any], triple: str, machine: Any) -> bytes:
+def _compile(functions: Sequence[Any], lanes: int, triple: str, machine: Any) -> bytes:
     """Return an object file with functions."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
-        _Writer(module, function).write()
+        _Writer(module, function, lanes).write()
     parsed = binding.parse_assembly(str(module))
     passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(parsed, passes)
@@ -110,7 +115,7 @@ def _compile(functions: Sequence[Any], triple: str, machine: Any) -> bytes:
 
 @cache
 def _own_source() -> bytes:
-    return Path(__file__).read_bytes()
+    return Path(__file__).read_bytes() + Path(vectors.__file__).read_bytes()
 
 
 def _kept(key: str, make: Callable[[], bytes]) -> bytes:
@@ -142,8 +147,10 @@ _FUNCTIONS = {
     "OP_POW": "pow",
     "OP_CONSTPOW": "pow",
     "OP_HYPOT": "hypot",
+    "OP_SQRT": "sqrt",
+    "OP_FABS": "fabs",
 }
-_INTRINSICS = {"OP_SQRT": "llvm.sqrt.f64", "OP_FABS": "llvm.fabs.f64"}
+_INTRINSICS = {"sqrt": "llvm.sqrt.f64", "fabs": "llvm.fabs.f64"}
 
 
 @cache
@@ -169,23 +176,28 @@ def _prepare() -> None:
 class _Writer:
     """Translates one function of CasADi into a module of LLVM."""
 
-    def __init__(self, module: ir.Module, function: Any) -> None:
+    def __init__(self, module: ir.Module, function: Any, lanes: int) -> None:
         self.module = module
         self.source = function
+        self.lanes = lanes
+        self.kind = vectors.vector(lanes)
+        # products are rounded together with what is added to them
+        self.flags = ("contract",) if lanes > 1 else ()
+        self.reciprocals: dict[int, tuple[Any, Any]] = {}
         target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
         for argument in target.args[1:]:
             argument.add_attribute("noalias")
         self.arguments = target.args
         self.build = build = ir.IRBuilder(target.append_basic_block())
         self.plain: dict[str, Callable[..., Any]] = {
-            "OP_ADD": build.fadd,
-            "OP_SUB": build.fsub,
-            "OP_MUL": build.fmul,
-            "OP_DIV": build.fdiv,
+            "OP_ADD": partial(build.fadd, flags=self.flags),
+            "OP_SUB": partial(build.fsub, flags=self.flags),
+            "OP_MUL": partial(build.fmul, flags=self.flags),
+            "OP_DIV": self._quotient,
             "OP_NEG": build.fneg,
-            "OP_SQ": lambda a: build.fmul(a, a),
+            "OP_SQ": lambda a: build.fmul(a, a, flags=self.flags),
             "OP_TWICE": lambda a: build.fadd(a, a),
-            "OP_INV": lambda a: build.fdiv(ir.Constant(_DOUBLE, 1.0), a),
+            "OP_INV": self._reciprocal,
             "OP_ASSIGN": lambda a: a,
             "OP_SIGN": self._sign,
         }
@@ -203,35 +215,61 @@ class _Writer:
             code, ins, outs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
             if code == casadi.OP_INPUT:
                 which, place = ins
-                argument = self.arguments[which]
-                values[outs[0]] = argument if which == 0 else build.load(build.gep(argument, [_index(place)]))
+                values[outs[0]] = self._time() if which == 0 else build.load(self._place(which, place), align=8)
             elif code == casadi.OP_OUTPUT:
                 which, place = outs
-                build.store(values[ins[0]], build.gep(self.arguments[5], [_index(int(first[which]) + place)]))
+                build.store(values[ins[0]], self._place(5, int(first[which]) + place), align=8)
             elif code == casadi.OP_CONST:
-                values[outs[0]] = ir.Constant(_DOUBLE, float(f.instruction_constant(k)))
+                values[outs[0]] = self._constant(f.instruction_constant(k))
             else:
                 values[outs[0]] = self._operation(code, [values[i] for i in ins])
         build.ret_void()
+
+    def _place(self, which: int, place: int) -> Any:
+        """Return a pointer to a number of an argument, or to that of each lane."""
+        pointer = self.build.gep(self.arguments[which], [_index(place * self.lanes)])
+        return self.build.bitcast(pointer, self.kind.as_pointer())
+
+    def _time(self) -> Any:
+        if self.lanes == 1:
+            return self.arguments[0]
+        value = ir.Constant(self.kind, ir.Undefined)
+        for lane in range(self.lanes):
+            value = self.build.insert_element(value, self.arguments[0], _index(lane))
+        return value
+
+    def _constant(self, value: float) -> Any:
+        return ir.Constant(self.kind, float(value) if self.lanes == 1 else [float(value)] * self.lanes)
 
     def _operation(self, code: int, operands: list[Any]) -> Any:
         operation = _operations().get(code, str(code))
         if operation in self.plain:
             return self.plain[operation](*operands)
-        name = (_FUNCTIONS | _INTRINSICS).get(operation)
+        name = _FUNCTIONS.get(operation)
         if name is None:
             raise LinkworkError(
                 f"{self.source.name()}: CasADi's operation {operation} cannot be compiled; equations consist of "
                 "arithmetic and functions such as sin, sqrt, exp"
             )
-        target = self.module.globals.get(name)
-        if target is None:
-            target = ir.Function(self.module, ir.FunctionType(_DOUBLE, [_DOUBLE] * len(operands)), name)
-            target.attributes.add("nounwind")
-        return self.build.call(target, operands)
+        if self.lanes > 1:
+            return vectors.FUNCTIONS[name](*(vectors.Vector(self.build, value) for value in operands)).value
+        name = _INTRINSICS.get(name, name)
+        return self.build.call(vectors.declared(self.module, name, self.kind, len(operands)), operands)
+
+    def _quotient(self, a: Any, b: Any) -> Any:
+        if self.lanes == 1:
+            return self.build.fdiv(a, b)
+        # a division takes as long as sixteen products, and equations often divide by the same again
+        return self.build.fmul(a, self._reciprocal(b), flags=self.flags)
+
+    def _reciprocal(self, a: Any) -> Any:
+        if id(a) not in self.reciprocals:
+            # with a, so that no other value gets its id
+            self.reciprocals[id(a)] = a, self.build.fdiv(self._constant(1.0), a)
+        return self.reciprocals[id(a)][1]
 
     def _sign(self, a: Any) -> Any:
-        zero, one, less = (ir.Constant(_DOUBLE, value) for value in (0.0, 1.0, -1.0))
+        zero, one, less = map(self._constant, (0.0, 1.0, -1.0))
         negative = self.build.select(self.build.fcmp_ordered("<", a, zero), less, zero)
         return self.build.select(self.build.fcmp_ordered(">", a, zero), one, negative)
 
