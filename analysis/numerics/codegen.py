@@ -200,6 +200,7 @@ class _Writer:
             "OP_INV": self._reciprocal,
             "OP_ASSIGN": lambda a: a,
             "OP_SIGN": self._sign,
+            "OP_FMAX": lambda a, b: build.select(build.fcmp_ordered("<", a, b), b, a),
         }
 
     def write(self) -> None:
@@ -342,6 +343,8 @@ _PART: dict[str, Any] = {
 part = njit(**_PART)
 #: The same for functions that make no arrays: counting the references to their arguments would cost more than their work.
 inner = njit(**_PART, _nrt=False)
+#: The same for functions whose value lives no longer than their caller: they become a part of it before Numba types it.
+inline = njit(**_PART, _nrt=False, inline="always")
 
 
 @inner

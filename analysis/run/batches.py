@@ -188,7 +188,7 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
             if code == _GIVEN_UP:
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
-            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed)
+            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages
 
@@ -206,7 +206,7 @@ def _integrate(
     of the channel that was not finite, the number of steps, state and channels at the end. ``samples`` get the samples, NaN
     after the end of a run.
     """
-    from . import compiled
+    from . import compiled, lanes
     from . import records as k
 
     mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
@@ -227,8 +227,14 @@ def _integrate(
     own, recorded = batch._replace(laws=batch.laws.copy()), k.Samples(settings.times, states, forces)
     watch = k.watch_nothing(mechanism.size)
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
+    fits = _fits(batch, settings)
+    code = lanes.code_of(mechanism, _switched(mechanism, batch.p))
     while todo.any() and not heard:
-        compiled.run(problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL)
+        arguments = problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
+        if (todo & fits).any():
+            lanes.run_in_lanes(code, fits, *arguments)
+        else:
+            compiled.run(*arguments)
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
         passed = carries["begin"] + carries["elapsed"] - settings.times[0]
         for i in np.flatnonzero(todo & too_slow(steps, passed, span, settings.max_steps)).tolist():
@@ -247,6 +253,17 @@ def _integrate(
     ends[:, :5] = np.column_stack([status, counts, ended, carries["lost"], steps])
     ends[:, 5:] = np.column_stack([state.x, state.u])
     return not todo.any()
+
+
+def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
+    """Return which runs go in lanes: those whose inputs are constant, or held, in each interval.
+
+    The others, with harmonics, ramps, motors, torsion bars or functions of the state, go one by one.
+    """
+    from .lanes import LANES
+
+    fits = (batch.steady & ~batch.laws[:, :, 2].any(axis=1)) | (settings.hold > 0.0)
+    return fits & (LANES > 1)
 
 
 # Start of a run

@@ -354,9 +354,9 @@ class _Gathered:
 def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
     """Return a hash of the code that runs depend on: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
-    from . import batches, compiled
+    from . import batches, compiled, lanes
 
-    kernels = (compiled.run, compiled.channels_of_many, compiled.rows)
+    kernels = (compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows)
     switched = any(mechanism.switched(p.constants()) for p in parameters)
     ours = [machine(mechanism, switched).fingerprint, inspect.getsource(batches), *map(fingerprint, kernels)]
     return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])

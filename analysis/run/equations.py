@@ -170,13 +170,13 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
     )
 
 
-def _compiled(traces: Traced, functions: Mapping[str, Any]) -> MachineCode:
+def _compiled(traces: Traced, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
     """Return machine code of expressions, by their names, in the symbols of traced equations."""
     from ..numerics.codegen import MachineCode
 
     casadi = symbolic.library()
     arguments = [casadi.SX.sym("t"), *traces.symbols]
-    return MachineCode([casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()])
+    return MachineCode([casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()], lanes)
 
 
 class Machine:
@@ -188,25 +188,25 @@ class Machine:
         Of the functions, by DERIVATIVE and its kin.
     """
 
-    def __init__(self, mechanism: Mechanism, switched: bool) -> None:
+    def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:
         traces = expressions(mechanism, switched)
-        self._code = _compiled(traces, {name: getattr(traces, name) for name in _NAMES})
+        self._code = _compiled(traces, {name: getattr(traces, name) for name in _NAMES}, lanes)
         self.addresses: NDArray[np.int64] = np.array([self._code.addresses[name] for name in _NAMES], dtype=np.int64)
         self.fingerprint = self._code.fingerprint
 
 
-_MACHINES: dict[tuple[Mechanism, bool], Machine] = {}
+_MACHINES: dict[tuple[Mechanism, bool, int], Machine] = {}
 
 
-def machine(mechanism: Mechanism, switched: bool = False) -> Machine:
-    """Return the machine code of a mechanism's equations; one thread compiles it at the first call."""
-    key = mechanism, switched
+def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Machine:
+    """Return the machine code of a mechanism's equations for so many states at once; one thread compiles it at first."""
+    key = mechanism, switched, lanes
     if key not in _MACHINES:
         from ..numerics.codegen import MAKING
 
         with MAKING:
             if key not in _MACHINES:
-                _MACHINES[key] = Machine(mechanism, switched)
+                _MACHINES[key] = Machine(mechanism, switched, lanes)
     return _MACHINES[key]
 
 

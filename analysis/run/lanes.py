@@ -1,0 +1,381 @@
+"""Runs of an ensemble in lanes: as many at once as the processor takes doubles, each with its own time, step size and end.
+
+The steps are those of `compiled`: the stages of all lanes are computed together, and each lane then accepts its step or tries
+a shorter one. A lane whose run ends takes the next run. Intervals of inputs begin, and the limit of assembly is located, by
+the functions of single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``.
+
+A run fits here if its inputs are constant in each interval. Others, which have them evaluated at each stage, are left to
+`compiled.run`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from math import isfinite, isnan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import int64, types
+from numpy.typing import NDArray
+
+from linkwork import tableau
+from linkwork.integrate import LEAST_STEP
+from linkwork.limits import LIMIT_SINE
+from linkwork.mechanism import Mechanism
+
+from ..numerics.codegen import MAKING, MATRIX, VECTOR, MachineCode, evaluate, inner, kernel, part
+from ..numerics.lanes import width
+from ..numerics.references import refer
+from ..numerics.symbolic import library
+from .compiled import BATCH, begin_interval, choose_first, make_room, motion_of, next_size, refused, sample_step
+from .equations import CLEARANCE, DERIVATIVE, JUMP, machine
+from .locating import end_at, locate_events
+from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH
+from .sources import ADDRESSES, SOURCE
+from .stepping import STAGES, following, shorter
+
+#: Runs at once.
+LANES = width()
+#: In the place of a sum of squares that is zero.
+LEAST = 1e-300
+
+
+class Lanes(NamedTuple):
+    """Work arrays: addresses of the functions in lanes; of each lane its run or -1, whether its run is in an interval whose
+    first rates are known, whether the step is the last of its interval, what became of it; and in lanes the state, its end and
+    that inside the step, modes, channels, constants, scales, step size, fraction of the step, stages, interpolant, clearance.
+    After the state at the end of the step comes the error."""
+
+    code: NDArray[np.int64]
+    run: NDArray[np.int64]
+    inside: NDArray[np.int64]
+    last: NDArray[np.int64]
+    outcome: NDArray[np.int64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]
+    modes: NDArray[np.float64]
+    u: NDArray[np.float64]
+    p: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    h: NDArray[np.float64]
+    fraction: NDArray[np.float64]
+    k: NDArray[np.float64]
+    f: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+
+
+# What became of a step
+_IDLE, _REJECTED, _ACCEPTED, _SAMPLED = range(4)
+# Places of addresses, after the equations: stage s of a step at _STAGE + s
+_STAGE = JUMP
+_INTERPOLANT, _INTERPOLATE = _STAGE + 16, _STAGE + 17
+
+
+def code_of(mechanism: Mechanism, switched: bool) -> NDArray[np.int64]:
+    """Return the addresses of the equations in lanes, and of the straight lines of a step."""
+    return np.concatenate([machine(mechanism, switched, LANES).addresses, _code_of_steps(mechanism.size)])
+
+
+@cache
+def _code_of_steps(n: int) -> NDArray[np.int64]:
+    """Return the addresses of the sums of a step of n states: `stepping.stage` and its kin, without loops.
+
+    The end of a step is followed by its error, of order 8 in the step size; without a number where the end is not finite.
+    """
+    casadi = library()
+    x, k, h, scale, y = (casadi.SX.sym(name, size) for name, size in zip("xkhsy", (n, 16 * n, 1, n, n)))
+    f, t = casadi.SX.sym("f", 7 * n), casadi.SX.sym("t")
+
+    def total(pairs: Iterable[tuple[int, float]]) -> Any:
+        return sum((weight * k[n * j : n * (j + 1)] for j, weight in pairs if weight), casadi.SX.zeros(n))
+
+    stages = {f"stage{s}": x + h * total(tableau.A[s]) for s in range(1, 16)}
+    end = stages[f"stage{STAGES}"]
+    weight = scale + casadi.fmax(casadi.fabs(x), casadi.fabs(end))
+    sum3, sum5 = (casadi.sumsqr(total(enumerate(row)) / weight) for row in (tableau.E3, tableau.E5))
+    bottom = casadi.fmax((sum5 + 0.01 * sum3) * n, LEAST)
+    stages[f"stage{STAGES}"] = casadi.vertcat(end, h * sum5 / casadi.sqrt(bottom))
+    delta, first, last = y - x, k[:n], k[n * STAGES : n * (STAGES + 1)]
+    interpolant = [delta, h * first - delta, 2.0 * delta - h * (last + first)]
+    interpolant += [h * total(enumerate(row)) for row in tableau.D]
+    between = casadi.SX.zeros(n)
+    for r in range(7):
+        between = (between + f[n * (6 - r) : n * (7 - r)]) * (h if r % 2 == 0 else 1.0 - h)
+    functions = [casadi.Function(name, [t, x, k, h, scale], [value], {"cse": True}) for name, value in stages.items()]
+    functions.append(casadi.Function("interpolant", [t, x, k, h, y], [casadi.vertcat(*interpolant)], {"cse": True}))
+    functions.append(casadi.Function("interpolate", [t, x, f, h, scale], [x + between]))
+    with MAKING:
+        addresses = MachineCode(functions, LANES).addresses
+    return np.array([addresses[function.name()] for function in functions], dtype=np.int64)
+
+
+@part
+def _make_lanes(code, states, modes, channels, constants):
+    """Allocate work arrays, with empty lanes."""
+    n = states * LANES
+    return Lanes(
+        code, np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
+        np.zeros(n), np.zeros(n + LANES), np.zeros(n), np.zeros(modes * LANES), np.zeros(channels * LANES),
+        np.zeros(constants * LANES), np.zeros(n), np.zeros(LANES), np.zeros(LANES), np.zeros((16, n)), np.zeros((7, n)),
+        np.zeros(LANES),
+    )  # fmt: skip
+
+
+@inner
+def _put(lane, values, many):
+    """Write values into a lane."""
+    for i in range(values.shape[0]):
+        many[LANES * i + lane] = values[i]
+
+
+@inner
+def _take(lane, many, values):
+    """Read the values of a lane."""
+    for i in range(values.shape[0]):
+        values[i] = many[LANES * i + lane]
+
+
+@inner
+def _equation(which, x, out, v):
+    evaluate(v.code[which], 0.0, x, v.modes, v.u, v.p, out)
+
+
+@inner
+def _stage(s, out, v):
+    """Compute the states at a stage of the lanes' steps; after those at the end the errors."""
+    evaluate(v.code[_STAGE + s], 0.0, v.x, v.k, v.h, v.scale, out)
+
+
+@inner
+def _attempt(v):
+    """Take a step in all lanes into ``v.y``, as `stepping.attempt`."""
+    for s in range(1, STAGES):
+        _stage(s, v.y, v)
+        _equation(DERIVATIVE, v.y, v.k[s], v)
+    _stage(STAGES, v.y, v)
+
+
+@inner
+def _make_interpolants(v):
+    """Compute the interpolants of all lanes' steps."""
+    for s in range(STAGES + 1, 16):
+        _stage(s, v.z, v)
+        _equation(DERIVATIVE, v.z, v.k[s], v)
+    evaluate(v.code[_INTERPOLANT], 0.0, v.x, v.k, v.h, v.y, v.f)
+
+
+@inner
+def _sample(samples, state, v):
+    """Record the samples inside the steps."""
+    while True:
+        more = False
+        for lane in range(LANES):
+            if v.outcome[lane] == _SAMPLED:
+                carry = state.carries[v.run[lane]]
+                if carry.sample < samples.times.shape[0] and samples.times[carry.sample] < _end_of_step(lane, carry, v):
+                    elapsed = samples.times[carry.sample] - carry.begin
+                    v.fraction[lane] = (elapsed - carry.elapsed) / v.h[lane]
+                    more = True
+                else:
+                    v.outcome[lane] = _ACCEPTED
+        if not more:
+            return
+        evaluate(v.code[_INTERPOLATE], 0.0, v.x, v.f, v.fraction, v.scale, v.z)
+        for lane in range(LANES):
+            if v.outcome[lane] == _SAMPLED:
+                i = v.run[lane]
+                carry = state.carries[i]
+                _take(lane, v.z, samples.states[i, carry.sample])
+                _take(lane, v.u, samples.forces[i, carry.sample])
+                carry.sample += 1
+
+
+@inner
+def _end_of_step(lane, carry, v):
+    return carry.stop if v.last[lane] else carry.begin + (carry.elapsed + v.h[lane])
+
+
+@inner
+def _finite(lane, states, many):
+    for i in range(states):  # noqa: SIM110 - Numba compiles no generators
+        if not isfinite(many[LANES * i + lane]):
+            return False
+    return True
+
+
+@inner
+def _judge(lane, error, carry, samples, v):
+    """Return what becomes of the step of a lane with an error relative to the tolerance."""
+    clearance, states = v.clearance[lane], v.x.shape[0] // LANES
+    if not error <= 1.0 or isnan(clearance) or not _finite(lane, states, v.y):
+        return _REJECTED
+    inside = clearance < LIMIT_SINE or (
+        carry.sample < samples.times.shape[0] and samples.times[carry.sample] < _end_of_step(lane, carry, v)
+    )
+    if (inside or not v.last[lane]) and not _finite(lane, states, v.k[STAGES]):
+        return _REJECTED
+    return _SAMPLED if inside else _ACCEPTED
+
+
+@inner
+def _run(arrays, room, fits, problem, source, batch, watch, state, samples, status, most, budget):
+    """Do the work of `run_in_lanes`, which holds the arrays that are referred to here."""
+    v = refer(arrays)
+    states = state.x.shape[1]
+    least = LEAST_STEP * (problem.end - samples.times[0])
+    first = 0
+    while True:
+        busy = fresh = False
+        for lane in range(LANES):
+            v.outcome[lane] = _IDLE
+            v.last[lane] = 0
+            while True:
+                i = v.run[lane]
+                if i < 0:
+                    while first < status.shape[0] and not (
+                        fits[first] and status[first] == RUNNING and state.carries[first].steps < most
+                    ):
+                        first += 1
+                    if first == status.shape[0]:
+                        break
+                    i = first
+                    first += 1
+                    v.run[lane] = i
+                    v.inside[lane] = 0
+                    _put(lane, batch.p[i], v.p)
+                    _put(lane, batch.scales[i], v.scale)
+                carry = state.carries[i]
+                if v.inside[lane] == 0:
+                    if carry.midway == 0:
+                        motion = motion_of(i, problem, source, batch, watch, samples, room, state)
+                        status[i] = begin_interval(motion)
+                        if status[i] != RUNNING:
+                            v.run[lane] = -1
+                            continue
+                        carry.midway = 1
+                    _put(lane, state.x[i], v.x)
+                    _put(lane, state.u[i], v.u)
+                    v.inside[lane] = 2
+                    fresh = True
+                if carry.steps >= most:
+                    _take(lane, v.x, state.x[i])
+                    v.run[lane] = -1
+                    continue
+                busy = True
+                break
+        if not busy:
+            return
+        if fresh:
+            _equation(DERIVATIVE, v.x, v.z, v)
+        for lane in range(LANES):
+            i = v.run[lane]
+            h = 0.0
+            if i >= 0:
+                carry = state.carries[i]
+                if v.inside[lane] == 2:
+                    v.inside[lane] = 1
+                    _take(lane, v.z, room.k[0])
+                    _put(lane, room.k[0], v.k[0])
+                    choose_first(motion_of(i, problem, source, batch, watch, samples, room, state))
+                h, last = next_size(carry)
+                v.last[lane] = last
+                carry.steps += 1
+                budget -= 1
+            v.h[lane] = h
+        _attempt(v)
+        _equation(CLEARANCE, v.y, v.clearance, v)
+        _equation(DERIVATIVE, v.y, v.k[STAGES], v)
+        looking = False
+        for lane in range(LANES):
+            i = v.run[lane]
+            if i < 0:
+                continue
+            carry, h = state.carries[i], v.h[lane]
+            error = v.y[LANES * states + lane] / problem.tolerance
+            v.outcome[lane] = _judge(lane, error, carry, samples, v)
+            if v.outcome[lane] == _REJECTED:
+                carry.rejected += 1
+                carry.step = shorter(h, error)
+                if not carry.step >= least:
+                    _take(lane, v.x, state.x[i])
+                    motion = motion_of(i, problem, source, batch, watch, samples, room, state)
+                    status[i] = refused(h, motion)
+                    v.run[lane] = -1
+                continue
+            carry.step = following(h, carry.step, error)
+            if v.clearance[lane] < LIMIT_SINE:
+                _take(lane, v.x, state.x[i])
+                _take(lane, v.y, room.y)
+                for s in range(STAGES + 1):
+                    _take(lane, v.k[s], room.k[s])
+                motion = motion_of(i, problem, source, batch, watch, samples, room, state)
+                what, cut = locate_events(v.clearance[lane], h, motion)
+                sample_step(carry.begin + (carry.elapsed + cut * h), h, motion)
+                status[i] = end_at(what, cut, h, motion)
+                v.run[lane] = -1
+                v.outcome[lane] = _IDLE
+            looking |= v.outcome[lane] == _SAMPLED
+        if looking:
+            _make_interpolants(v)
+            _sample(samples, state, v)
+        for lane in range(LANES):
+            if v.outcome[lane] == _ACCEPTED:
+                i = v.run[lane]
+                carry = state.carries[i]
+                for j in range(lane, v.x.shape[0], LANES):
+                    v.x[j] = v.y[j]
+                    v.k[0, j] = v.k[STAGES, j]
+                if v.last[lane]:
+                    carry.begin = carry.stop
+                    carry.elapsed = 0.0
+                    carry.interval += 1
+                    carry.midway = 0
+                    _take(lane, v.x, state.x[i])
+                    v.inside[lane] = 0
+                else:
+                    carry.elapsed += v.h[lane]
+        if budget <= 0:
+            for lane in range(LANES):
+                if v.run[lane] >= 0:
+                    _take(lane, v.x, state.x[v.run[lane]])
+            return
+
+
+@kernel(
+    types.void(ADDRESSES, types.boolean[::1], PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
+    purpose="the solver of ensembles",
+)
+def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, status, most, budget):
+    """Integrate the runs of a batch that fit and whose status is RUNNING, as `compiled.run` does one after the other.
+
+    ``code`` are the addresses of `code_of`.
+    """
+    states, channels = state.x.shape[1], state.u.shape[1]
+    room = make_room(states, problem.outputs, channels)
+    v = _make_lanes(code, states, problem.modes.shape[0], channels, batch.p.shape[1])
+    for lane in range(LANES):
+        _put(lane, problem.modes, v.modes)
+    _run(v, room, fits, problem, source, batch, watch, state, samples, status, most, budget)
+
+
+@kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs in lanes")
+def rows_in_lanes(equation, modes, p, states, forces, out):
+    """Evaluate one of the equations in lanes for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``."""
+    of_lanes = (
+        np.empty(LANES * modes.shape[0]), np.empty(LANES * p.shape[0]), np.empty(LANES * states.shape[1]),
+        np.empty(LANES * forces.shape[1]), np.empty(LANES * out.shape[1]),
+    )  # fmt: skip
+    for lane in range(LANES):
+        _put(lane, modes, of_lanes[0])
+        _put(lane, p, of_lanes[1])
+    for i in range(0, states.shape[0], LANES):
+        # the lanes after the last row repeat it
+        last = states.shape[0] - 1
+        for lane in range(LANES):
+            _put(lane, states[min(i + lane, last)], of_lanes[2])
+            _put(lane, forces[min(i + lane, last)], of_lanes[3])
+        evaluate(equation, 0.0, of_lanes[2], of_lanes[0], of_lanes[3], of_lanes[1], of_lanes[4])
+        for lane in range(min(LANES, states.shape[0] - i)):
+            _take(lane, of_lanes[4], out[i + lane])
