@@ -22,7 +22,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from threading import RLock
 from types import CodeType, ModuleType
@@ -181,8 +181,6 @@ class _Writer:
         self.source = function
         self.lanes = lanes
         self.kind = vectors.vector(lanes)
-        # products are rounded together with what is added to them
-        self.flags = ("contract",) if lanes > 1 else ()
         self.reciprocals: dict[int, tuple[Any, Any]] = {}
         target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
         for argument in target.args[1:]:
@@ -190,12 +188,12 @@ class _Writer:
         self.arguments = target.args
         self.build = build = ir.IRBuilder(target.append_basic_block())
         self.plain: dict[str, Callable[..., Any]] = {
-            "OP_ADD": partial(build.fadd, flags=self.flags),
-            "OP_SUB": partial(build.fsub, flags=self.flags),
-            "OP_MUL": partial(build.fmul, flags=self.flags),
+            "OP_ADD": build.fadd,
+            "OP_SUB": build.fsub,
+            "OP_MUL": build.fmul,
             "OP_DIV": self._quotient,
             "OP_NEG": build.fneg,
-            "OP_SQ": lambda a: build.fmul(a, a, flags=self.flags),
+            "OP_SQ": lambda a: build.fmul(a, a),
             "OP_TWICE": lambda a: build.fadd(a, a),
             "OP_INV": self._reciprocal,
             "OP_ASSIGN": lambda a: a,
@@ -261,7 +259,7 @@ class _Writer:
         if self.lanes == 1:
             return self.build.fdiv(a, b)
         # a division takes as long as sixteen products, and equations often divide by the same again
-        return self.build.fmul(a, self._reciprocal(b), flags=self.flags)
+        return self.build.fmul(a, self._reciprocal(b))
 
     def _reciprocal(self, a: Any) -> Any:
         if id(a) not in self.reciprocals:

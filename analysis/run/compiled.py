@@ -411,8 +411,39 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
         budget -= carry.steps - before
 
 
-@kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
-def rows(equation, modes, p, states, forces, out):
-    """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``."""
-    for i in range(states.shape[0]):
-        evaluate(equation, 0.0, states[i], modes, forces[i], p, out[i])
+@inner
+def put(lane, lanes, values, many):
+    """Write values into one of several lanes."""
+    for i in range(values.shape[0]):
+        many[lanes * i + lane] = values[i]
+
+
+@inner
+def take(lane, lanes, many, values):
+    """Read the values of one of several lanes."""
+    for i in range(values.shape[0]):
+        values[i] = many[lanes * i + lane]
+
+
+@kernel(types.void(int64, int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
+def rows(equation, lanes, modes, p, states, forces, out):
+    """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``.
+
+    The equation takes so many rows at once as it has ``lanes``.
+    """
+    modes_of, p_of = np.empty(lanes * modes.shape[0]), np.empty(lanes * p.shape[0])
+    x, u = np.empty(lanes * states.shape[1]), np.empty(lanes * forces.shape[1])
+    y = np.empty(lanes * out.shape[1])
+    for lane in range(lanes):
+        put(lane, lanes, modes, modes_of)
+        put(lane, lanes, p, p_of)
+    for first in range(0, states.shape[0], lanes):
+        count = min(lanes, states.shape[0] - first)
+        for lane in range(lanes):
+            # the last row fills what remains
+            row = first + min(lane, count - 1)
+            put(lane, lanes, states[row], x)
+            put(lane, lanes, forces[row], u)
+        evaluate(equation, 0.0, x, modes_of, u, p_of, y)
+        for lane in range(count):
+            take(lane, lanes, y, out[first + lane])

@@ -211,10 +211,10 @@ def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Mac
 
 
 @cache
-def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...]) -> MachineCode:
+def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
     """Return machine code of the equation ``chosen``: some of the outputs, which costs what these need."""
     from ..numerics.codegen import MAKING
 
     traces = expressions(mechanism, switched)
     with MAKING:
-        return _compiled(traces, {"chosen": traces.outputs[list(columns)]})
+        return _compiled(traces, {"chosen": traces.outputs[list(columns)]}, lanes)

@@ -24,11 +24,22 @@ from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
-from ..numerics.codegen import MAKING, MATRIX, VECTOR, MachineCode, evaluate, inner, kernel, part
+from ..numerics.codegen import MAKING, MachineCode, evaluate, inner, kernel, part
 from ..numerics.lanes import width
 from ..numerics.references import refer
 from ..numerics.symbolic import library
-from .compiled import BATCH, begin_interval, choose_first, make_room, motion_of, next_size, refused, sample_step
+from .compiled import (
+    BATCH,
+    begin_interval,
+    choose_first,
+    make_room,
+    motion_of,
+    next_size,
+    put,
+    refused,
+    sample_step,
+    take,
+)
 from .equations import CLEARANCE, DERIVATIVE, JUMP, machine
 from .locating import end_at, locate_events
 from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH
@@ -124,20 +135,6 @@ def _make_lanes(code, states, modes, channels, constants):
 
 
 @inner
-def _put(lane, values, many):
-    """Write values into a lane."""
-    for i in range(values.shape[0]):
-        many[LANES * i + lane] = values[i]
-
-
-@inner
-def _take(lane, many, values):
-    """Read the values of a lane."""
-    for i in range(values.shape[0]):
-        values[i] = many[LANES * i + lane]
-
-
-@inner
 def _equation(which, x, out, v):
     evaluate(v.code[which], 0.0, x, v.modes, v.u, v.p, out)
 
@@ -187,8 +184,8 @@ def _sample(samples, state, v):
             if v.outcome[lane] == _SAMPLED:
                 i = v.run[lane]
                 carry = state.carries[i]
-                _take(lane, v.z, samples.states[i, carry.sample])
-                _take(lane, v.u, samples.forces[i, carry.sample])
+                take(lane, LANES, v.z, samples.states[i, carry.sample])
+                take(lane, LANES, v.u, samples.forces[i, carry.sample])
                 carry.sample += 1
 
 
@@ -244,8 +241,8 @@ def _run(arrays, room, fits, problem, source, batch, watch, state, samples, stat
                     first += 1
                     v.run[lane] = i
                     v.inside[lane] = 0
-                    _put(lane, batch.p[i], v.p)
-                    _put(lane, batch.scales[i], v.scale)
+                    put(lane, LANES, batch.p[i], v.p)
+                    put(lane, LANES, batch.scales[i], v.scale)
                 carry = state.carries[i]
                 if v.inside[lane] == 0:
                     if carry.midway == 0:
@@ -255,12 +252,12 @@ def _run(arrays, room, fits, problem, source, batch, watch, state, samples, stat
                             v.run[lane] = -1
                             continue
                         carry.midway = 1
-                    _put(lane, state.x[i], v.x)
-                    _put(lane, state.u[i], v.u)
+                    put(lane, LANES, state.x[i], v.x)
+                    put(lane, LANES, state.u[i], v.u)
                     v.inside[lane] = 2
                     fresh = True
                 if carry.steps >= most:
-                    _take(lane, v.x, state.x[i])
+                    take(lane, LANES, v.x, state.x[i])
                     v.run[lane] = -1
                     continue
                 busy = True
@@ -276,8 +273,8 @@ def _run(arrays, room, fits, problem, source, batch, watch, state, samples, stat
                 carry = state.carries[i]
                 if v.inside[lane] == 2:
                     v.inside[lane] = 1
-                    _take(lane, v.z, room.k[0])
-                    _put(lane, room.k[0], v.k[0])
+                    take(lane, LANES, v.z, room.k[0])
+                    put(lane, LANES, room.k[0], v.k[0])
                     choose_first(motion_of(i, problem, source, batch, watch, samples, room, state))
                 h, last = next_size(carry)
                 v.last[lane] = last
@@ -299,17 +296,17 @@ def _run(arrays, room, fits, problem, source, batch, watch, state, samples, stat
                 carry.rejected += 1
                 carry.step = shorter(h, error)
                 if not carry.step >= least:
-                    _take(lane, v.x, state.x[i])
+                    take(lane, LANES, v.x, state.x[i])
                     motion = motion_of(i, problem, source, batch, watch, samples, room, state)
                     status[i] = refused(h, motion)
                     v.run[lane] = -1
                 continue
             carry.step = following(h, carry.step, error)
             if v.clearance[lane] < LIMIT_SINE:
-                _take(lane, v.x, state.x[i])
-                _take(lane, v.y, room.y)
+                take(lane, LANES, v.x, state.x[i])
+                take(lane, LANES, v.y, room.y)
                 for s in range(STAGES + 1):
-                    _take(lane, v.k[s], room.k[s])
+                    take(lane, LANES, v.k[s], room.k[s])
                 motion = motion_of(i, problem, source, batch, watch, samples, room, state)
                 what, cut = locate_events(v.clearance[lane], h, motion)
                 sample_step(carry.begin + (carry.elapsed + cut * h), h, motion)
@@ -332,14 +329,14 @@ def _run(arrays, room, fits, problem, source, batch, watch, state, samples, stat
                     carry.elapsed = 0.0
                     carry.interval += 1
                     carry.midway = 0
-                    _take(lane, v.x, state.x[i])
+                    take(lane, LANES, v.x, state.x[i])
                     v.inside[lane] = 0
                 else:
                     carry.elapsed += v.h[lane]
         if budget <= 0:
             for lane in range(LANES):
                 if v.run[lane] >= 0:
-                    _take(lane, v.x, state.x[v.run[lane]])
+                    take(lane, LANES, v.x, state.x[v.run[lane]])
             return
 
 
@@ -356,26 +353,5 @@ def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, stat
     room = make_room(states, problem.outputs, channels)
     v = _make_lanes(code, states, problem.modes.shape[0], channels, batch.p.shape[1])
     for lane in range(LANES):
-        _put(lane, problem.modes, v.modes)
+        put(lane, LANES, problem.modes, v.modes)
     _run(v, room, fits, problem, source, batch, watch, state, samples, status, most, budget)
-
-
-@kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs in lanes")
-def rows_in_lanes(equation, modes, p, states, forces, out):
-    """Evaluate one of the equations in lanes for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``."""
-    of_lanes = (
-        np.empty(LANES * modes.shape[0]), np.empty(LANES * p.shape[0]), np.empty(LANES * states.shape[1]),
-        np.empty(LANES * forces.shape[1]), np.empty(LANES * out.shape[1]),
-    )  # fmt: skip
-    for lane in range(LANES):
-        _put(lane, modes, of_lanes[0])
-        _put(lane, p, of_lanes[1])
-    for i in range(0, states.shape[0], LANES):
-        # the lanes after the last row repeat it
-        last = states.shape[0] - 1
-        for lane in range(LANES):
-            _put(lane, states[min(i + lane, last)], of_lanes[2])
-            _put(lane, forces[min(i + lane, last)], of_lanes[3])
-        evaluate(equation, 0.0, of_lanes[2], of_lanes[0], of_lanes[3], of_lanes[1], of_lanes[4])
-        for lane in range(min(LANES, states.shape[0] - i)):
-            _take(lane, of_lanes[4], out[i + lane])

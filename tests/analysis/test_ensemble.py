@@ -155,6 +155,59 @@ def test_lanes_pause_and_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     assert same(whole, simulate_many(SPRINGS, Inputs(torque=3.0), **options))
 
 
+def test_sets_made_by_arrays_are_the_sets_one_by_one() -> None:
+    stiffness, torque = np.linspace(300.0, 900.0, 70), np.linspace(-1.0, 4.0, 70)
+    options: dict[str, Any] = {"initial": InitialState(crank_speed=5.0), "stop_time": 0.2, "step": 0.01}
+    values = {"slider.stiffness": stiffness, "slider_damping": stiffness / 50.0, "torque": torque}
+    varied = simulate_many(TABLE_3_1, Inputs(force=0.5), vary=values, **options)
+    sets = [replace(TABLE_3_1, slider_stiffness=k, slider_damping=k / 50.0) for k in stiffness.tolist()]
+    listed = simulate_many(sets, [Inputs(force=0.5, torque=value) for value in torque.tolist()], **options)
+    assert same(varied, listed)
+    assert list(varied.parameters) == sets
+    assert np.array_equal(varied[7].values, listed[7].values)
+    again = simulate_many(TABLE_3_1, Inputs(force=0.5), vary=values, n_jobs=2, batch=16, **options)
+    assert same(again, listed)
+
+
+def test_texts_and_names_of_the_contract_vary_too(tmp_path: Path) -> None:
+    values = {"slider.stiffness": ["1 kN/m", 1500.0], "drive.speed": ["420 rpm", "430 rpm"]}
+    varied = simulate_many("table-3.1", vary=values, folder=tmp_path, **OPTIONS)
+    speeds = [Inputs(speed="420 rpm"), Inputs(speed="430 rpm")]
+    sets = [replace(TABLE_3_1, slider_stiffness=k) for k in (1000.0, 1500.0)]
+    assert same(varied, simulate_many(sets, speeds, initial=SETS["table-3.1"].initial, **OPTIONS))
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "said"),
+    [
+        ({"slider.stiffness": [1.0, -2.0, 3.0]}, ParameterError, "set 1 of 3: parameter slider.stiffness is -2.0"),
+        ({"slider.mass": [1.0, 1.0, 0.0], "rocker.mass": [1.0, 1.0, 0.0]}, ParameterError, "set 2 of 3"),
+        ({"crank.length": [0.1, nan]}, ParameterError, "set 1 of 2: parameter crank.length is nan"),
+        ({"crank.inertia": [1.0, 0.0]}, ParameterError, "set 1 of 2: parameter crank.inertia is 0.0"),
+        ({"assembly.branch": [1, 2]}, ParameterError, "set 1 of 2: parameter assembly.branch is 2"),
+        ({"slider.stifness": [1.0]}, InputError, "did you mean slider.stiffness"),
+        ({"slider.stiffness": [1.0], "torque": [1.0, 2.0]}, InputError, "1 of slider.stiffness, 2 of torque"),
+        ({"slider.stiffness": 3.0}, InputError, "it must be a list or an array of numbers"),
+        ({"slider.stiffness": [True]}, InputError, "it must be a list or an array of numbers"),
+        ({"torque": [0.0, nan]}, InputError, "set 1 of 2: torque is nan"),
+        ({}, InputError, "vary has nothing"),
+    ],
+)
+def test_what_varies_is_checked_and_names_the_set(values: dict[str, Any], error: type, said: str) -> None:
+    heavy = replace(TABLE_3_1, crank_mass=1.0, crank_cog_distance=0.1, crank_inertia=1.0)
+    with pytest.raises(error, match=said):
+        simulate_many(heavy, vary=values, **OPTIONS)
+
+
+def test_one_set_without_what_varies_is_refused() -> None:
+    with pytest.raises(InputError, match="it must be a list, or vary must say what differs"):
+        simulate_many(TABLE_3_1, **OPTIONS)
+    with pytest.raises(InputError, match="one set of parameters"):
+        simulate_many([TABLE_3_1], vary={"torque": [1.0]}, **OPTIONS)
+    with pytest.raises(InputError, match="one object of inputs"):
+        simulate_many(TABLE_3_1, [Inputs()], vary={"torque": [1.0]}, **OPTIONS)
+
+
 def slipping() -> list[FiveBarParameters]:
     """The second runs into the limit of assembly after half a second, the others do not."""
     return [replace(TABLE_3_1, slider_stiffness=k, slider_damping=10.0) for k in (1000.0, 0.0, 2000.0)]
