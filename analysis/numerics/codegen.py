@@ -68,6 +68,9 @@ class MachineCode:
     lanes : int
         How many arguments each call takes at once: with more than one, arrays have so many numbers for each of theirs, and t
         is the same for all.
+    rows : sequence of str
+        Names of the functions whose outputs are written one lane after the other, which readers of single lanes need: to
+        gather them takes some processors longer than to compute them.
 
     Attributes
     ----------
@@ -82,17 +85,19 @@ class MachineCode:
         If an operation has no counterpart here, or an output is not dense.
     """
 
-    def __init__(self, functions: Sequence[Any], lanes: int = 1) -> None:
+    def __init__(self, functions: Sequence[Any], lanes: int = 1, rows: Sequence[str] = ()) -> None:
         _prepare()
         triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
         features = binding.get_host_cpu_features().flatten()
-        digest = hashlib.sha256(f"{llvmlite.__version__} {triple} {cpu} {features} {lanes}".encode() + _own_source())
+        digest = hashlib.sha256(
+            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows}".encode() + _own_source()
+        )
         digest.update(" ".join(function.serialize() for function in functions).encode())
         self.fingerprint = digest.hexdigest()
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, triple, machine))
+        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, rows, triple, machine))
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -100,12 +105,12 @@ class MachineCode:
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
-def _compile(functions: Sequence[Any], lanes: int, triple: str, machine: Any) -> bytes:
+def _compile(functions: Sequence[Any], lanes: int, rows: Sequence[str], triple: str, machine: Any) -> bytes:
     """Return an object file with functions."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
-        _Writer(module, function, lanes).write()
+        _Writer(module, function, lanes, function.name() in rows).write()
     parsed = binding.parse_assembly(str(module))
     passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(parsed, passes)
@@ -176,10 +181,11 @@ def _prepare() -> None:
 class _Writer:
     """Translates one function of CasADi into a module of LLVM."""
 
-    def __init__(self, module: ir.Module, function: Any, lanes: int) -> None:
+    def __init__(self, module: ir.Module, function: Any, lanes: int, in_rows: bool) -> None:
         self.module = module
         self.source = function
         self.lanes = lanes
+        self.in_rows = in_rows and lanes > 1
         self.kind = vectors.vector(lanes)
         self.reciprocals: dict[int, tuple[Any, Any]] = {}
         target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
@@ -217,7 +223,7 @@ class _Writer:
                 values[outs[0]] = self._time() if which == 0 else build.load(self._place(which, place), align=8)
             elif code == casadi.OP_OUTPUT:
                 which, place = outs
-                build.store(values[ins[0]], self._place(5, int(first[which]) + place), align=8)
+                self._store(values[ins[0]], int(first[which]) + place, int(first[-1]))
             elif code == casadi.OP_CONST:
                 values[outs[0]] = self._constant(f.instruction_constant(k))
             else:
@@ -228,6 +234,15 @@ class _Writer:
         """Return a pointer to a number of an argument, or to that of each lane."""
         pointer = self.build.gep(self.arguments[which], [_index(place * self.lanes)])
         return self.build.bitcast(pointer, self.kind.as_pointer())
+
+    def _store(self, value: Any, place: int, count: int) -> None:
+        """Write one of so many outputs."""
+        if not self.in_rows:
+            self.build.store(value, self._place(5, place), align=8)
+            return
+        for lane in range(self.lanes):
+            target = self.build.gep(self.arguments[5], [_index(count * lane + place)])
+            self.build.store(self.build.extract_element(value, _index(lane)), target)
 
     def _time(self) -> Any:
         if self.lanes == 1:

@@ -429,7 +429,7 @@ def take(lane, lanes, many, values):
 def rows(equation, lanes, modes, p, states, forces, out):
     """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``.
 
-    The equation takes so many rows at once as it has ``lanes``.
+    The equation takes so many rows at once as it has ``lanes``, and writes them one after the other.
     """
     modes_of, p_of = np.empty(lanes * modes.shape[0]), np.empty(lanes * p.shape[0])
     x, u = np.empty(lanes * states.shape[1]), np.empty(lanes * forces.shape[1])
@@ -444,6 +444,9 @@ def rows(equation, lanes, modes, p, states, forces, out):
             row = first + min(lane, count - 1)
             put(lane, lanes, states[row], x)
             put(lane, lanes, forces[row], u)
-        evaluate(equation, 0.0, x, modes_of, u, p_of, y)
-        for lane in range(count):
-            take(lane, lanes, y, out[first + lane])
+        if count == lanes:
+            evaluate(equation, 0.0, x, modes_of, u, p_of, out[first:])
+        else:
+            evaluate(equation, 0.0, x, modes_of, u, p_of, y)
+            for lane in range(count):
+                copy(y[lane * out.shape[1] :], out[first + lane])

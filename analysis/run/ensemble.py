@@ -202,8 +202,8 @@ def simulate_many(
     Other Parameters
     ----------------
     batch : int, optional
-        Runs that are prepared and solved together: by default a sixteenth of all, between 64 and 256, fewer where they have
-        many samples.
+        Runs that are prepared and solved together: by default a quarter of all up to 128, or a sixteenth up to 256, at least
+        16, and fewer where they have many samples.
     start_time, max_steps, progress
         As the others, those of `simulate`.
 
@@ -254,9 +254,9 @@ def simulate_many(
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
     compiled_source(encoded)
+    usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
     # whole vectors
-    usual = min(256, max(64, len(parameters) // 16), _SAMPLES_OF_BATCH // len(settings.times))
-    batch = batch or max(16, usual // 8 * 8)
+    batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)
     code = "" if where is None else _code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
         Task(

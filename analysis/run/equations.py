@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 #: The functions that a run needs, by their numbers among `Machine.addresses`.
 DERIVATIVE, OUTPUTS, CLEARANCE, JUMP = range(4)
 _NAMES = ("derivative", "outputs", "clearance", "jump")
+_IN_ROWS = ("outputs", "chosen")
 
 _ALLOWED = (
     "equations must be arithmetic without branches, of functions in the mechanism's modules, imported by name, and of "
@@ -171,12 +172,14 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
 
 
 def _compiled(traces: Traced, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
-    """Return machine code of expressions, by their names, in the symbols of traced equations."""
+    """Return machine code of expressions, by their names, in the symbols of traced equations; outputs go in rows."""
     from ..numerics.codegen import MachineCode
 
     casadi = symbolic.library()
     arguments = [casadi.SX.sym("t"), *traces.symbols]
-    return MachineCode([casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()], lanes)
+    return MachineCode(
+        [casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()], lanes, _IN_ROWS
+    )
 
 
 class Machine:

@@ -24,7 +24,7 @@ from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
-from ..numerics.codegen import MAKING, MachineCode, evaluate, inner, kernel, part
+from ..numerics.codegen import MAKING, MachineCode, copy, evaluate, inner, kernel, part
 from ..numerics.lanes import width
 from ..numerics.references import refer
 from ..numerics.symbolic import library
@@ -55,8 +55,8 @@ LEAST = 1e-300
 class Lanes(NamedTuple):
     """Work arrays: addresses of the functions in lanes; of each lane its run or -1, whether its run is in an interval whose
     first rates are known, whether the step is the last of its interval, what became of it; and in lanes the state, its end and
-    that inside the step, modes, channels, constants, scales, step size, fraction of the step, stages, interpolant, clearance.
-    After the state at the end of the step comes the error."""
+    that at a stage, modes, channels, constants, scales, step size, fraction of the step, stages, interpolant, clearance; and a
+    row for each lane, the state at the fraction. After the state at the end of the step comes the error."""
 
     code: NDArray[np.int64]
     run: NDArray[np.int64]
@@ -75,6 +75,7 @@ class Lanes(NamedTuple):
     k: NDArray[np.float64]
     f: NDArray[np.float64]
     clearance: NDArray[np.float64]
+    between: NDArray[np.float64]
 
 
 # What became of a step
@@ -118,7 +119,7 @@ def _code_of_steps(n: int) -> NDArray[np.int64]:
     functions.append(casadi.Function("interpolant", [t, x, k, h, y], [casadi.vertcat(*interpolant)], {"cse": True}))
     functions.append(casadi.Function("interpolate", [t, x, f, h, scale], [x + between]))
     with MAKING:
-        addresses = MachineCode(functions, LANES).addresses
+        addresses = MachineCode(functions, LANES, ("interpolate",)).addresses
     return np.array([addresses[function.name()] for function in functions], dtype=np.int64)
 
 
@@ -130,7 +131,7 @@ def _make_lanes(code, states, modes, channels, constants):
         code, np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
         np.zeros(n), np.zeros(n + LANES), np.zeros(n), np.zeros(modes * LANES), np.zeros(channels * LANES),
         np.zeros(constants * LANES), np.zeros(n), np.zeros(LANES), np.zeros(LANES), np.zeros((16, n)), np.zeros((7, n)),
-        np.zeros(LANES),
+        np.zeros(LANES), np.zeros((LANES, states)),
     )  # fmt: skip
 
 
@@ -179,13 +180,13 @@ def _sample(samples, state, v):
                     v.outcome[lane] = _ACCEPTED
         if not more:
             return
-        evaluate(v.code[_INTERPOLATE], 0.0, v.x, v.f, v.fraction, v.scale, v.z)
+        evaluate(v.code[_INTERPOLATE], 0.0, v.x, v.f, v.fraction, v.scale, v.between)
         for lane in range(LANES):
             if v.outcome[lane] == _SAMPLED:
                 i = v.run[lane]
                 carry = state.carries[i]
-                take(lane, LANES, v.z, samples.states[i, carry.sample])
-                take(lane, LANES, v.u, samples.forces[i, carry.sample])
+                copy(v.between[lane], samples.states[i, carry.sample])
+                copy(state.u[i], samples.forces[i, carry.sample])
                 carry.sample += 1
 
 
