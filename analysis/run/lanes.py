@@ -24,12 +24,13 @@ from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
-from ..numerics.codegen import MAKING, MachineCode, copy, evaluate, inner, kernel, part
+from ..numerics.codegen import MAKING, MachineCode, copy, evaluate, inline, inner, kernel, part
 from ..numerics.lanes import width
 from ..numerics.references import refer
 from ..numerics.symbolic import library
 from .compiled import (
     BATCH,
+    Batch,
     begin_interval,
     choose_first,
     make_room,
@@ -42,8 +43,8 @@ from .compiled import (
 )
 from .equations import CLEARANCE, DERIVATIVE, JUMP, machine
 from .locating import end_at, locate_events
-from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH
-from .sources import ADDRESSES, SOURCE
+from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
+from .sources import ADDRESSES, SOURCE, Source
 from .stepping import STAGES, following, shorter
 
 #: Runs at once.
@@ -53,14 +54,14 @@ LEAST = 1e-300
 
 
 class Lanes(NamedTuple):
-    """Work arrays: addresses of the functions in lanes; of each lane its run or -1, whether its run is in an interval whose
-    first rates are known, whether the step is the last of its interval, what became of it; and in lanes the state, its end and
-    that at a stage, modes, channels, constants, scales, step size, fraction of the step, stages, interpolant, clearance; and a
-    row for each lane, the state at the fraction. After the state at the end of the step comes the error."""
+    """Work arrays: addresses of the functions in lanes; of each lane its run or -1, where that is, whether the step is the last
+    of its interval, what became of it; and in lanes the state, its end and that at a stage, modes, channels, constants, scales,
+    step size, fraction of the step, stages, interpolant, clearance; and a row for each lane, the state at the fraction. After
+    the state at the end of the step comes the error."""
 
     code: NDArray[np.int64]
     run: NDArray[np.int64]
-    inside: NDArray[np.int64]
+    phase: NDArray[np.int64]
     last: NDArray[np.int64]
     outcome: NDArray[np.int64]
     x: NDArray[np.float64]
@@ -78,6 +79,8 @@ class Lanes(NamedTuple):
     between: NDArray[np.float64]
 
 
+# Where a run is: between intervals, inside one whose first rates are not known, or inside
+_BETWEEN, _ENTERED, _INSIDE = range(3)
 # What became of a step
 _IDLE, _REJECTED, _ACCEPTED, _SAMPLED = range(4)
 # Places of addresses, after the equations: stage s of a step at _STAGE + s
@@ -217,128 +220,185 @@ def _judge(lane, error, carry, samples, v):
     return _SAMPLED if inside else _ACCEPTED
 
 
+class Work(NamedTuple):
+    """What the lanes work on: the arguments of `run_in_lanes`, and room for the functions of single runs."""
+
+    fits: NDArray[np.bool_]
+    problem: Problem
+    source: Source
+    batch: Batch
+    watch: Watch
+    state: State
+    samples: Samples
+    status: NDArray[np.int64]
+    room: Room
+
+
+@inline
+def _motion(i, w):
+    """Return a reference to a run."""
+    return motion_of(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
+
+
 @inner
-def _run(arrays, room, fits, problem, source, batch, watch, state, samples, status, most, budget):
-    """Do the work of `run_in_lanes`, which holds the arrays that are referred to here."""
-    v = refer(arrays)
-    states = state.x.shape[1]
-    least = LEAST_STEP * (problem.end - samples.times[0])
-    first = 0
-    while True:
-        busy = fresh = False
-        for lane in range(LANES):
-            v.outcome[lane] = _IDLE
-            v.last[lane] = 0
-            while True:
-                i = v.run[lane]
-                if i < 0:
-                    while first < status.shape[0] and not (
-                        fits[first] and status[first] == RUNNING and state.carries[first].steps < most
-                    ):
-                        first += 1
-                    if first == status.shape[0]:
-                        break
-                    i = first
-                    first += 1
-                    v.run[lane] = i
-                    v.inside[lane] = 0
-                    put(lane, LANES, batch.p[i], v.p)
-                    put(lane, LANES, batch.scales[i], v.scale)
-                carry = state.carries[i]
-                if v.inside[lane] == 0:
-                    if carry.midway == 0:
-                        motion = motion_of(i, problem, source, batch, watch, samples, room, state)
-                        status[i] = begin_interval(motion)
-                        if status[i] != RUNNING:
-                            v.run[lane] = -1
-                            continue
-                        carry.midway = 1
-                    put(lane, LANES, state.x[i], v.x)
-                    put(lane, LANES, state.u[i], v.u)
-                    v.inside[lane] = 2
-                    fresh = True
-                if carry.steps >= most:
-                    take(lane, LANES, v.x, state.x[i])
-                    v.run[lane] = -1
-                    continue
-                busy = True
-                break
-        if not busy:
+def _take_run(lane, first, most, v, w):
+    """Give a lane the first run from a number on that has something to do; return the number after it."""
+    i, end = first, w.status.shape[0]
+    while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
+        i += 1
+    if i == end:
+        return end
+    v.run[lane] = i
+    v.phase[lane] = _BETWEEN
+    put(lane, LANES, w.batch.p[i], v.p)
+    put(lane, LANES, w.batch.scales[i], v.scale)
+    return i + 1
+
+
+@inner
+def _enter(lane, v, w):
+    """Begin an interval, or go on inside one, unless the run ends there."""
+    i = v.run[lane]
+    carry = w.state.carries[i]
+    if carry.midway == 0:
+        w.status[i] = begin_interval(_motion(i, w))
+        if w.status[i] != RUNNING:
+            v.run[lane] = -1
             return
-        if fresh:
-            _equation(DERIVATIVE, v.x, v.z, v)
-        for lane in range(LANES):
-            i = v.run[lane]
-            h = 0.0
-            if i >= 0:
-                carry = state.carries[i]
-                if v.inside[lane] == 2:
-                    v.inside[lane] = 1
-                    take(lane, LANES, v.z, room.k[0])
-                    put(lane, LANES, room.k[0], v.k[0])
-                    choose_first(motion_of(i, problem, source, batch, watch, samples, room, state))
-                h, last = next_size(carry)
-                v.last[lane] = last
-                carry.steps += 1
-                budget -= 1
-            v.h[lane] = h
+        carry.midway = 1
+    put(lane, LANES, w.state.x[i], v.x)
+    put(lane, LANES, w.state.u[i], v.u)
+    v.phase[lane] = _ENTERED
+
+
+@inner
+def _fill(first, most, v, w):
+    """Bring each lane to the beginning of a step; return the number of lanes that have one, and of the next run."""
+    busy = 0
+    for lane in range(LANES):
+        v.outcome[lane] = _IDLE
+        while True:
+            if v.run[lane] < 0:
+                first = _take_run(lane, first, most, v, w)
+                if v.run[lane] < 0:
+                    break
+            if v.phase[lane] == _BETWEEN:
+                _enter(lane, v, w)
+            if v.run[lane] >= 0:
+                if w.state.carries[v.run[lane]].steps < most:
+                    busy += 1
+                    break
+                take(lane, LANES, v.x, w.state.x[v.run[lane]])
+                v.run[lane] = -1
+    return busy, first
+
+
+@inner
+def _choose_sizes(v, w):
+    """Choose the size of each lane's step, with the first rates of the intervals that begin."""
+    fresh = False
+    for lane in range(LANES):
+        fresh |= v.run[lane] >= 0 and v.phase[lane] == _ENTERED
+    if fresh:
+        _equation(DERIVATIVE, v.x, v.z, v)
+    for lane in range(LANES):
+        i = v.run[lane]
+        v.h[lane] = 0.0
+        if i >= 0:
+            carry = w.state.carries[i]
+            if v.phase[lane] == _ENTERED:
+                v.phase[lane] = _INSIDE
+                take(lane, LANES, v.z, w.room.k[0])
+                put(lane, LANES, w.room.k[0], v.k[0])
+                choose_first(_motion(i, w))
+            v.h[lane], v.last[lane] = next_size(carry)
+            carry.steps += 1
+
+
+@inner
+def _end_at_limit(lane, v, w):
+    """End a run at the limit of assembly inside its step."""
+    i, h = v.run[lane], v.h[lane]
+    take(lane, LANES, v.x, w.state.x[i])
+    take(lane, LANES, v.y, w.room.y)
+    for s in range(STAGES + 1):
+        take(lane, LANES, v.k[s], w.room.k[s])
+    motion = _motion(i, w)
+    what, cut = locate_events(v.clearance[lane], h, motion)
+    sample_step(motion.carry.begin + (motion.carry.elapsed + cut * h), h, motion)
+    w.status[i] = end_at(what, cut, h, motion)
+    v.run[lane] = -1
+    v.outcome[lane] = _IDLE
+
+
+@inner
+def _decide(lane, least, v, w):
+    """Decide what becomes of the step of a lane."""
+    i, h, states = v.run[lane], v.h[lane], w.state.x.shape[1]
+    carry = w.state.carries[i]
+    error = v.y[LANES * states + lane] / w.problem.tolerance
+    v.outcome[lane] = _judge(lane, error, carry, w.samples, v)
+    if v.outcome[lane] != _REJECTED:
+        carry.step = following(h, carry.step, error)
+        if v.clearance[lane] < LIMIT_SINE:
+            _end_at_limit(lane, v, w)
+        return
+    carry.rejected += 1
+    carry.step = shorter(h, error)
+    if not carry.step >= least:
+        take(lane, LANES, v.x, w.state.x[i])
+        w.status[i] = refused(h, _motion(i, w))
+        v.run[lane] = -1
+
+
+@inner
+def _move_on(lane, v, w):
+    """Go on from the end of an accepted step."""
+    i = v.run[lane]
+    carry = w.state.carries[i]
+    for j in range(lane, v.x.shape[0], LANES):
+        v.x[j] = v.y[j]
+        v.k[0, j] = v.k[STAGES, j]
+    if v.last[lane]:
+        carry.begin = carry.stop
+        carry.elapsed = 0.0
+        carry.interval += 1
+        carry.midway = 0
+        take(lane, LANES, v.x, w.state.x[i])
+        v.phase[lane] = _BETWEEN
+    else:
+        carry.elapsed += v.h[lane]
+
+
+@inner
+def _run(lanes, work, most, budget):
+    """Do the work of `run_in_lanes`, which holds the arrays that are referred to here."""
+    v, w = refer(lanes), refer(work)
+    least = LEAST_STEP * (w.problem.end - w.samples.times[0])
+    first = 0
+    while budget > 0:
+        busy, first = _fill(first, most, v, w)
+        if busy == 0:
+            return
+        budget -= busy
+        _choose_sizes(v, w)
         _attempt(v)
         _equation(CLEARANCE, v.y, v.clearance, v)
         _equation(DERIVATIVE, v.y, v.k[STAGES], v)
         looking = False
         for lane in range(LANES):
-            i = v.run[lane]
-            if i < 0:
-                continue
-            carry, h = state.carries[i], v.h[lane]
-            error = v.y[LANES * states + lane] / problem.tolerance
-            v.outcome[lane] = _judge(lane, error, carry, samples, v)
-            if v.outcome[lane] == _REJECTED:
-                carry.rejected += 1
-                carry.step = shorter(h, error)
-                if not carry.step >= least:
-                    take(lane, LANES, v.x, state.x[i])
-                    motion = motion_of(i, problem, source, batch, watch, samples, room, state)
-                    status[i] = refused(h, motion)
-                    v.run[lane] = -1
-                continue
-            carry.step = following(h, carry.step, error)
-            if v.clearance[lane] < LIMIT_SINE:
-                take(lane, LANES, v.x, state.x[i])
-                take(lane, LANES, v.y, room.y)
-                for s in range(STAGES + 1):
-                    take(lane, LANES, v.k[s], room.k[s])
-                motion = motion_of(i, problem, source, batch, watch, samples, room, state)
-                what, cut = locate_events(v.clearance[lane], h, motion)
-                sample_step(carry.begin + (carry.elapsed + cut * h), h, motion)
-                status[i] = end_at(what, cut, h, motion)
-                v.run[lane] = -1
-                v.outcome[lane] = _IDLE
-            looking |= v.outcome[lane] == _SAMPLED
+            if v.run[lane] >= 0:
+                _decide(lane, least, v, w)
+                looking |= v.outcome[lane] == _SAMPLED
         if looking:
             _make_interpolants(v)
-            _sample(samples, state, v)
+            _sample(w.samples, w.state, v)
         for lane in range(LANES):
             if v.outcome[lane] == _ACCEPTED:
-                i = v.run[lane]
-                carry = state.carries[i]
-                for j in range(lane, v.x.shape[0], LANES):
-                    v.x[j] = v.y[j]
-                    v.k[0, j] = v.k[STAGES, j]
-                if v.last[lane]:
-                    carry.begin = carry.stop
-                    carry.elapsed = 0.0
-                    carry.interval += 1
-                    carry.midway = 0
-                    take(lane, LANES, v.x, state.x[i])
-                    v.inside[lane] = 0
-                else:
-                    carry.elapsed += v.h[lane]
-        if budget <= 0:
-            for lane in range(LANES):
-                if v.run[lane] >= 0:
-                    take(lane, LANES, v.x, state.x[v.run[lane]])
-            return
+                _move_on(lane, v, w)
+    for lane in range(LANES):
+        if v.run[lane] >= 0:
+            take(lane, LANES, v.x, w.state.x[v.run[lane]])
 
 
 @kernel(
@@ -355,4 +415,4 @@ def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, stat
     v = _make_lanes(code, states, problem.modes.shape[0], channels, batch.p.shape[1])
     for lane in range(LANES):
         put(lane, LANES, problem.modes, v.modes)
-    _run(v, room, fits, problem, source, batch, watch, state, samples, status, most, budget)
+    _run(v, Work(fits, problem, source, batch, watch, state, samples, status, room), most, budget)
