@@ -22,7 +22,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from analysis import Inputs, simulate, simulate_many
+from analysis import Ensemble, Inputs, simulate, simulate_many
 from analysis.run import batches, compiled, lanes
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -92,6 +92,7 @@ def report_memory(count: int) -> None:
         simulate_many(TABLE_3_1, Inputs(speed=30.0), vary={"slider.stiffness": [1.0]}, **options)
         before, begun = peak(), process_time()
         runs = simulate_many(TABLE_3_1, Inputs(speed=30.0), vary=values, folder=folder, **options)
+        assert runs.values is not None
         print(
             f"{len(runs)} runs, {runs.values.nbytes / 2.0**20:.0f} MiB of results: peak {peak():.0f} MiB, {before:.0f} MiB "
             f"before them; {1e6 * (process_time() - begun) / count:.0f} us a run"
@@ -118,12 +119,12 @@ def main() -> None:
 
             def together(
                 n_jobs: int | None = None, drive: str = drive, values: object = values, samples: dict = samples
-            ) -> object:
+            ) -> Ensemble:
                 return simulate_many(
                     TABLE_3_1, vary={"slider.stiffness": stiffness, drive: values}, n_jobs=n_jobs, **samples
                 )
 
-            def apart(together: Callable[[], object] = together) -> None:
+            def apart(together: Callable[[], Ensemble] = together) -> None:
                 with without_lanes():
                     together()
 
@@ -135,7 +136,6 @@ def main() -> None:
                 for i in some:
                     simulate(springs[i], Inputs(**{drive: values[i]}), **samples)
 
-            springs = together().parameters
             single, other, ours, two = measured([alone, apart, together, lambda together=together: together(2)])
             own = single[0] / len(some), other[0] / n, ours[0] / n
             table.add_row(

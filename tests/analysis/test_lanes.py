@@ -29,12 +29,13 @@ def apply(address: Any, a: Any, b: Any, out: Any) -> None:
         evaluate(address, 0.0, a[i], b[i], b[i], b[i], out[i])
 
 
-def values(name: str, *arguments: np.ndarray) -> np.ndarray:
-    """The function of arrays, computed in lanes."""
+def values(name: str, *arguments: np.ndarray, width: int = 0) -> np.ndarray:
+    """The function of arrays, computed in lanes, as many as the processor has or another number."""
+    width = width or lanes.width()
     symbols = [casadi.SX.sym("t"), *(casadi.SX.sym(letter) for letter in "abcd")]
     function = getattr(casadi, name, lambda x, y: x**y)(*symbols[1 : 1 + len(arguments)])
-    code = MachineCode([casadi.Function("f", symbols, [function])], lanes.width())
-    rows = [np.ascontiguousarray(a, float).reshape(-1, lanes.width()) for a in (arguments[0], arguments[-1])]
+    code = MachineCode([casadi.Function("f", symbols, [function])], width)
+    rows = [np.ascontiguousarray(a, float).reshape(-1, width) for a in (arguments[0], arguments[-1])]
     out = np.empty_like(rows[0])
     apply(code.addresses["f"], *rows, out)
     return out.ravel()
@@ -114,7 +115,7 @@ def test_angles_on_the_axes(y: float, x: float) -> None:
 
 
 @pytest.mark.parametrize("name", [*ELEMENTARY, "pow"])
-def test_a_lane_does_not_depend_on_its_neighbours(name: str) -> None:
+def test_a_lane_depends_neither_on_its_neighbours_nor_on_their_number(name: str) -> None:
     g = np.random.default_rng(5)
     arguments = [abs(g.normal(size=8 * lanes.width())) for _ in range(1 + (name in ("atan2", "hypot", "pow")))]
     order = g.permutation(len(arguments[0]))
@@ -122,3 +123,4 @@ def test_a_lane_does_not_depend_on_its_neighbours(name: str) -> None:
     other = g.random(len(order)) < 0.2
     again = values(name, *(np.where(other, 1e12, a[order]) for a in arguments))
     assert np.array_equal(again[~other], once[order][~other], equal_nan=True)
+    assert np.array_equal(values(name, *arguments, width=2), once, equal_nan=True)
