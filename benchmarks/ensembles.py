@@ -1,116 +1,151 @@
-"""Throughput of `simulate_many` over short runs, as ratios within this one process.
+"""Throughput of `simulate_many`, as ratios within this one process.
 
-    python -m benchmarks.ensembles --runs 3000
-    python -m benchmarks.ensembles --runs 100000 --disk
+    python -m benchmarks.ensembles
+    python -m benchmarks.ensembles --runs 1000000 --disk
 
-Runs of 0.1 s of the five-bar slider of Table 3.1 with varying springs, at commanded speeds and under torques. Times and ratios
-are of the processor, so that they hold on a busy machine; the speed-up of two threads by the clock needs two free cores.
+Runs of the five-bar slider of Table 3.1 with springs of an array, at commanded speeds and under torques: three turns at samples
+of 1 ms, and 0.1 s. Beside them the same runs alone, and the same ensemble without lanes. Times and ratios are of the
+processor, so that they hold on a busy machine; the speed-up of two threads by the clock needs two free cores.
 """
 
 from __future__ import annotations
 
 import argparse
 import resource
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from math import pi
 from tempfile import TemporaryDirectory
-from time import process_time
+from time import perf_counter, process_time
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from analysis import Inputs, simulate, simulate_many
-from analysis.run import compiled
-from benchmarks.accuracy import best_time
-from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import TABLE_3_1
+from analysis import Ensemble, Inputs, simulate, simulate_many
+from analysis.run import batches, compiled, lanes
+from linkwork.five_bar.published import SETS, TABLE_3_1
 
 REPEATS = 7
 #: Number of runs solved one by one.
-FEW = 300
-OPTIONS = {"stop_time": 0.1, "step": 1e-3}
+FEW = 20
+SPEED = SETS["table-3.1"].crank_speed
+LENGTHS = {"three turns": 6.0 * pi / SPEED, "0.1 s": 0.1}
 
 
-def best_of_each(runs: list[Callable[[], object]]) -> list[float]:
-    """Return the shortest time by the clock of each run (s), taken in turn, as other programs may use the machine."""
-    times = [[best_time(run, 1) for run in runs] for _ in range(REPEATS)]
-    return [min(column) for column in zip(*times)]
-
-
-def times_of(run: Callable[[], object]) -> tuple[float, float]:
-    """Return the CPU time of the shortest of several runs, and the part inside the compiled solver (s)."""
-    kernel, spent = compiled.run, []
-
-    def timed(*arguments: object) -> None:
-        begun = process_time()
-        kernel(*arguments)
-        spent.append(process_time() - begun)
-
-    times = []
-    compiled.run = timed
+@contextmanager
+def without_lanes() -> Iterator[None]:
+    """Solve all runs one after the other."""
+    fits = batches._fits
+    batches._fits = lambda batch, settings: np.zeros(len(batch.steady), dtype=bool)
     try:
-        for _ in range(REPEATS):
-            spent.clear()
-            whole = best_time(run, 1, process_time)
-            times.append((whole, sum(spent)))
+        yield
     finally:
-        compiled.run = kernel
-    return min(times)
+        batches._fits = fits
 
 
-def report_memory(springs: list[FiveBarParameters]) -> None:
+@contextmanager
+def kernels_timed(spent: list[float]) -> Iterator[None]:
+    """Note the CPU time (s) of each call of the compiled solvers."""
+    kernels = compiled.run, lanes.run_in_lanes
+
+    def timed(kernel: Callable[..., None]) -> Callable[..., None]:
+        def call(*arguments: object) -> None:
+            begun = process_time()
+            kernel(*arguments)
+            spent.append(process_time() - begun)
+
+        return call
+
+    compiled.run, lanes.run_in_lanes = map(timed, kernels)
+    try:
+        yield
+    finally:
+        compiled.run, lanes.run_in_lanes = kernels
+
+
+def measured(runs: list[Callable[[], object]]) -> list[tuple[float, float, float]]:
+    """Return for each the shortest CPU time, that within the compiled solver, and time by the clock (s), taken in turn."""
+    times = []
+    for _ in range(REPEATS + 1):
+        row = []
+        for run in runs:
+            spent: list[float] = []
+            with kernels_timed(spent):
+                begun, clock = process_time(), perf_counter()
+                run()
+                row.append((process_time() - begun, sum(spent), perf_counter() - clock))
+        times.append(row)
+    # the first compiles
+    return [tuple(map(min, zip(*column))) for column in zip(*times[1:])]
+
+
+def report_memory(count: int) -> None:
     """Print the peak memory of an ensemble that is kept in a folder, and of this process before it."""
 
     def peak() -> float:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
+    values = {"slider.stiffness": np.linspace(500.0, 1500.0, count)}
     with TemporaryDirectory(dir=".") as folder:
-        before = peak()
-        runs = simulate_many(springs, Inputs(speed=30.0), folder=folder, **OPTIONS)
-        size = (runs.states.nbytes + runs.forces.nbytes) / 2.0**20
-        print(f"{len(runs)} runs, {size:.0f} MiB of results: peak {peak():.0f} MiB, {before:.0f} MiB before them")
+        options = {"outputs": ["slider.position"], "stop_time": 0.1, "step": 0.01}
+        simulate_many(TABLE_3_1, Inputs(speed=30.0), vary={"slider.stiffness": [1.0]}, **options)
+        before, begun = peak(), process_time()
+        runs = simulate_many(TABLE_3_1, Inputs(speed=30.0), vary=values, folder=folder, **options)
+        assert runs.values is not None
+        print(
+            f"{len(runs)} runs, {runs.values.nbytes / 2.0**20:.0f} MiB of results: peak {peak():.0f} MiB, {before:.0f} MiB "
+            f"before them; {1e6 * (process_time() - begun) / count:.0f} us a run"
+        )
         del runs
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=3000, help="how many (default: %(default)s)")
+    parser.add_argument("--runs", type=int, default=400, help="how many (default: %(default)s)")
     parser.add_argument("--disk", action="store_true", help="instead the peak of memory of runs that are kept on disk")
     options = parser.parse_args()
     n = options.runs
-    # evenly over all, which differ in their cost
-    some = range(0, n, max(1, n // FEW))
-    springs = [replace(TABLE_3_1, slider_stiffness=500.0 + 1000.0 * i / n) for i in range(n)]
     if options.disk:
-        report_memory(springs)
+        report_memory(n)
         return
-    kinds = {
-        "commanded speed": [Inputs(speed=20.0 + 10.0 * i / n) for i in range(n)],
-        "torque": [Inputs(torque=10.0 * i / n) for i in range(n)],
-    }
-    columns = ("`simulate`", "a run", "of it compiled", "the rest", "times `simulate`", "two threads: CPU", "the clock")
-    table = Table("runs", *columns)
-    for name, inputs in kinds.items():
+    stiffness, some = 500.0 + 1000.0 * np.arange(n) / n, range(0, n, max(1, n // FEW))
+    drives = {"speed": 0.5 * SPEED * (1.0 + np.arange(n) / n), "torque": 10.0 * np.arange(n) / n}
+    columns = ("alone", "one by one", "in lanes", "of it compiled", "alone", "one by one", "compiled", "CPU", "clock")
+    table = Table(f"{n} runs", *columns, title="microseconds a run; ratios to lanes; two threads")
+    for length, stop_time in LENGTHS.items():
+        for drive, values in drives.items():
+            samples = {"stop_time": stop_time, "step": 1e-3}
 
-        def together(n_jobs: int | None = None, inputs: list[Inputs] = inputs) -> object:
-            return simulate_many(springs, inputs, n_jobs=n_jobs, **OPTIONS)
+            def together(
+                n_jobs: int | None = None, drive: str = drive, values: object = values, samples: dict = samples
+            ) -> Ensemble:
+                return simulate_many(
+                    TABLE_3_1, vary={"slider.stiffness": stiffness, drive: values}, n_jobs=n_jobs, **samples
+                )
 
-        def one_by_one(inputs: list[Inputs] = inputs) -> object:
-            return [simulate(springs[i], inputs[i], **OPTIONS) for i in some]
+            def apart(together: Callable[[], Ensemble] = together) -> None:
+                with without_lanes():
+                    together()
 
-        alone = best_time(one_by_one, REPEATS, process_time) / len(some)
-        cpu, inside = times_of(together)
-        of_two = best_time(lambda: together(2), REPEATS, process_time)
-        clock = best_of_each([lambda jobs=jobs: together(jobs) for jobs in (1, 2)])
-        table.add_row(
-            name,
-            f"{1e6 * alone:.0f} us",
-            *(f"{1e6 * time / n:.0f} us" for time in (cpu, inside, cpu - inside)),
-            f"{alone * n / cpu:.1f}",
-            f"{of_two / cpu:.2f}",
-            f"{clock[0] / clock[1]:.2f}",
-        )
-    Console(width=120).print(table)
+            springs = together().parameters
+
+            def alone(
+                drive: str = drive, values: np.ndarray = values, samples: dict = samples, springs: Sequence = springs
+            ) -> None:
+                for i in some:
+                    simulate(springs[i], Inputs(**{drive: values[i]}), **samples)
+
+            single, other, ours, two = measured([alone, apart, together, lambda together=together: together(2)])
+            own = single[0] / len(some), other[0] / n, ours[0] / n
+            table.add_row(
+                f"{length}, {drive}",
+                *(f"{1e6 * time:.0f}" for time in (*own, ours[1] / n)),
+                *(f"{ratio:.1f}" for ratio in (own[0] / own[2], own[1] / own[2], other[1] / ours[1])),
+                f"{two[0] / ours[0]:.2f}",
+                f"{ours[2] / two[2]:.2f}",
+            )
+    Console(width=140).print(table)
 
 
 if __name__ == "__main__":

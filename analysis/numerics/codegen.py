@@ -6,8 +6,9 @@ that it cannot be out of date. Every function has the form
 
     f(t, a, b, c, d, out)        t a float, the others arrays of floats
 
-so that a kernel, compiled once, works with the functions of any mechanism. Kernels are kept on disk in a folder whose name is
-a hash of all their sources.
+so that a kernel, compiled once, works with the functions of any mechanism. In lanes each number of an array is a vector of
+doubles, one of each lane, and the functions of `lanes` take the place of the C library's. Kernels are kept on disk in a folder
+whose name is a hash of all their sources.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from linkwork.errors import LinkworkError
 
+from . import lanes as vectors
 from . import linking
 from .cache import alone, code_folder, keep
 
@@ -45,7 +47,7 @@ VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
 CUBE = float64[:, :, ::1]
 
-_DOUBLE = ir.DoubleType()
+_DOUBLE = vectors.DOUBLE
 _ARGUMENTS = [_DOUBLE, *[_DOUBLE.as_pointer()] * 5]
 
 # Machine code of functions
@@ -63,6 +65,12 @@ class MachineCode:
     functions : sequence of casadi.Function
         Of SX, with the inputs (t, a, b, c, d) and dense outputs. The outputs follow one another in ``out``, matrices column
         by column.
+    lanes : int
+        How many arguments each call takes at once: with more than one, arrays have so many numbers for each of theirs, and t
+        is the same for all.
+    rows : sequence of str
+        Names of the functions whose outputs are written one lane after the other, which readers of single lanes need: to
+        gather them takes some processors longer than to compute them.
 
     Attributes
     ----------
@@ -77,17 +85,19 @@ class MachineCode:
         If an operation has no counterpart here, or an output is not dense.
     """
 
-    def __init__(self, functions: Sequence[Any]) -> None:
+    def __init__(self, functions: Sequence[Any], lanes: int = 1, rows: Sequence[str] = ()) -> None:
         _prepare()
         triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
         features = binding.get_host_cpu_features().flatten()
-        digest = hashlib.sha256(f"{llvmlite.__version__} {triple} {cpu} {features}".encode() + _own_source())
+        digest = hashlib.sha256(
+            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows}".encode() + _own_source()
+        )
         digest.update(" ".join(function.serialize() for function in functions).encode())
         self.fingerprint = digest.hexdigest()
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = _kept(self.fingerprint, lambda: _compile(functions, triple, machine))
+        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, rows, triple, machine))
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -95,12 +105,12 @@ class MachineCode:
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
-def _compile(functions: Sequence[Any], triple: str, machine: Any) -> bytes:
+def _compile(functions: Sequence[Any], lanes: int, rows: Sequence[str], triple: str, machine: Any) -> bytes:
     """Return an object file with functions."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
-        _Writer(module, function).write()
+        _Writer(module, function, lanes, function.name() in rows).write()
     parsed = binding.parse_assembly(str(module))
     passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(parsed, passes)
@@ -110,7 +120,7 @@ def _compile(functions: Sequence[Any], triple: str, machine: Any) -> bytes:
 
 @cache
 def _own_source() -> bytes:
-    return Path(__file__).read_bytes()
+    return Path(__file__).read_bytes() + Path(vectors.__file__).read_bytes()
 
 
 def _kept(key: str, make: Callable[[], bytes]) -> bytes:
@@ -142,8 +152,10 @@ _FUNCTIONS = {
     "OP_POW": "pow",
     "OP_CONSTPOW": "pow",
     "OP_HYPOT": "hypot",
+    "OP_SQRT": "sqrt",
+    "OP_FABS": "fabs",
 }
-_INTRINSICS = {"OP_SQRT": "llvm.sqrt.f64", "OP_FABS": "llvm.fabs.f64"}
+_INTRINSICS = {"sqrt": "llvm.sqrt.f64", "fabs": "llvm.fabs.f64"}
 
 
 @cache
@@ -169,9 +181,13 @@ def _prepare() -> None:
 class _Writer:
     """Translates one function of CasADi into a module of LLVM."""
 
-    def __init__(self, module: ir.Module, function: Any) -> None:
+    def __init__(self, module: ir.Module, function: Any, lanes: int, in_rows: bool) -> None:
         self.module = module
         self.source = function
+        self.lanes = lanes
+        self.in_rows = in_rows and lanes > 1
+        self.kind = vectors.vector(lanes)
+        self.reciprocals: dict[int, tuple[Any, Any]] = {}
         target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
         for argument in target.args[1:]:
             argument.add_attribute("noalias")
@@ -181,13 +197,14 @@ class _Writer:
             "OP_ADD": build.fadd,
             "OP_SUB": build.fsub,
             "OP_MUL": build.fmul,
-            "OP_DIV": build.fdiv,
+            "OP_DIV": self._quotient,
             "OP_NEG": build.fneg,
             "OP_SQ": lambda a: build.fmul(a, a),
             "OP_TWICE": lambda a: build.fadd(a, a),
-            "OP_INV": lambda a: build.fdiv(ir.Constant(_DOUBLE, 1.0), a),
+            "OP_INV": self._reciprocal,
             "OP_ASSIGN": lambda a: a,
             "OP_SIGN": self._sign,
+            "OP_FMAX": lambda a, b: build.select(build.fcmp_ordered("<", a, b), b, a),
         }
 
     def write(self) -> None:
@@ -203,35 +220,70 @@ class _Writer:
             code, ins, outs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
             if code == casadi.OP_INPUT:
                 which, place = ins
-                argument = self.arguments[which]
-                values[outs[0]] = argument if which == 0 else build.load(build.gep(argument, [_index(place)]))
+                values[outs[0]] = self._time() if which == 0 else build.load(self._place(which, place), align=8)
             elif code == casadi.OP_OUTPUT:
                 which, place = outs
-                build.store(values[ins[0]], build.gep(self.arguments[5], [_index(int(first[which]) + place)]))
+                self._store(values[ins[0]], int(first[which]) + place, int(first[-1]))
             elif code == casadi.OP_CONST:
-                values[outs[0]] = ir.Constant(_DOUBLE, float(f.instruction_constant(k)))
+                values[outs[0]] = self._constant(f.instruction_constant(k))
             else:
                 values[outs[0]] = self._operation(code, [values[i] for i in ins])
         build.ret_void()
+
+    def _place(self, which: int, place: int) -> Any:
+        """Return a pointer to a number of an argument, or to that of each lane."""
+        pointer = self.build.gep(self.arguments[which], [_index(place * self.lanes)])
+        return self.build.bitcast(pointer, self.kind.as_pointer())
+
+    def _store(self, value: Any, place: int, count: int) -> None:
+        """Write one of so many outputs."""
+        if not self.in_rows:
+            self.build.store(value, self._place(5, place), align=8)
+            return
+        for lane in range(self.lanes):
+            target = self.build.gep(self.arguments[5], [_index(count * lane + place)])
+            self.build.store(self.build.extract_element(value, _index(lane)), target)
+
+    def _time(self) -> Any:
+        if self.lanes == 1:
+            return self.arguments[0]
+        value = ir.Constant(self.kind, ir.Undefined)
+        for lane in range(self.lanes):
+            value = self.build.insert_element(value, self.arguments[0], _index(lane))
+        return value
+
+    def _constant(self, value: float) -> Any:
+        return ir.Constant(self.kind, float(value) if self.lanes == 1 else [float(value)] * self.lanes)
 
     def _operation(self, code: int, operands: list[Any]) -> Any:
         operation = _operations().get(code, str(code))
         if operation in self.plain:
             return self.plain[operation](*operands)
-        name = (_FUNCTIONS | _INTRINSICS).get(operation)
+        name = _FUNCTIONS.get(operation)
         if name is None:
             raise LinkworkError(
                 f"{self.source.name()}: CasADi's operation {operation} cannot be compiled; equations consist of "
                 "arithmetic and functions such as sin, sqrt, exp"
             )
-        target = self.module.globals.get(name)
-        if target is None:
-            target = ir.Function(self.module, ir.FunctionType(_DOUBLE, [_DOUBLE] * len(operands)), name)
-            target.attributes.add("nounwind")
-        return self.build.call(target, operands)
+        if self.lanes > 1:
+            return vectors.FUNCTIONS[name](*(vectors.Vector(self.build, value) for value in operands)).value
+        name = _INTRINSICS.get(name, name)
+        return self.build.call(vectors.declared(self.module, name, self.kind, len(operands)), operands)
+
+    def _quotient(self, a: Any, b: Any) -> Any:
+        if self.lanes == 1:
+            return self.build.fdiv(a, b)
+        # a division takes as long as sixteen products, and equations often divide by the same again
+        return self.build.fmul(a, self._reciprocal(b))
+
+    def _reciprocal(self, a: Any) -> Any:
+        if id(a) not in self.reciprocals:
+            # with a, so that no other value gets its id
+            self.reciprocals[id(a)] = a, self.build.fdiv(self._constant(1.0), a)
+        return self.reciprocals[id(a)][1]
 
     def _sign(self, a: Any) -> Any:
-        zero, one, less = (ir.Constant(_DOUBLE, value) for value in (0.0, 1.0, -1.0))
+        zero, one, less = map(self._constant, (0.0, 1.0, -1.0))
         negative = self.build.select(self.build.fcmp_ordered("<", a, zero), less, zero)
         return self.build.select(self.build.fcmp_ordered(">", a, zero), one, negative)
 
@@ -304,6 +356,8 @@ _PART: dict[str, Any] = {
 part = njit(**_PART)
 #: The same for functions that make no arrays: counting the references to their arguments would cost more than their work.
 inner = njit(**_PART, _nrt=False)
+#: The same for functions whose value lives no longer than their caller: they become a part of it before Numba types it.
+inline = njit(**_PART, _nrt=False, inline="always")
 
 
 @inner

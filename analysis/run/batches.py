@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from functools import cache
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import prod
-from operator import attrgetter
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,13 +20,11 @@ from linkwork.mechanism import Mechanism
 
 from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
-from ..numerics.symbolic import ELEMENTARY
-from ..numerics.tracing import Rebound, rebound
 from .cautions import MANY_STEPS, too_slow
-from .equations import like_parameters, modules_of
 from .inputs import Encoded, Inputs, align, compiled_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, problem_of, verdict
 from .sampling import of_functions
+from .varied import Varied, constants_of, distinct, over_arrays
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -188,7 +182,7 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
             if code == _GIVEN_UP:
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
-            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed)
+            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages
 
@@ -206,7 +200,7 @@ def _integrate(
     of the channel that was not finite, the number of steps, state and channels at the end. ``samples`` get the samples, NaN
     after the end of a run.
     """
-    from . import compiled
+    from . import compiled, lanes
     from . import records as k
 
     mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
@@ -227,8 +221,14 @@ def _integrate(
     own, recorded = batch._replace(laws=batch.laws.copy()), k.Samples(settings.times, states, forces)
     watch = k.watch_nothing(mechanism.size)
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
+    fits = _fits(batch, settings)
+    code = lanes.code_of(mechanism, _switched(mechanism, batch.p))
     while todo.any() and not heard:
-        compiled.run(problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL)
+        arguments = problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
+        if (todo & fits).any():
+            lanes.run_in_lanes(code, fits, *arguments)
+        else:
+            compiled.run(*arguments)
         todo = (status == k.RUNNING) & (steps < settings.max_steps)
         passed = carries["begin"] + carries["elapsed"] - settings.times[0]
         for i in np.flatnonzero(todo & too_slow(steps, passed, span, settings.max_steps)).tolist():
@@ -247,6 +247,17 @@ def _integrate(
     ends[:, :5] = np.column_stack([status, counts, ended, carries["lost"], steps])
     ends[:, 5:] = np.column_stack([state.x, state.u])
     return not todo.any()
+
+
+def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
+    """Return which runs go in lanes: those whose inputs are constant, or held, in each interval.
+
+    The others, with harmonics, ramps, motors, torsion bars or functions of the state, go one by one.
+    """
+    from .lanes import LANES
+
+    fits: NDArray[np.bool_] = (batch.steady & ~batch.laws[:, :, 2].any(axis=1)) | (settings.hold > 0.0)
+    return fits & (LANES > 1)
 
 
 # Start of a run
@@ -278,13 +289,10 @@ def prepare(task: Task) -> Prepared:
                 doubtful.add(i)
     x[:, encoded.commands[:, 1]] = u[:, encoded.commands[:, 0]]
     scales = np.zeros_like(x)
-    (functions, like), equations = _over_arrays(mechanism), mechanism.equations
-    names = [field.name for field in fields(mechanism.parameters)]
-    own = np.array(list(map(attrgetter(*names), task.parameters)), float).reshape(len(x), -1)
+    functions, equations = over_arrays(mechanism)[0], mechanism.equations
     try:
         with np.errstate(all="ignore"):
-            parameters = like(**dict(zip(names, own.T)))
-            columns = parameters.constants()
+            parameters, columns = constants_of(mechanism, task.parameters)
             for n, column in enumerate(columns):
                 p[:, n] = column
             if mechanism.switch:
@@ -326,29 +334,6 @@ def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
     return [made[id(item)] for item in items]
 
 
-@cache
-def _over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
-    """Return the equations for arrays, and the type of parameters that they take.
-
-    The functions are those of `math` itself, element by element, as those of NumPy differ in bits.
-    """
-    elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
-    ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}
-    functions = rebound(modules_of(mechanism), elementwise | ours)
-    return functions, like_parameters(mechanism, functions)
-
-
-def _elementwise(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
-    """Return a function of floats that is applied to arrays element by element."""
-
-    def applied(*values: Any) -> NDArray[np.float64]:
-        arrays = np.broadcast_arrays(*values) if len(values) > 1 else [np.asarray(values[0])]
-        columns = [array.ravel().tolist() for array in arrays]
-        return np.fromiter(map(function, *columns), float, arrays[0].size).reshape(arrays[0].shape)
-
-    return applied
-
-
 def _acting(task: Task) -> tuple[Encoded, Any]:
     """The inputs of a batch, those of the first run encoded; and of all, as `compiled.Batch` without constants and scales."""
     from . import compiled
@@ -378,7 +363,8 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
         constant = len(kinds) - 1 if constant < 0 else constant
         return constant, values
 
-    found = _once(kind_of, task.inputs)
+    varied = task.inputs.columns if isinstance(task.inputs, Varied) else {}
+    found = _once(kind_of, distinct(task.inputs) * len(task.inputs) if varied else task.inputs)
     which = np.array([kind for kind, _ in found])
     sources = [e.source for e in kinds]
     sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in sources])
@@ -393,6 +379,8 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
     coefficients = coefficients[which]
     if constant >= 0:
         coefficients[which == constant, 0, :, 0] = [values for _, values in found if values is not None]
+    for name, column in varied.items():
+        coefficients[:, :, signals.index(name), 0] = column[:, None]
     return kinds[which[0]], compiled.Batch(
         p=np.empty((0, 0)),
         scales=np.empty((0, 0)),

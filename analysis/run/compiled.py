@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inline, inner, kernel, part
 from ..numerics.references import refer
 from .equations import DERIVATIVE, JUMP, OUTPUTS
 from .locating import EVENTS_PER_STEP, NOTHING, end_at, locate_events, notice_jumps
@@ -52,7 +52,7 @@ GREATEST_SHARE = 1e-3
 
 
 @inner
-def _begin_interval(motion):
+def begin_interval(motion):
     """Sample the inputs, apply jumps of commanded rates, record samples and events; return the status."""
     problem, source, carry = motion.problem, motion.source, motion.carry
     x, u, t = motion.x, motion.u, motion.carry.begin
@@ -110,9 +110,16 @@ def _not_finite(u):
 @inner
 def _first_step(motion):
     """Compute the rates at the beginning of the interval and, at the start of the run, the first step size."""
-    carry, x, k = motion.carry, motion.x, motion.room.k
-    equation(DERIVATIVE, carry.begin + carry.elapsed, x, motion.u, k[0], motion)
+    carry = motion.carry
+    equation(DERIVATIVE, carry.begin + carry.elapsed, motion.x, motion.u, motion.room.k[0], motion)
     carry.evaluations += 1
+    choose_first(motion)
+
+
+@inner
+def choose_first(motion):
+    """Compute the first step size of a run from the rates at its beginning."""
+    carry, x, k = motion.carry, motion.x, motion.room.k
     if not carry.step > 0.0:
         ratio = 1e-300
         for i in range(x.shape[0]):
@@ -121,6 +128,14 @@ def _first_step(motion):
 
 
 # Attempt a step
+
+
+@inner
+def next_size(carry):
+    """Return the size of the next step, and whether it is the last of its interval."""
+    remaining = (carry.stop - carry.begin) - carry.elapsed
+    last = carry.step >= remaining * (1.0 - 1e-10)
+    return remaining if last else min(carry.step, 0.5 * remaining), last
 
 
 @inner
@@ -171,7 +186,7 @@ def _keep_balance(motion):
 
 
 @inner
-def _refused(h, motion):
+def refused(h, motion):
     """Return the status of a run whose step has become too short."""
     carry, room, x, u = motion.carry, motion.room, motion.x, motion.u
     status = LIMIT if abs(clearance_at(x, u, motion)) < NEAR_LIMIT else NO_STEP
@@ -203,7 +218,7 @@ def _sample_beginning(motion):
 
 
 @inner
-def _sample_step(t_new, h, motion):
+def sample_step(t_new, h, motion):
     """Record the samples inside a step; one at its end waits for the next, or for the next interval's inputs."""
     carry, samples = motion.carry, motion.samples
     while carry.sample < samples.times.shape[0] and samples.times[carry.sample] < t_new:
@@ -235,9 +250,7 @@ def _cross_interval(motion, most):
             # after a step that was refused they are those of one of its stages
             renew(carry.elapsed, x, motion.u, motion)
             return RUNNING
-        remaining = (carry.stop - carry.begin) - carry.elapsed
-        last = carry.step >= remaining * (1.0 - 1e-10)
-        h = remaining if last else min(carry.step, 0.5 * remaining)
+        h, last = next_size(carry)
         t_new = carry.stop if last else carry.begin + (carry.elapsed + h)
         error = _attempt(h, motion)
         good, inside, clearance = False, False, 0.0
@@ -247,16 +260,16 @@ def _cross_interval(motion, most):
             carry.rejected += 1
             carry.step = shorter(h, error)
             if not carry.step >= least:
-                return _refused(h, motion)
+                return refused(h, motion)
             continue
         carry.step = following(h, carry.step, error)
         carry.known = carry.found
         if inside:
             what, cut = locate_events(clearance, h, motion)
             if what != NOTHING:
-                _sample_step(carry.begin + (carry.elapsed + cut * h), h, motion)
+                sample_step(carry.begin + (carry.elapsed + cut * h), h, motion)
                 return end_at(what, cut, h, motion)
-            _sample_step(t_new, h, motion)
+            sample_step(t_new, h, motion)
         copy(room.y, x)
         copy(room.k[12], room.k[0])
         if last:
@@ -268,7 +281,7 @@ def _cross_interval(motion, most):
 
 
 @part
-def _make_room(states, outputs, inputs):
+def make_room(states, outputs, inputs):
     """Allocate work arrays for given numbers of states, outputs and inputs."""
     return Room(
         np.empty((16, states)),
@@ -289,7 +302,7 @@ def _advance(motion, most):
         if carry.midway == 0:
             if carry.found > full:
                 return RUNNING
-            status = _begin_interval(motion)
+            status = begin_interval(motion)
             if status != RUNNING:
                 return status
         status = _cross_interval(motion, most)
@@ -311,7 +324,7 @@ class Batch(NamedTuple):
     laws: NDArray[np.float64]
 
 
-_BATCH = types.NamedTuple(
+BATCH = types.NamedTuple(
     (MATRIX, MATRIX, boolean[::1], int64[:, ::1], MATRIX, float64[:, :, :, ::1], CUBE, CUBE), Batch
 )
 
@@ -338,7 +351,16 @@ def _own(i, source, batch):
     )
 
 
-@kernel(types.void(float64, SOURCE, _BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
+@inline
+def motion_of(i, problem, source, batch, watch, samples, room, state):
+    """Return a reference to one run of a batch."""
+    return refer(Motion(
+        problem, batch.p[i], batch.scales[i], batch.steady[i], _own(i, source, batch), watch,
+        Samples(samples.times, samples.states[i], samples.forces[i]), room, state.carries[i], state.x[i], state.u[i],
+    ))  # fmt: skip
+
+
+@kernel(types.void(float64, SOURCE, BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
 def channels_of_many(t, source, batch, x, u):
     """Write the channels of each run of a batch at time t and at its state into the rows of u."""
     for i in range(x.shape[0]):
@@ -347,7 +369,7 @@ def channels_of_many(t, source, batch, x, u):
 
 
 @kernel(
-    types.void(PROBLEM, SOURCE, _BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
+    types.void(PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
     purpose="the solver",
 )
 def run(problem, source, batch, watch, state, samples, status, most, budget):
@@ -376,7 +398,7 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
         Written: RUNNING, FINISHED, BAD_INPUT, LIMIT, NO_STEP or EVENT.
     most, budget : int
     """
-    room = _make_room(state.x.shape[1], problem.outputs, state.u.shape[1])
+    room = make_room(state.x.shape[1], problem.outputs, state.u.shape[1])
     for i in range(state.x.shape[0]):
         carry = state.carries[i]
         before = carry.steps
@@ -384,16 +406,47 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
             continue
         if budget <= 0:
             return
-        motion = refer(Motion(
-            problem, batch.p[i], batch.scales[i], batch.steady[i], _own(i, source, batch), watch,
-            Samples(samples.times, samples.states[i], samples.forces[i]), room, carry, state.x[i], state.u[i],
-        ))  # fmt: skip
+        motion = motion_of(i, problem, source, batch, watch, samples, room, state)
         status[i] = _advance(motion, min(most, before + budget))
         budget -= carry.steps - before
 
 
-@kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
-def rows(equation, modes, p, states, forces, out):
-    """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``."""
-    for i in range(states.shape[0]):
-        evaluate(equation, 0.0, states[i], modes, forces[i], p, out[i])
+@inner
+def put(lane, lanes, values, many):
+    """Write values into one of several lanes."""
+    for i in range(values.shape[0]):
+        many[lanes * i + lane] = values[i]
+
+
+@inner
+def take(lane, lanes, many, values):
+    """Read the values of one of several lanes."""
+    for i in range(values.shape[0]):
+        values[i] = many[lanes * i + lane]
+
+
+@kernel(types.void(int64, int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
+def rows(equation, lanes, modes, p, states, forces, out):
+    """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``.
+
+    The equation takes so many rows at once as it has ``lanes``, and writes them one after the other.
+    """
+    modes_of, p_of = np.empty(lanes * modes.shape[0]), np.empty(lanes * p.shape[0])
+    x, u = np.empty(lanes * states.shape[1]), np.empty(lanes * forces.shape[1])
+    y = np.empty(lanes * out.shape[1])
+    for lane in range(lanes):
+        put(lane, lanes, modes, modes_of)
+        put(lane, lanes, p, p_of)
+    for first in range(0, states.shape[0], lanes):
+        count = min(lanes, states.shape[0] - first)
+        for lane in range(lanes):
+            # the last row fills what remains
+            row = first + min(lane, count - 1)
+            put(lane, lanes, states[row], x)
+            put(lane, lanes, forces[row], u)
+        if count == lanes:
+            evaluate(equation, 0.0, x, modes_of, u, p_of, out[first:])
+        else:
+            evaluate(equation, 0.0, x, modes_of, u, p_of, y)
+            for lane in range(count):
+                copy(y[lane * out.shape[1] :], out[first + lane])

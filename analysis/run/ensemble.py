@@ -6,7 +6,7 @@ import inspect
 import mmap
 import os
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -35,6 +35,8 @@ from .prepared import outputs_of
 from .signals import Function
 from .simulation import MOST_STEPS, RunOptions, sample_times, settings_of
 from .trajectory import Trajectory
+from .varied import Varied, constants_of, distinct
+from .varied import vary as sets_of
 
 #: Largest number of samples in a batch whose size the caller leaves open.
 _SAMPLES_OF_BATCH = 1 << 16
@@ -63,7 +65,7 @@ class Ensemble:
         Why a run ended early or did not start; of a run to its end, that it is stiff, or nothing.
     counts : ndarray of int, shape (m,)
         Samples that each run reached; 0 of one that did not start.
-    parameters : tuple
+    parameters : sequence
         Those of the mechanism, one for each run.
     modes : ndarray
         Values of the mechanism's modes, the same for all.
@@ -79,7 +81,7 @@ class Ensemble:
     status: NDArray[np.int64]
     messages: tuple[str, ...]
     counts: NDArray[np.int64]
-    parameters: tuple[Parameters, ...]
+    parameters: Sequence[Parameters]
     modes: NDArray[np.float64]
     energies: NDArray[np.float64]
 
@@ -161,9 +163,10 @@ class EnsembleOptions(RunOptions, total=False):
 @takes_options(EnsembleOptions)
 @in_si(stop_time="s", step="s", start_time="s", hold="s")
 def simulate_many(
-    parameters: Sequence[Parameters],
+    parameters: Sequence[Parameters] | Parameters,
     inputs: Inputs | Sequence[Inputs] | None = None,
     *,
+    vary: Mapping[str, Any] | None = None,
     initial: InitialState | Sequence[InitialState] | None = None,
     stop_time: Amount,
     step: Amount = 1e-3,
@@ -181,8 +184,14 @@ def simulate_many(
     side by side; or over the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky"
     for processes.
 
+    Runs whose inputs are constant between jumps, or held, are stepped as many at once as the processor takes doubles; the
+    others one after the other.
+
     Parameters
     ----------
+    vary : mapping, optional
+        Values of parameters or of constant inputs by their names, as many of each as there are runs, in SI or as texts with
+        units: ``parameters`` and ``inputs`` are then what all runs have in common.
     outputs : sequence of str, optional
         Outputs of the FMI contract to keep; by default states and channels, from which `Ensemble` computes all outputs.
     folder : path, optional
@@ -193,8 +202,8 @@ def simulate_many(
     Other Parameters
     ----------------
     batch : int, optional
-        Runs that are prepared and solved together: by default a sixteenth of all, between 16 and 256, fewer where they have
-        many samples.
+        Runs that are prepared and solved together: by default a quarter of all up to 128, or a sixteenth up to 256, at least
+        16, and fewer where they have many samples.
     start_time, max_steps, progress
         As the others, those of `simulate`.
 
@@ -215,12 +224,18 @@ def simulate_many(
 
     Examples
     --------
-    >>> from analysis import simulate_many, variant
-    >>> springs = [variant("table-3.1", slider_stiffness=f"{k} N/m") for k in (800, 1000, 1200)]
-    >>> runs = simulate_many(springs, stop_time="0.2 s")
+    >>> import numpy as np
+    >>> from analysis import simulate_many
+    >>> runs = simulate_many("table-3.1", vary={"slider.stiffness": np.linspace(800.0, 1200.0, 3)}, stop_time="0.2 s")
     >>> runs.output("slider.position").shape
     (3, 201)
     """
+    if vary is not None:
+        if isinstance(parameters, Sequence):
+            raise InputError("with vary there is one set of parameters, which all runs have in common")
+        parameters, inputs = sets_of(parameters, inputs, vary)
+    elif not isinstance(parameters, Sequence):
+        raise InputError(f"parameters is {parameters!r:.200}: it must be a list, or vary must say what differs")
     if len(parameters) == 0:
         raise InputError("an ensemble needs at least one set of parameters")
     batch = options.get("batch")
@@ -228,7 +243,7 @@ def simulate_many(
         raise InputError(f"batch is {batch}: it must be at least 1")
     check_jobs(n_jobs)
     mechanism = mechanism_of(parameters[0])
-    if any(mechanism_of(p) is not mechanism for p in parameters):
+    if any(mechanism_of(p) is not mechanism for p in distinct(parameters)):
         raise InputError("an ensemble's parameters must all be of one mechanism")
     names = mechanism.output_names if outputs is None else tuple(outputs)
     columns = tuple(column_of(name, mechanism.output_names) for name in names)
@@ -239,7 +254,9 @@ def simulate_many(
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
     compiled_source(encoded)
-    batch = batch or max(16, min(256, len(parameters) // 16, _SAMPLES_OF_BATCH // len(settings.times)))
+    usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
+    # whole vectors
+    batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)
     code = "" if where is None else _code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
         Task(
@@ -285,7 +302,8 @@ class _Gathered:
         folder: Path | None,
     ) -> None:
         m, n = len(parameters), len(times)
-        self.parameters, self.times, self.names, self.chosen = tuple(parameters), times, names, chosen
+        self.parameters = parameters if isinstance(parameters, Varied) else tuple(parameters)
+        self.times, self.names, self.chosen = times, names, chosen
         samples = 0 if chosen else n
         self.maps: list[mmap.mmap] = []
         self.states = self._room((m, samples, mechanism.size), folder)
@@ -354,27 +372,35 @@ class _Gathered:
 def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
     """Return a hash of the code that runs depend on: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
-    from . import batches, compiled
+    from . import batches, compiled, lanes
 
-    kernels = (compiled.run, compiled.channels_of_many, compiled.rows)
-    switched = any(mechanism.switched(p.constants()) for p in parameters)
-    ours = [machine(mechanism, switched).fingerprint, inspect.getsource(batches), *map(fingerprint, kernels)]
+    kernels = (compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows)
+    switch = mechanism.switch and getattr(constants_of(mechanism, parameters)[1], mechanism.switch)
+    switched = bool(np.any(switch)) if mechanism.switch else False
+    ours = [
+        *(machine(mechanism, switched, n).fingerprint for n in sorted({1, lanes.LANES})),
+        inspect.getsource(batches),
+        *map(fingerprint, kernels),
+    ]
     return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])
 
 
-def _checked(mechanism: Mechanism, inputs: Any, initial: Any, count: int) -> tuple[list[Inputs], list[InitialState]]:
+def _checked(
+    mechanism: Mechanism, inputs: Any, initial: Any, count: int
+) -> tuple[Sequence[Inputs], list[InitialState]]:
     """Return the inputs and initial state of each run; all inputs must drive the same way with the same functions."""
     all_inputs, starts = _each(inputs, count, "inputs"), _each(initial, count, "initial states")
     nothing, rest = given(mechanism, None, None)
-    all_inputs = [nothing if i is None else i for i in all_inputs]
+    if not isinstance(all_inputs, Varied):
+        all_inputs = [nothing if i is None else i for i in all_inputs]
     read = {
         id(s): rest if s is None else s if isinstance(s, mechanism.initial) else given(mechanism, None, s)[1]
-        for s in {id(s): s for s in starts}.values()
+        for s in distinct(starts)
     }
     starts = [read[id(s)] for s in starts]
     accepted: set[tuple[str, ...]] = set()
     ways: set[Any] = set()
-    for one in {id(i): i for i in all_inputs}.values():
+    for one in distinct(all_inputs):
         names = tuple(one) if isinstance(one, Inputs) else ()
         if not names or names not in accepted:
             given(mechanism, one, None)
@@ -384,7 +410,7 @@ def _checked(mechanism: Mechanism, inputs: Any, initial: Any, count: int) -> tup
         raise InputError("an ensemble's inputs must all drive the mechanism in the same way")
     functions = {
         tuple((name, id(f.function), id(f.rate)) for name in i for f in i.parts(name) if isinstance(f, Function))
-        for i in {id(i): i for i in all_inputs}.values()
+        for i in distinct(all_inputs)
     }
     if len(functions) > 1:
         raise InputError("an ensemble's inputs must share their Python functions")
@@ -404,9 +430,9 @@ def column_of(name: str, names: tuple[str, ...]) -> int:
     return names.index(name)
 
 
-def _each(value: Any, count: int, what: str) -> list[Any]:
+def _each(value: Any, count: int, what: str) -> Any:
     if value is None or not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:
         raise InputError(f"{len(value)} {what} for {count} sets of parameters: give one, or as many")
-    return list(value)
+    return value if isinstance(value, Varied) else list(value)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 #: The functions that a run needs, by their numbers among `Machine.addresses`.
 DERIVATIVE, OUTPUTS, CLEARANCE, JUMP = range(4)
 _NAMES = ("derivative", "outputs", "clearance", "jump")
+_IN_ROWS = ("outputs", "chosen")
 
 _ALLOWED = (
     "equations must be arithmetic without branches, of functions in the mechanism's modules, imported by name, and of "
@@ -170,13 +171,15 @@ def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
     )
 
 
-def _compiled(traces: Traced, functions: Mapping[str, Any]) -> MachineCode:
-    """Return machine code of expressions, by their names, in the symbols of traced equations."""
+def _compiled(traces: Traced, functions: Mapping[str, Any], lanes: int = 1) -> MachineCode:
+    """Return machine code of expressions, by their names, in the symbols of traced equations; outputs go in rows."""
     from ..numerics.codegen import MachineCode
 
     casadi = symbolic.library()
     arguments = [casadi.SX.sym("t"), *traces.symbols]
-    return MachineCode([casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()])
+    return MachineCode(
+        [casadi.Function(name, arguments, [e], {"cse": True}) for name, e in functions.items()], lanes, _IN_ROWS
+    )
 
 
 class Machine:
@@ -188,33 +191,33 @@ class Machine:
         Of the functions, by DERIVATIVE and its kin.
     """
 
-    def __init__(self, mechanism: Mechanism, switched: bool) -> None:
+    def __init__(self, mechanism: Mechanism, switched: bool, lanes: int) -> None:
         traces = expressions(mechanism, switched)
-        self._code = _compiled(traces, {name: getattr(traces, name) for name in _NAMES})
+        self._code = _compiled(traces, {name: getattr(traces, name) for name in _NAMES}, lanes)
         self.addresses: NDArray[np.int64] = np.array([self._code.addresses[name] for name in _NAMES], dtype=np.int64)
         self.fingerprint = self._code.fingerprint
 
 
-_MACHINES: dict[tuple[Mechanism, bool], Machine] = {}
+_MACHINES: dict[tuple[Mechanism, bool, int], Machine] = {}
 
 
-def machine(mechanism: Mechanism, switched: bool = False) -> Machine:
-    """Return the machine code of a mechanism's equations; one thread compiles it at the first call."""
-    key = mechanism, switched
+def machine(mechanism: Mechanism, switched: bool = False, lanes: int = 1) -> Machine:
+    """Return the machine code of a mechanism's equations for so many states at once; one thread compiles it at first."""
+    key = mechanism, switched, lanes
     if key not in _MACHINES:
         from ..numerics.codegen import MAKING
 
         with MAKING:
             if key not in _MACHINES:
-                _MACHINES[key] = Machine(mechanism, switched)
+                _MACHINES[key] = Machine(mechanism, switched, lanes)
     return _MACHINES[key]
 
 
 @cache
-def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...]) -> MachineCode:
+def chosen_outputs(mechanism: Mechanism, switched: bool, columns: tuple[int, ...], lanes: int) -> MachineCode:
     """Return machine code of the equation ``chosen``: some of the outputs, which costs what these need."""
     from ..numerics.codegen import MAKING
 
     traces = expressions(mechanism, switched)
     with MAKING:
-        return _compiled(traces, {"chosen": traces.outputs[list(columns)]})
+        return _compiled(traces, {"chosen": traces.outputs[list(columns)]}, lanes)

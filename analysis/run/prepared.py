@@ -325,13 +325,14 @@ def outputs_of(
     columns : tuple of int, optional
         Numbers of the outputs to compute, in the order of the columns; by default all.
     """
+    from ..numerics.lanes import width
     from .compiled import rows
 
     switched = mechanism.switched(p.tolist())
     if columns is None:
-        outputs, count = machine(mechanism, switched).addresses[OUTPUTS], len(mechanism.output_names)
+        outputs, count = machine(mechanism, switched, width()).addresses[OUTPUTS], len(mechanism.output_names)
     else:
-        outputs, count = chosen_outputs(mechanism, switched, columns).addresses["chosen"], len(columns)
+        outputs, count = chosen_outputs(mechanism, switched, columns, width()).addresses["chosen"], len(columns)
     values = np.empty((len(states), count))
-    rows(outputs, modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
+    rows(outputs, width(), modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return values

@@ -44,7 +44,7 @@ def call(mechanism: Mechanism, which: int, size: int, x: Any, modes: Any, u: Any
     """A function of the equations at one state."""
     out = np.empty((1, size))
     compiled.rows(
-        machine(mechanism).addresses[which], np.array(modes), np.array([*p, 0.3]), np.array([x]), np.array([u]), out
+        machine(mechanism).addresses[which], 1, np.array(modes), np.array([*p, 0.3]), np.array([x]), np.array([u]), out
     )
     return out[0]
 

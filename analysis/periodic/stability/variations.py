@@ -139,6 +139,7 @@ class Variations:
         values = np.empty((count, size))
         rows(
             _code(self.flow, self.switched, name).addresses[name],
+            1,
             np.array(self.flow.modes, dtype=float),
             np.concatenate([self._p, along[d:]]),
             np.ascontiguousarray(rows_of_arguments),

@@ -1,0 +1,418 @@
+"""Runs of an ensemble in lanes: as many at once as the processor takes doubles, each with its own time, step size and end.
+
+The steps are those of `compiled`: the stages of all lanes are computed together, and each lane then accepts its step or tries
+a shorter one. A lane whose run ends takes the next run. Intervals of inputs begin, and the limit of assembly is located, by
+the functions of single runs. Arrays in lanes are flat: number i of lane l is at ``LANES * i + l``.
+
+A run fits here if its inputs are constant in each interval. Others, which have them evaluated at each stage, are left to
+`compiled.run`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from math import isfinite, isnan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import int64, types
+from numpy.typing import NDArray
+
+from linkwork import tableau
+from linkwork.integrate import LEAST_STEP
+from linkwork.limits import LIMIT_SINE
+from linkwork.mechanism import Mechanism
+
+from ..numerics.codegen import MAKING, MachineCode, copy, evaluate, inline, inner, kernel, part
+from ..numerics.lanes import width
+from ..numerics.references import refer
+from ..numerics.symbolic import library
+from .compiled import (
+    BATCH,
+    Batch,
+    begin_interval,
+    choose_first,
+    make_room,
+    motion_of,
+    next_size,
+    put,
+    refused,
+    sample_step,
+    take,
+)
+from .equations import CLEARANCE, DERIVATIVE, JUMP, machine
+from .locating import end_at, locate_events
+from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
+from .sources import ADDRESSES, SOURCE, Source
+from .stepping import STAGES, following, shorter
+
+#: Runs at once.
+LANES = width()
+#: In the place of a sum of squares that is zero.
+LEAST = 1e-300
+
+
+class Lanes(NamedTuple):
+    """Work arrays: addresses of the functions in lanes; of each lane its run or -1, where that is, whether the step is the last
+    of its interval, what became of it; and in lanes the state, its end and that at a stage, modes, channels, constants, scales,
+    step size, fraction of the step, stages, interpolant, clearance; and a row for each lane, the state at the fraction. After
+    the state at the end of the step comes the error."""
+
+    code: NDArray[np.int64]
+    run: NDArray[np.int64]
+    phase: NDArray[np.int64]
+    last: NDArray[np.int64]
+    outcome: NDArray[np.int64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]
+    modes: NDArray[np.float64]
+    u: NDArray[np.float64]
+    p: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    h: NDArray[np.float64]
+    fraction: NDArray[np.float64]
+    k: NDArray[np.float64]
+    f: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+    between: NDArray[np.float64]
+
+
+# Where a run is: between intervals, inside one whose first rates are not known, or inside
+_BETWEEN, _ENTERED, _INSIDE = range(3)
+# What became of a step
+_IDLE, _REJECTED, _ACCEPTED, _SAMPLED = range(4)
+# Places of addresses, after the equations: stage s of a step at _STAGE + s
+_STAGE = JUMP
+_INTERPOLANT, _INTERPOLATE = _STAGE + 16, _STAGE + 17
+
+
+def code_of(mechanism: Mechanism, switched: bool) -> NDArray[np.int64]:
+    """Return the addresses of the equations in lanes, and of the straight lines of a step."""
+    return np.concatenate([machine(mechanism, switched, LANES).addresses, _code_of_steps(mechanism.size)])
+
+
+@cache
+def _code_of_steps(n: int) -> NDArray[np.int64]:
+    """Return the addresses of the sums of a step of n states: `stepping.stage` and its kin, without loops.
+
+    The end of a step is followed by its error, of order 8 in the step size; without a number where the end is not finite.
+    """
+    casadi = library()
+    x, k, h, scale, y = (casadi.SX.sym(name, size) for name, size in zip("xkhsy", (n, 16 * n, 1, n, n)))
+    f, t = casadi.SX.sym("f", 7 * n), casadi.SX.sym("t")
+
+    def total(pairs: Iterable[tuple[int, float]]) -> Any:
+        return sum((weight * k[n * j : n * (j + 1)] for j, weight in pairs if weight), casadi.SX.zeros(n))
+
+    stages = {f"stage{s}": x + h * total(tableau.A[s]) for s in range(1, 16)}
+    end = stages[f"stage{STAGES}"]
+    weight = scale + casadi.fmax(casadi.fabs(x), casadi.fabs(end))
+    sum3, sum5 = (casadi.sumsqr(total(enumerate(row)) / weight) for row in (tableau.E3, tableau.E5))
+    bottom = casadi.fmax((sum5 + 0.01 * sum3) * n, LEAST)
+    stages[f"stage{STAGES}"] = casadi.vertcat(end, h * sum5 / casadi.sqrt(bottom))
+    delta, first, last = y - x, k[:n], k[n * STAGES : n * (STAGES + 1)]
+    interpolant = [delta, h * first - delta, 2.0 * delta - h * (last + first)]
+    interpolant += [h * total(enumerate(row)) for row in tableau.D]
+    between = casadi.SX.zeros(n)
+    for r in range(7):
+        between = (between + f[n * (6 - r) : n * (7 - r)]) * (h if r % 2 == 0 else 1.0 - h)
+    functions = [casadi.Function(name, [t, x, k, h, scale], [value], {"cse": True}) for name, value in stages.items()]
+    functions.append(casadi.Function("interpolant", [t, x, k, h, y], [casadi.vertcat(*interpolant)], {"cse": True}))
+    functions.append(casadi.Function("interpolate", [t, x, f, h, scale], [x + between]))
+    with MAKING:
+        addresses = MachineCode(functions, LANES, ("interpolate",)).addresses
+    return np.array([addresses[function.name()] for function in functions], dtype=np.int64)
+
+
+@part
+def _make_lanes(code, states, modes, channels, constants):
+    """Allocate work arrays, with empty lanes."""
+    n = states * LANES
+    return Lanes(
+        code, np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
+        np.zeros(n), np.zeros(n + LANES), np.zeros(n), np.zeros(modes * LANES), np.zeros(channels * LANES),
+        np.zeros(constants * LANES), np.zeros(n), np.zeros(LANES), np.zeros(LANES), np.zeros((16, n)), np.zeros((7, n)),
+        np.zeros(LANES), np.zeros((LANES, states)),
+    )  # fmt: skip
+
+
+@inner
+def _equation(which, x, out, v):
+    evaluate(v.code[which], 0.0, x, v.modes, v.u, v.p, out)
+
+
+@inner
+def _stage(s, out, v):
+    """Compute the states at a stage of the lanes' steps; after those at the end the errors."""
+    evaluate(v.code[_STAGE + s], 0.0, v.x, v.k, v.h, v.scale, out)
+
+
+@inner
+def _attempt(v):
+    """Take a step in all lanes into ``v.y``, as `stepping.attempt`."""
+    for s in range(1, STAGES):
+        _stage(s, v.y, v)
+        _equation(DERIVATIVE, v.y, v.k[s], v)
+    _stage(STAGES, v.y, v)
+
+
+@inner
+def _make_interpolants(v):
+    """Compute the interpolants of all lanes' steps."""
+    for s in range(STAGES + 1, 16):
+        _stage(s, v.z, v)
+        _equation(DERIVATIVE, v.z, v.k[s], v)
+    evaluate(v.code[_INTERPOLANT], 0.0, v.x, v.k, v.h, v.y, v.f)
+
+
+@inner
+def _sample(samples, state, v):
+    """Record the samples inside the steps."""
+    while True:
+        more = False
+        for lane in range(LANES):
+            if v.outcome[lane] == _SAMPLED:
+                carry = state.carries[v.run[lane]]
+                if carry.sample < samples.times.shape[0] and samples.times[carry.sample] < _end_of_step(lane, carry, v):
+                    elapsed = samples.times[carry.sample] - carry.begin
+                    v.fraction[lane] = (elapsed - carry.elapsed) / v.h[lane]
+                    more = True
+                else:
+                    v.outcome[lane] = _ACCEPTED
+        if not more:
+            return
+        evaluate(v.code[_INTERPOLATE], 0.0, v.x, v.f, v.fraction, v.scale, v.between)
+        for lane in range(LANES):
+            if v.outcome[lane] == _SAMPLED:
+                i = v.run[lane]
+                carry = state.carries[i]
+                copy(v.between[lane], samples.states[i, carry.sample])
+                copy(state.u[i], samples.forces[i, carry.sample])
+                carry.sample += 1
+
+
+@inner
+def _end_of_step(lane, carry, v):
+    return carry.stop if v.last[lane] else carry.begin + (carry.elapsed + v.h[lane])
+
+
+@inner
+def _finite(lane, states, many):
+    for i in range(states):  # noqa: SIM110 - Numba compiles no generators
+        if not isfinite(many[LANES * i + lane]):
+            return False
+    return True
+
+
+@inner
+def _judge(lane, error, carry, samples, v):
+    """Return what becomes of the step of a lane with an error relative to the tolerance."""
+    clearance, states = v.clearance[lane], v.x.shape[0] // LANES
+    if not error <= 1.0 or isnan(clearance) or not _finite(lane, states, v.y):
+        return _REJECTED
+    inside = clearance < LIMIT_SINE or (
+        carry.sample < samples.times.shape[0] and samples.times[carry.sample] < _end_of_step(lane, carry, v)
+    )
+    if (inside or not v.last[lane]) and not _finite(lane, states, v.k[STAGES]):
+        return _REJECTED
+    return _SAMPLED if inside else _ACCEPTED
+
+
+class Work(NamedTuple):
+    """What the lanes work on: the arguments of `run_in_lanes`, and room for the functions of single runs."""
+
+    fits: NDArray[np.bool_]
+    problem: Problem
+    source: Source
+    batch: Batch
+    watch: Watch
+    state: State
+    samples: Samples
+    status: NDArray[np.int64]
+    room: Room
+
+
+@inline
+def _motion(i, w):
+    """Return a reference to a run."""
+    return motion_of(i, w.problem, w.source, w.batch, w.watch, w.samples, w.room, w.state)
+
+
+@inner
+def _take_run(lane, first, most, v, w):
+    """Give a lane the first run from a number on that has something to do; return the number after it."""
+    i, end = first, w.status.shape[0]
+    while i < end and not (w.fits[i] and w.status[i] == RUNNING and w.state.carries[i].steps < most):
+        i += 1
+    if i == end:
+        return end
+    v.run[lane] = i
+    v.phase[lane] = _BETWEEN
+    put(lane, LANES, w.batch.p[i], v.p)
+    put(lane, LANES, w.batch.scales[i], v.scale)
+    return i + 1
+
+
+@inner
+def _enter(lane, v, w):
+    """Begin an interval, or go on inside one, unless the run ends there."""
+    i = v.run[lane]
+    carry = w.state.carries[i]
+    if carry.midway == 0:
+        w.status[i] = begin_interval(_motion(i, w))
+        if w.status[i] != RUNNING:
+            v.run[lane] = -1
+            return
+        carry.midway = 1
+    put(lane, LANES, w.state.x[i], v.x)
+    put(lane, LANES, w.state.u[i], v.u)
+    v.phase[lane] = _ENTERED
+
+
+@inner
+def _fill(first, most, v, w):
+    """Bring each lane to the beginning of a step; return the number of lanes that have one, and of the next run."""
+    busy = 0
+    for lane in range(LANES):
+        v.outcome[lane] = _IDLE
+        while True:
+            if v.run[lane] < 0:
+                first = _take_run(lane, first, most, v, w)
+                if v.run[lane] < 0:
+                    break
+            if v.phase[lane] == _BETWEEN:
+                _enter(lane, v, w)
+            if v.run[lane] >= 0:
+                if w.state.carries[v.run[lane]].steps < most:
+                    busy += 1
+                    break
+                take(lane, LANES, v.x, w.state.x[v.run[lane]])
+                v.run[lane] = -1
+    return busy, first
+
+
+@inner
+def _choose_sizes(v, w):
+    """Choose the size of each lane's step, with the first rates of the intervals that begin."""
+    fresh = False
+    for lane in range(LANES):
+        fresh |= v.run[lane] >= 0 and v.phase[lane] == _ENTERED
+    if fresh:
+        _equation(DERIVATIVE, v.x, v.z, v)
+    for lane in range(LANES):
+        i = v.run[lane]
+        v.h[lane] = 0.0
+        if i >= 0:
+            carry = w.state.carries[i]
+            if v.phase[lane] == _ENTERED:
+                v.phase[lane] = _INSIDE
+                take(lane, LANES, v.z, w.room.k[0])
+                put(lane, LANES, w.room.k[0], v.k[0])
+                choose_first(_motion(i, w))
+            v.h[lane], v.last[lane] = next_size(carry)
+            carry.steps += 1
+
+
+@inner
+def _end_at_limit(lane, v, w):
+    """End a run at the limit of assembly inside its step."""
+    i, h = v.run[lane], v.h[lane]
+    take(lane, LANES, v.x, w.state.x[i])
+    take(lane, LANES, v.y, w.room.y)
+    for s in range(STAGES + 1):
+        take(lane, LANES, v.k[s], w.room.k[s])
+    motion = _motion(i, w)
+    what, cut = locate_events(v.clearance[lane], h, motion)
+    sample_step(motion.carry.begin + (motion.carry.elapsed + cut * h), h, motion)
+    w.status[i] = end_at(what, cut, h, motion)
+    v.run[lane] = -1
+    v.outcome[lane] = _IDLE
+
+
+@inner
+def _decide(lane, least, v, w):
+    """Decide what becomes of the step of a lane."""
+    i, h, states = v.run[lane], v.h[lane], w.state.x.shape[1]
+    carry = w.state.carries[i]
+    error = v.y[LANES * states + lane] / w.problem.tolerance
+    v.outcome[lane] = _judge(lane, error, carry, w.samples, v)
+    if v.outcome[lane] != _REJECTED:
+        carry.step = following(h, carry.step, error)
+        if v.clearance[lane] < LIMIT_SINE:
+            _end_at_limit(lane, v, w)
+        return
+    carry.rejected += 1
+    carry.step = shorter(h, error)
+    if not carry.step >= least:
+        take(lane, LANES, v.x, w.state.x[i])
+        w.status[i] = refused(h, _motion(i, w))
+        v.run[lane] = -1
+
+
+@inner
+def _move_on(lane, v, w):
+    """Go on from the end of an accepted step."""
+    i = v.run[lane]
+    carry = w.state.carries[i]
+    for j in range(lane, v.x.shape[0], LANES):
+        v.x[j] = v.y[j]
+        v.k[0, j] = v.k[STAGES, j]
+    if v.last[lane]:
+        carry.begin = carry.stop
+        carry.elapsed = 0.0
+        carry.interval += 1
+        carry.midway = 0
+        take(lane, LANES, v.x, w.state.x[i])
+        v.phase[lane] = _BETWEEN
+    else:
+        carry.elapsed += v.h[lane]
+
+
+@inner
+def _run(lanes, work, most, budget):
+    """Do the work of `run_in_lanes`, which holds the arrays that are referred to here."""
+    v, w = refer(lanes), refer(work)
+    least = LEAST_STEP * (w.problem.end - w.samples.times[0])
+    first = 0
+    while budget > 0:
+        busy, first = _fill(first, most, v, w)
+        if busy == 0:
+            return
+        budget -= busy
+        _choose_sizes(v, w)
+        _attempt(v)
+        _equation(CLEARANCE, v.y, v.clearance, v)
+        _equation(DERIVATIVE, v.y, v.k[STAGES], v)
+        looking = False
+        for lane in range(LANES):
+            if v.run[lane] >= 0:
+                _decide(lane, least, v, w)
+                looking |= v.outcome[lane] == _SAMPLED
+        if looking:
+            _make_interpolants(v)
+            _sample(w.samples, w.state, v)
+        for lane in range(LANES):
+            if v.outcome[lane] == _ACCEPTED:
+                _move_on(lane, v, w)
+    for lane in range(LANES):
+        if v.run[lane] >= 0:
+            take(lane, LANES, v.x, w.state.x[v.run[lane]])
+
+
+@kernel(
+    types.void(ADDRESSES, types.boolean[::1], PROBLEM, SOURCE, BATCH, WATCH, STATE, SAMPLES, int64[::1], int64, int64),
+    purpose="the solver of ensembles",
+)
+def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, status, most, budget):
+    """Integrate the runs of a batch that fit and whose status is RUNNING, as `compiled.run` does one after the other.
+
+    ``code`` are the addresses of `code_of`.
+    """
+    states, channels = state.x.shape[1], state.u.shape[1]
+    room = make_room(states, problem.outputs, channels)
+    v = _make_lanes(code, states, problem.modes.shape[0], channels, batch.p.shape[1])
+    for lane in range(LANES):
+        put(lane, LANES, problem.modes, v.modes)
+    _run(v, Work(fits, problem, source, batch, watch, state, samples, status, room), most, budget)
