@@ -232,7 +232,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         ("closed-form.md", 4, 2, ("out/poses.png",)),
         ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
         ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
-        ("workers.md", 1, 1, ()),
+        ("workers.md", 2, 2, ()),
         (
             "linkage-library.md",
             2,

@@ -32,6 +32,7 @@ from analysis.numerics.codegen import (
 from analysis.numerics.symbolic import ELEMENTARY
 from analysis.run import compiled, machine
 from analysis.run.equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
+from analysis.run.prepared import outputs_of
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from tests import slider_cranks, strategies
@@ -75,6 +76,12 @@ def test_machine_code_has_the_values_of_the_plain_functions(name: str, seed: int
             ours = call(mechanism, which, len(values), x, flags, u, p)
             size = max(1.0, max(map(abs, values)))
             assert ours == pytest.approx(values, rel=1e-11, abs=1e-13 * size)
+        # in lanes, a full vector and part of one
+        states, forces = np.tile(x, (11, 1)), np.tile(u, (11, 1))
+        ours = outputs_of(mechanism, np.array(flags), np.array([*p, 0.3]), states, forces)
+        assert (ours == ours[0]).all()
+        size = max(1.0, max(map(abs, plain[OUTPUTS])))
+        assert ours[0] == pytest.approx(plain[OUTPUTS], rel=1e-11, abs=1e-13 * size)
 
 
 def test_configuration_that_does_not_exist_is_nan() -> None:
@@ -148,7 +155,7 @@ def test_matrices_are_written_column_by_column() -> None:
     code = MachineCode([casadi.Function("f", symbols, [casadi.densify(matrix)])])
     out = np.empty((1, 4))
     one = np.ones(2)
-    compiled.rows(code.addresses["f"], one, one, np.array([[2.0, 0.0]]), np.array([[0.0, 0.0]]), out)
+    compiled.rows(code.addresses["f"], 1, one, one, np.array([[2.0, 0.0]]), np.array([[0.0, 0.0]]), out)
     assert out[0].tolist() == [2.0, 6.0, 4.0, 8.0]
 
 

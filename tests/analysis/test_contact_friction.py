@@ -52,8 +52,11 @@ def test_an_ensemble_may_have_runs_with_and_without() -> None:
     found = simulate_many(both, Inputs(speed=30.0), stop_time=0.3, step=0.01)
     for parameters, run in zip(both, found):
         alone = simulate(parameters, Inputs(speed=30.0), stop_time=0.3, step=0.01)
-        scale = np.abs(alone.values).max(axis=0)
-        assert np.all(np.abs(run.values - alone.values) <= 1e-7 * scale + 1e-9)
+        fine = simulate(parameters, Inputs(speed=30.0), stop_time=0.3, step=0.01, tolerance=1e-12)
+        scale = np.abs(alone.values).max(axis=0) + 1e-2
+        # where the slider sticks and slips, rounding decides over some steps: by less than the error of the run
+        error = np.abs(alone.values - fine.values) / scale
+        assert np.all(np.abs(run.values - alone.values) / scale <= 1e-8 + error.max())
 
 
 def test_a_row_of_orbits_may_begin_without() -> None:
