@@ -78,6 +78,7 @@ free = "90 deg"                           # angle, position or length at which i
 damping = "0.01 N*m*s/rad"
 # friction = "0.1 N*m"                    # Coulomb friction, smooth about rest
 # law = "3*x**3"                          # a further force against the stretch x and its rate v, or a table [[x, force], ...]
+# constants = {{ a = "3 N*m" }}             # of a law such as "a*x**3": parameters
 # driven = true                           # an input drives it: a cylinder, a linear motor
 
 # [linkage.friction]                      # that grows with the force in a joint
