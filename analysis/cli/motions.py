@@ -110,8 +110,8 @@ def _motions(title: str, found: Sequence[Orbits]) -> None:
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"
         if part.index != 1:
             sure = (
-                "there may be another motion, or one at which the links lock: motions come and go in pairs, and these do not "
-                f"pair up (their indices add up to {part.index} instead of 1)"
+                "there may be another motion, or one at which the links lock: motions come and go in pairs, a stable and an "
+                f"unstable one, and these do not pair up (sum of indices {part.index}, which is 1 of all motions)"
             )
         of = "" if len(found) == 1 else f"of {format_count(turns, 'turn')}: "
         say(of + sure)

@@ -201,7 +201,11 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
         begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
-    show_table(f"{title}: periodic motions over {response.family.name}", headings, rows, words=headings[-1:])
+    over = "speed" if factor != 1.0 else response.family.name
+    table = (
+        f"{title}: how it moves at each {over}, and where that jumps or becomes unstable (branches of periodic motions)"
+    )
+    show_table(table, headings, rows, words=headings[-1:])
 
 
 def _form(family: Any, special: Any) -> str:

@@ -25,7 +25,9 @@ _Side: TypeAlias = Literal["left", "right"]
 _SIDES: tuple[_Side, _Side] = ("right", "left")
 #: Distances (points) from its point at which a text may be, the first the best, and directions there.
 _DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
-_DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 70.0, 110.0, -70.0, -110.0])
+_DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 90.0, 70.0, 110.0, -90.0, -70.0, -110.0])
+#: How much a line that crosses a text counts beside a text that covers a curve.
+_CROSSED = 3
 #: Directions from a pin in which its letter may stand.
 _ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
 
@@ -68,13 +70,14 @@ def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
 class _Scene:
     """What is on axes that letters must not cover, in pixels: edges, legend, lines of marks, curves; it is laid out.
 
-    A curve is its path, the size of its markers and whether it has a line.
+    A curve is its path, the size of its markers and whether it has a line. The arrows are those without letters.
     """
 
     inside: Bbox
     legend: Bbox | None
     marks: Sequence[float]
     curves: Sequence[tuple[Path, float, bool]]
+    arrows: Sequence[Path]
 
     @classmethod
     def of(cls, axis: Axes) -> _Scene:
@@ -89,11 +92,14 @@ class _Scene:
             for line in axis.lines
             if line.get_gid() != _GID
         ]
+        to_pixels = axis.transData.transform
+        bare = [text for text in axis.texts if isinstance(text, Annotation) and not text.get_text()]
         return cls(
             axis.get_window_extent(),
             None if legend is None else legend.get_window_extent(),
             [line.get_window_extent().x0 for line in marks],
             curves,
+            [Path(to_pixels([text.xyann, text.xy])) for text in bare],
         )
 
     def covered(self, box: Bbox, others: Sequence[Bbox]) -> int:
@@ -110,7 +116,14 @@ class _Scene:
                 count += box.padded(marker).count_contains(path.vertices) > 0
             if line:
                 count += path.intersects_bbox(box, filled=False)
+        count += sum(arrow.intersects_bbox(box, filled=False) for arrow in self.arrows)
         return int(count)
+
+    def crossed(self, leader: Path, others: Sequence[Bbox]) -> int:
+        """Count the names and arrows that the line from a point to its text crosses."""
+        return sum(leader.intersects_bbox(other, filled=True) for other in others) + sum(
+            leader.intersects_path(arrow, filled=False) for arrow in self.arrows
+        )
 
 
 def place_marks(figure: Figure) -> Figure:
@@ -119,10 +132,13 @@ def place_marks(figure: Figure) -> Figure:
         texts = [text for text in axis.texts if isinstance(text, Annotation)]
         scene = _Scene.of(axis) if any(text.get_gid() in _MOVES for text in texts) else None
         placed: list[Bbox] = []
+        leaders: list[Path] = []
         for gid, (move, first, second) in _MOVES.items():
             for text in (text for text in texts if text.get_gid() == gid):
                 assert scene is not None
-                placed.append(_place(text, move, product(first, second), scene, placed))
+                placed.append(_place(text, move, product(first, second), scene, placed, leaders))
+                if gid == _LABEL:
+                    leaders.append(_leader(text, placed[-1]))
     return figure
 
 
@@ -132,11 +148,20 @@ def _place(
     places: Iterable[tuple[float, Any]],
     scene: _Scene,
     others: Sequence[Bbox],
+    leaders: Sequence[Path],
 ) -> Bbox:
-    """Put letters at the first of the places where they cover least, and return the box that they take."""
+    """Put letters at the first of the places where they and their leader cover least, and return the box that they take."""
     least: tuple[int, tuple[float, Any]] | None = None
     for place in places:
-        covered = scene.covered(move(text, *place).padded(_GAP), others)
+        box = move(text, *place).padded(_GAP)
+        covered = scene.covered(box, others)
+        if least is not None and covered >= least[0]:
+            continue
+        crossed = sum(leader.intersects_bbox(box, filled=False) for leader in leaders)
+        if text.get_gid() == _LABEL:
+            own = _leader(text, box)
+            crossed += scene.crossed(own, others) + sum(own.intersects_path(other, filled=False) for other in leaders)
+        covered += _CROSSED * crossed
         if least is None or covered < least[0]:
             least = covered, place
         if covered == 0:
@@ -156,10 +181,18 @@ def _slide(mark: Annotation, top: float, side: _Side) -> Bbox:
 def _turn(label: Annotation, distance: float, direction: float) -> Bbox:
     """Move the text of a point to a distance and direction from it, and return the box that it takes there."""
     label.set_position((distance * np.cos(direction), distance * np.sin(direction)))
-    label.set_horizontalalignment("left" if np.cos(direction) > 0.0 else "right")
+    across = np.cos(direction)
+    label.set_horizontalalignment("center" if abs(across) < 0.1 else "left" if across > 0.0 else "right")
     label.get_window_extent()
     # without the line to the point, which may cross what it likes
     return Text.get_window_extent(label)
+
+
+def _leader(label: Annotation, box: Bbox) -> Path:
+    """Return the line from the point of a text to the nearest place of its box, begun a little off the point."""
+    point = label.axes.transData.transform(label.xy)  # type: ignore[union-attr]
+    end = np.clip(point, (box.x0, box.y0), (box.x1, box.y1))
+    return Path([point + 0.1 * (end - point), end])
 
 
 def roomiest(

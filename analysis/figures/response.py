@@ -46,6 +46,8 @@ _HIDDEN = 1.5 * LINE
 _NONE, _SMALL = 1e-3, 2e-5
 #: Height above the valleys about it, relative to the axis, from which a peak has a text.
 _STANDS_OUT = 0.01
+#: Share of the axis within which crossings have one text.
+_CASCADE = 0.01
 #: Letters along a branch.
 _LETTERS = 7
 
@@ -160,21 +162,11 @@ def _amplitudes(
             curves.append(_letters(x, y, str(branch.turns), colour=colour))
     curves += _visible(others, branches, look, top)
     curves += _specials(branches, look, found)
-    labels = [
+    labels = [label for branch in branches if branch.turns == 1 for label in _peaks(branch, look, top)]
+    labels += [
         Label(x=look.factor * jump.parameter, y=look.scale * jump.before, text=_jump(jump, look)) for jump in found
     ]
-    # one that is on two branches, or is passed twice, is named once
-    met = {
-        f"{_MARKERS[special.kind][1]}, {look.place(special.parameter)}": special
-        for branch in branches
-        for special in branch.special
-        if special.kind is not Crossing.FOLD and _is_met(branch, special)
-    }
-    labels += [
-        Label(x=look.factor * special.parameter, y=look.scale * special.orbit.amplitude, text=text)
-        for text, special in met.items()
-    ]
-    labels += [label for branch in branches if branch.turns == 1 for label in _peaks(branch, look, top)]
+    labels += _crossings(branches, look, top)
     return Panel(
         x_label=look.axis,
         y_label=f"amplitude of {look.what} [{look.shown}]",
@@ -212,6 +204,37 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
         bend, slope, height = np.polyfit(near, y[n - 1 : n + 2], 2)
         place, tall = (x[n] - 0.5 * slope / bend, height - 0.25 * slope**2 / bend) if bend < 0.0 else (x[n], y[n])
         labels.append(Label(x=look.factor * place, y=tall, text=f"peak, {look.place(place)}: {tall:.4g} {look.shown}"))
+    return labels
+
+
+def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Label]:
+    """Return the texts of doublings and tori that a machine meets; those close together, as in a cascade, have one."""
+    # one that is on two branches, or is passed twice, is named once
+    met = {
+        (special.kind, look.place(special.parameter)): special
+        for branch in branches
+        for special in branch.special
+        if special.kind is not Crossing.FOLD and _is_met(branch, special)
+    }
+    width = float(np.ptp(np.concatenate([branch.parameter for branch in branches])))
+    groups: list[list[SpecialPoint]] = []
+    for special in sorted(met.values(), key=lambda s: (s.kind.value, s.parameter)):
+        first = groups[-1][0] if groups else special
+        near = abs(special.parameter - first.parameter) < _CASCADE * width
+        level = look.scale * abs(special.orbit.amplitude - first.orbit.amplitude) < 5.0 * _CASCADE * top
+        if groups and special.kind is first.kind and near and level:
+            groups[-1].append(special)
+        else:
+            groups.append([special])
+    labels = []
+    for group in groups:
+        middle, name = group[len(group) // 2], _MARKERS[group[0].kind][1]
+        text = f"{name}, {look.place(middle.parameter)}"
+        if len(group) > 1:
+            low, high = (look.place(special.parameter) for special in (group[0], group[-1]))
+            plural = "tori" if name == "torus" else f"{name}s"
+            text = f"{len(group)} {plural},\n{low.removesuffix(look.unit).rstrip()} to {high}"
+        labels.append(Label(x=look.factor * middle.parameter, y=look.scale * middle.orbit.amplitude, text=text))
     return labels
 
 

@@ -53,11 +53,11 @@ class ContinuationError(LinkworkError):
 class Reason(Enum):
     """Reason for the end of a curve."""
 
-    BOX = "it leaves the box"
+    BOX = "the end of the range is reached"
     CLOSED = "it is closed"
     TIP = "it turns too sharply to follow, or meets another boundary"
     NO_VALUE = "the test function has no value beyond"
-    LENGTH = "the number of points is used up"
+    LENGTH = "it is longer than is followed"
     LEFT = "it is left"
 
 
@@ -315,7 +315,7 @@ class Follower:
                 length *= SHRINKAGE
                 if length < settings.least:
                     message = taken.text if taken.reason is Reason.NO_VALUE else ""
-                    stalled = f"the continuation stalls: {taken.text}"
+                    stalled = f"no next point is found: {taken.text}"
                     return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
@@ -324,8 +324,8 @@ class Follower:
             if self.is_beyond(point):
                 point, length = self._to_bound(last, point, length)
                 if length <= TOLERANCE:
-                    return Curve(tuple(points), tuple(steps), Reason.BOX, "the end of the range is reached")
-                end = Reason.BOX, "the end of the range is reached"
+                    return Curve(tuple(points), tuple(steps), Reason.BOX, Reason.BOX.value)
+                end = Reason.BOX, Reason.BOX.value
             elif len(points) > 3 and self._passes(first, last, point):
                 point, length = first, float((self._scaled(first) - self._scaled(last)) @ last.tangent)
                 end = Reason.CLOSED, "the curve closes"
@@ -342,7 +342,10 @@ class Follower:
             widths = np.abs(point.tangent[[*settings.bounds, -1]])
             length = min(length, max(settings.widest / max(float(widths.max()), settings.least), settings.least))
         return Curve(
-            tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
+            tuple(points),
+            tuple(steps),
+            Reason.LENGTH,
+            f"it is followed over {settings.most_points} points and no further",
         )
 
     def follow_both(

@@ -108,8 +108,8 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert {run.confirmation.verdict.stability for run in found.runs} == {Stability.STABLE, Stability.UNSTABLE}
     margins = 1.0 - found.grid.largest
     rows = points_to_confirm(found.grid)
-    assert float(margins[rows[0]]) == margins[2:-2, 2:-2].max()
-    assert float(margins[rows[1]]) == margins[2:-2, 2:-2].min()
+    assert float(margins[rows[0]]) == margins[4:-4, 4:-4].max()
+    assert float(margins[rows[1]]) == margins[4:-4, 4:-4].min()
 
 
 def test_long_runs_are_off_the_edges_unless_only_these_are_unstable() -> None:

@@ -11,10 +11,13 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import TwoSlopeNorm
+from matplotlib.path import Path as Path2D
+from matplotlib.text import Text
 from PIL import Image
 
 from analysis import Inputs, figures, simulate
 from analysis.figures import Curve, Panel, charts
+from analysis.figures.curves import Arrow, Label
 from analysis.files import save_figure
 from analysis.mechanisms import MECHANISMS
 from linkwork.errors import AssemblyError, InputError
@@ -294,3 +297,28 @@ def test_animation(run, tmp_path: Path) -> None:
 def test_animation_of_nothing(run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="at least 2"):
         figures.animate_linkage(WITH_POINT, run, tmp_path / "run.gif", frames=1)
+
+
+def test_leaders_of_texts_cross_no_text_and_no_arrow() -> None:
+    x = np.linspace(0.0, 10.0, 200)
+    places = [(5.0, 2.0), (5.1, 2.0), (5.2, 2.1), (5.3, 1.9), (2.0, 1.0), (2.1, 1.2)]
+    panel = Panel(
+        x_label="x",
+        y_label="y",
+        curves=[Curve(x=x, y=np.sin(x) + 1.5), Curve(x=x, y=4.0 - 0.3 * x)],
+        y_range=(0.0, 6.0),
+        labels=[Label(x=x, y=y, text=f"what happens at {x:.3f} is told") for x, y in places],
+        arrows=[Arrow(x=4.0, begin=1.0, end=5.0)],
+    )
+    figure = figures.plot_curves([panel], title="t", size=(7.6, 4.2))
+    (axis,) = figure.axes
+    texts = [text for text in axis.texts if text.get_text()]
+    boxes = [Text.get_window_extent(text) for text in texts]
+    (arrow,) = (Path2D(axis.transData.transform([text.xyann, text.xy])) for text in axis.texts if not text.get_text())
+    for text, own in zip(texts, boxes):
+        point = axis.transData.transform(text.xy)
+        leader = Path2D([point, np.clip(point, (own.x0, own.y0), (own.x1, own.y1))])
+        assert not leader.intersects_path(arrow)
+        for other in boxes:
+            assert other is own or not leader.intersects_bbox(other)
+            assert other is own or not own.overlaps(other)

@@ -238,7 +238,8 @@ def test_where_newton_fails_the_motion_itself_or_another_start_leads_there() -> 
 
 
 def test_where_none_is_found_the_error_says_where_it_ended() -> None:
-    with pytest.raises(OrbitError, match=r"residual .* after \d+ iterations at u = .* m, u' = .* m/s") as caught:
+    said = r"misses its start by .* after \d+ corrections, from slider.position = .* m, slider.velocity = .* m/s"
+    with pytest.raises(OrbitError, match=said) as caught:
         find_orbit(replace(RIG_1_B, slider_damping=2.0), speed=1076.7 * RAD_S_PER_RPM, settle=False)
     assert len(caught.value.start) == 2
     assert caught.value.iterations > 0

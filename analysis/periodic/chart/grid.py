@@ -392,8 +392,8 @@ MEASURABLE = 1e-2
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Choose three points of a grid for long runs: the most stable, the least stable, and the one nearest to a boundary.
 
-    They lie off the edges, where the picture shows them whole, unless an unstable point is on the edges only. The last has the
-    least margin, to either side, that a long run can still measure.
+    They lie a tenth of the ranges off the edges, where the picture shows them whole, unless an unstable point is on the edges
+    only. The last has the least margin, to either side, that a long run can still measure.
 
     Returns
     -------
@@ -404,7 +404,7 @@ def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     if margin.count() == 0:
         return []
     edges = np.ones(margin.shape, dtype=bool)
-    row, column = (max(1, count // 20) for count in margin.shape)
+    row, column = (max(1, count // 10) for count in margin.shape)
     edges[row:-row, column:-column] = False
     inner = np.ma.masked_where(edges, margin)
     if inner.count() == 0:

@@ -68,11 +68,10 @@ class OrbitError(LinkworkError):
         self.start = tuple(float(value) for value in start)
         self.residual = residual
         self.iterations = iterations
-        units = (unit for _, unit in flow.components)
-        place = ", ".join(f"{n} = {value:.6g} {unit}" for n, value, unit in zip(flow.labels, self.start, units))
-        super().__init__(
-            f"no periodic motion found: {reason}; residual {residual:.2e} after {iterations} iterations at {place}"
-        )
+        place = ", ".join(f"{n} = {value:.6g} {unit}" for (n, unit), value in zip(flow.components, self.start))
+        reached = f"it misses its start by {residual:.2e} after {iterations} corrections, from"
+        closed = reached if np.isfinite(residual) else "the motion ends within the first period from"
+        super().__init__(f"no periodic motion found: {reason}; {closed} {place}")
 
 
 class OrbitAssemblyError(OrbitError, AssemblyError):
