@@ -14,6 +14,8 @@ from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Stateme
 
 #: Folder of the plots beside the page, their width (in, px) and most bytes.
 PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
+#: Least width of three panels beside each other (in).
+THREE_PANELS = 11.0
 #: What a page has of a statement: its quote, kind of source and place, measure and tolerance, verdict.
 _STATEMENT = re.compile(
     rf"^> (.*)\n> \((text|program), .*\)\n\n(?:Measured: .*\n\n)?\*\*({'|'.join(OUTCOMES)})\*\*",
@@ -77,12 +79,16 @@ def _escaped(text: str) -> str:
 
 
 def save_small(figure: Figure, path: Path) -> None:
-    """Write a plot of `WIDTH_PX`, laid out anew, in the quality that keeps it below `MOST_BYTES`."""
+    """Write a plot of `WIDTH_PX`, laid out anew, in the quality that keeps it below `MOST_BYTES`.
+
+    Three panels beside each other keep their size, which is wider, for they would be too narrow to read.
+    """
     path.parent.mkdir(exist_ok=True)
     width, height = figure.get_size_inches()
-    figure.set_layout_engine("constrained")
-    # panels beside each other need more height for their labels
-    figure.set_size_inches(WIDTH_IN, height * WIDTH_IN / width * (1.15 if width > 8.0 else 1.0))
+    if width < THREE_PANELS:
+        figure.set_layout_engine("constrained")
+        # panels beside each other need more height for their labels
+        figure.set_size_inches(WIDTH_IN, height * WIDTH_IN / width * (1.15 if width > 8.0 else 1.0))
     for quality in (80, 60, 40, 20):
         figure.savefig(path, dpi=WIDTH_PX / WIDTH_IN, format="webp", pil_kwargs={"quality": quality, "method": 6})
         if path.stat().st_size <= MOST_BYTES:

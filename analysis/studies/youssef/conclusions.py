@@ -378,8 +378,7 @@ def linearised() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "The stability analysis showed a narrow region of instability in the [vicinity of w = 2wn] only, where wn is "
-            "the natural frequency.",
+            "The stability analysis showed a narrow region of instability in the [vicinity of w = 2wn] only ...",
             text("9.1, L7116"),
             "width of the first region relative to its lower end, the most of I4 = 0.25 to 2; width of the region at the "
             "natural frequency itself over it, the least",
