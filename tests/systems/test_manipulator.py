@@ -38,7 +38,12 @@ def make(folder: str, here: str) -> str:
 
     sys.path.insert(0, here)
     script = Path(folder, "hydraulics_fmu.py")
-    text = f"import sys\nsys.path.insert(0, {here!r})\nfrom tests.systems.hydraulics import Hydraulics\n\n\nclass Cylinder(Hydraulics):\n    pass\n"
+    lines = (
+        f"import sys; sys.path.insert(0, {here!r})",
+        "from tests.systems.hydraulics import Hydraulics",
+        "class Cylinder(Hydraulics): pass",
+    )
+    text = "\n".join(lines)
     script.write_text(text, encoding="utf-8")
     return str(FmuBuilder.build_FMU(script, dest=folder))
 
