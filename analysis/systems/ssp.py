@@ -135,7 +135,9 @@ def _complete(path: Path, wiring: Wiring) -> None:
             etree.SubElement(connector, f"{_NAMESPACE}ConnectorGeometry", x=repr(across), y=f"{up:.4f}")
         edges = {"x1": box.left, "y1": box.bottom, "x2": box.right, "y2": box.top}
         geometry = etree.Element(f"{_NAMESPACE}ElementGeometry", {key: repr(value) for key, value in edges.items()})
-        element.find(f"{_NAMESPACE}Connectors").addnext(geometry)
+        connectors = element.find(f"{_NAMESPACE}Connectors")
+        # a part without a connected port has none
+        element.insert(0 if connectors is None else element.index(connectors) + 1, geometry)
     tree.write(path, xml_declaration=True, encoding="utf-8")
 
 
