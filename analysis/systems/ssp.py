@@ -161,6 +161,12 @@ def _values(path: Path, part: Part) -> Path:
         for name, items in {port.enumeration: port.items for port in ports if port.items}.items():
             rows = [common.Item(text, number) for number, text in items]
             values.enumerations.add_enumeration(common.Enumeration(name, rows))
+    tree = etree.parse(path)
+    for node in tree.getroot().findall(f"{{{tree.getroot().nsmap['ssc']}}}Enumerations"):
+        # the library puts them last, and into another namespace than the schema
+        node.tag = f"{{{tree.getroot().nsmap['ssv']}}}Enumerations"
+        tree.getroot().insert(1, node)
+        tree.write(path, xml_declaration=True, encoding="utf-8")
     return path
 
 

@@ -15,10 +15,8 @@ import xmlschema
 from click.testing import Result
 
 from analysis import figures
-from analysis.export import build
-from analysis.mechanisms import FIVE_BAR
-from analysis.systems import End, System, WiringError, library, load_system, read_ssp, run_system, write_ssp
-from analysis.systems.description import PartTable, RunTable
+from analysis.systems import End, System, WiringError, library, load_system, read_ssp, run_system, ssp, write_ssp
+from analysis.systems.description import RunTable
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 from .conftest import system_of, wiring_of
@@ -139,16 +137,29 @@ def test_fmi_3_goes_into_an_archive_of_ssp_2(tmp_path: Path) -> None:
 
 
 def test_enumerations_are_written_by_the_names_of_their_items(tmp_path: Path) -> None:
-    build(FIVE_BAR, tmp_path)
-    part = PartTable(fmu="FiveBarSlider.fmu", values={"drive.mode": 1, "drive.speed": 40.0})
-    wiring = System(parts={"linkage": part}, run=RunTable(stop_time=0.01), folder=tmp_path).wiring()
-    path = write_ssp(wiring, tmp_path / "made.ssp")
+    """Our own FMUs have integers for their modes; here the motor's FMU says that one is an enumeration."""
+    wiring = wiring_of("motor-crank")
+    part = wiring.parts["linkage"]
+    mode = part.ports["drive.mode"]._replace(
+        type="Enumeration", enumeration="Drive", items=((0, "torque"), (1, "speed"))
+    )
+    part = replace(part, ports={**part.ports, "drive.mode": mode}, values={**part.values, "drive.mode": 1.0})
+    path = write_ssp(replace(wiring, parts={**wiring.parts, "linkage": part}), tmp_path / "made.ssp")
     with zipfile.ZipFile(path) as archive:
         archive.extractall(tmp_path / "there")
     values = tmp_path / "there" / "resources" / "linkage.ssv"
     xmlschema.XMLSchema10(SCHEMAS / "SystemStructureParameterValues.xsd").validate(values)
-    assert '<ssv:Enumeration value="speed"' in values.read_text(encoding="utf-8")
-    assert dict(read_ssp(path).parts["linkage"].values) == {"drive.mode": 1.0, "drive.speed": 40.0}
+    assert '<ssv:Enumeration value="speed" name="Drive"' in values.read_text(encoding="utf-8")
+    assert ssp._as_number("speed", mode, "drive.mode") == 1.0
+    with pytest.raises(WiringError, match="it must be a number"):
+        ssp._as_number("fast", mode, "drive.mode")
+
+
+def test_a_part_that_nothing_is_connected_to_is_kept(tmp_path: Path) -> None:
+    motor = {"motor": system_of("motor-crank").parts["motor"]}
+    wiring = System(parts=motor, run=RunTable(stop_time=0.01)).wiring()
+    path = write_ssp(wiring, tmp_path / "made.ssp")
+    assert dict(read_ssp(path).parts["motor"].values) == dict(wiring.parts["motor"].values)
 
 
 def test_what_would_be_read_past_is_refused(tmp_path: Path) -> None:
