@@ -206,7 +206,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
             0,
             ("examples/linkages/jansen.toml", "out/jansen-linkage.png", "out/toggle-press.csv"),
         ),
-        ("linkages.md", 6, 1, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu")),
+        ("linkages.md", 7, 2, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
     ],
 )
