@@ -93,8 +93,8 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
         ):
             left.plot(*_parts(MM_PER_METRE * curve), ".", markersize=3.0, color=colour, zorder=2, label=label)
         if found.solutions:
-            _draw_links(left, found.solutions[0])
-        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
+            _draw_links(left, found.solutions[0], named=True)
+        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
         best = np.degrees(np.where(found.sound, found.transmission, 0.0).max(axis=1, initial=0.0))
         x, y = _parts(MM_PER_METRE * found.pivots)
         right.plot(x[best <= 0.0], y[best <= 0.0], ".", markersize=3.0, color="0.75", label="with a defect")
@@ -154,7 +154,8 @@ def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = F
     for number, (place, angle) in enumerate(zip(places, angles), start=1):
         along = ARM * size * np.exp(1j * angle)
         mark = place + np.array([along, 0.0, 0.5j * along])
-        axis.plot(*_parts(mark), color=TARGET, linewidth=2.2, zorder=3, solid_joinstyle="miter")
+        name = "pose, its long arm along the body" if numbered and number == 1 else None
+        axis.plot(*_parts(mark), color=TARGET, linewidth=2.2, zorder=3, solid_joinstyle="miter", label=name)
         if numbered:
             label_place(axis, (place.real, place.imag), str(number))
 
@@ -166,18 +167,22 @@ def _pins(solution: Solution) -> dict[str, complex]:
     return {name: MM_PER_METRE * complex(*place) for name, place in pins.items()}
 
 
-def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = ()) -> None:
-    """Draw the links in the first pose; crank and rocker in the colours of the ``dyads`` that they are, the crank thick."""
+def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, named: bool = False) -> None:
+    """Draw the links in the first pose; crank and rocker in the colours of the ``dyads`` that they are, the crank thick.
+
+    With ``named`` the legend has them.
+    """
+    names = ("crank", "rocker", "body with its point, pose 1", "fixed pivots") if named else (None,) * 4
     pins = _pins(solution)
     pivots = np.array([MM_PER_METRE * dyad.pivot for dyad in dyads])
-    for ends, colour, width in (("AB", CRANK, 4.0), ("DC", ROCKER, 2.0)):
+    for ends, colour, width, name in (("AB", CRANK, 4.0, names[0]), ("DC", ROCKER, 2.0, names[1])):
         if len(pivots):
             colour = COLOURS[int(np.abs(pivots - pins[ends[0]]).argmin()) % len(COLOURS)]
-        axis.plot(*_parts(np.array([pins[n] for n in ends])), color=colour, linewidth=width, zorder=6)
-    body = Polygon(np.column_stack(_parts(np.array([pins[n] for n in "BPC"]))), facecolor="0.5", alpha=0.15, zorder=4)
-    axis.add_patch(body)
+        axis.plot(*_parts(np.array([pins[n] for n in ends])), color=colour, linewidth=width, zorder=6, label=name)
+    corners = np.column_stack(_parts(np.array([pins[n] for n in "BPC"])))
+    axis.add_patch(Polygon(corners, facecolor="0.5", alpha=0.15, zorder=4, label=names[2]))
     axis.plot(*_parts(np.array([pins[n] for n in "BPCB"])), color=SLIDER, linewidth=THIN, zorder=5)
-    axis.plot(*_parts(np.array([pins[n] for n in "AD"])), "^", color=GROUND, markersize=6.0, zorder=7)
+    axis.plot(*_parts(np.array([pins[n] for n in "AD"])), "^", color=GROUND, markersize=6.0, zorder=7, label=names[3])
 
 
 def _verdict(solution: Solution) -> str:

@@ -253,7 +253,8 @@ def _enlarged(axis: Axes, scene: LinkageScene) -> None:
     _draw_target(axis, scene, size=4.0)
     if scene.traced is not None:
         axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=LINE, zorder=4, label="path")
-    axis.plot(*strokes.T, color=CRANK, linewidth=HAIR, zorder=5, label=f"error{times}")
+    if not _met(scene):
+        axis.plot(*strokes.T, color=CRANK, linewidth=HAIR, zorder=5, label=f"error{times}")
     points = np.vstack([wanted, ends])
     low, high = points.min(axis=0), points.max(axis=0)
     rim = 0.06 * float((high - low).max())
@@ -282,23 +283,17 @@ def _rocker(axis: Axes, scene: LinkageScene) -> None:
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
 
 
+def _met(scene: LinkageScene) -> bool:
+    """Return whether every target is met but for rounding."""
+    errors = [scene.stations[name] for name in ("error [m]", "error of angle [rad]") if name in scene.stations]
+    return all(np.nanmax(np.abs(error), initial=0.0) < 1e-3 * ROUNDING for error in errors)
+
+
 def _errors(axis: Axes, scene: LinkageScene) -> None:
     """Plot the errors station by station."""
     x, words = _stations(scene)
     columns = scene.stations
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
-    names = [name for name in ("error [m]", "error of angle [rad]") if name in columns]
-    if all(np.nanmax(np.abs(columns[name]), initial=0.0) < 1e-3 * ROUNDING for name in names):
-        axis.text(
-            0.5,
-            0.5,
-            "every target is met: errors are rounding alone",
-            transform=axis.transAxes,
-            ha="center",
-            va="center",
-        )
-        axis.set_axis_off()
-        return
     if "error [m]" in columns:
         error = MM_PER_METRE * columns["error [m]"]
         axis.plot(x, np.where(error > ROUNDING, error, 0.0), color=COLOURS[0], **few)
@@ -383,8 +378,9 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
     """
     scene = LinkageScene(solution, title)
     with styled():
-        right = ["task", "errors", "transmission", *(["motion"] if scene.motion is not None else [])]
-        figure = Figure(figsize=(10.4, 3.1 + 1.3 * len(right)))
+        met = _met(scene)
+        right = ["task", *([] if met else ["errors"]), "transmission", *([] if scene.motion is None else ["motion"])]
+        figure = Figure(figsize=(10.4, 3.1 + 1.3 * max(3, len(right))))
         panels = figure.subplot_mosaic(
             [["linkage", name] for name in right],
             width_ratios=(1.25, 1.0),
@@ -392,11 +388,13 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         )
         _panel(panels["linkage"], scene, size=2.5)
         _task(panels["task"], scene)
-        _errors(panels["errors"], scene)
+        if not met:
+            _errors(panels["errors"], scene)
         _transmission(panels["transmission"], scene)
         if scene.motion is not None:
             _motion(panels["motion"], scene)
         write_title(figure, scene.title)
+        write_notes(figure, ["Every target is met: errors are rounding alone."] if met else [])
         figure.align_ylabels([panels[name] for name in right])
         return finish(figure)
 

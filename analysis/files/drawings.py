@@ -296,7 +296,8 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
             at(dimension.end),
             dimension.offset / metre,
             text=_label(dimension, metre),
-            override={name: share * height for name, share in sizes.items()} | {"dimtad": 1, "dimblk": ""},
+            override={name: share * height for name, share in sizes.items()}
+            | {"dimtad": 1, "dimblk": "", "dimtfill": 1},
             dxfattribs={"layer": dimension.layer},
         ).render()
     for text in drawing.texts:

@@ -452,3 +452,6 @@ def test_picture_of_four_poses_shows_good_pivots_and_the_whole_of_the_best_linka
     for x, y in best.linkage.pins(float(best.evaluation.rotation[0])).values():
         assert x0 < 1e3 * x < x1
         assert y0 < 1e3 * y < y1
+    legend = left.get_legend()
+    assert legend is not None
+    assert {"crank", "rocker", "fixed pivots"} <= {text.get_text() for text in legend.get_texts()}

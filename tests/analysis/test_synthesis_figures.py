@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import acos, cos, degrees, hypot, radians, sin
+from pathlib import Path
 
 import ezdxf
 import numpy as np
@@ -263,7 +264,20 @@ def test_targets_that_are_met_have_no_curve_of_rounding() -> None:
     task = syn.Motion(points=LINKAGE.path(PHI[:5]), angle=LINKAGE.coupler_angle(PHI[:5]), rotation=PHI[:5])
     figure = figures.plot(syn.Solution.of(task, LINKAGE))
     assert [axis for axis in figure.axes if "error" in axis.get_ylabel()] == []
-    assert any("rounding" in text.get_text() for axis in figure.axes for text in axis.texts)
+    assert "rounding" in figure.get_supxlabel()
+    assert len(figure.axes) == 3
+    assert not any("error" in text.get_text() for a in figure.axes if (of := a.get_legend()) for text in of.get_texts())
+
+
+def test_further_positions_run_through_no_number_of_a_dimension() -> None:
+    case = syn.load_synthesis_case(Path(__file__).parents[2] / "examples" / "four-poses.toml")
+    drawn = syn.drawing(syn.guidance(case.task, 1).solutions[0], poses=6)
+    thin = [LineString(line.points) for line in drawn.polylines if line.layer == "poses"]
+    assert len(thin) == 12
+    for dimension in drawn.dimensions:
+        (x0, y0), (x1, y1) = dimension.line
+        number = Point(0.5 * (x0 + x1), 0.5 * (y0 + y1)).buffer(1.3 * dimension.height)
+        assert not any(number.intersects(line) for line in thin)
 
 
 def test_the_drawing_of_moved_pivots_and_of_curves() -> None:

@@ -108,13 +108,14 @@ class Guidance(Exact):
 
     def describe(self) -> str:
         """Say in a sentence how many linkages there are."""
-        there = f"{format_count(len(self.dyads), 'real dyad')} of {len(self.dyads) + self.complex_dyads}"
+        possible = len(self.dyads) + self.complex_dyads
+        there = f"{len(self.dyads)} of {possible} possible links guide the body"
         if not self.solutions:
             return f"{there}: no four-bar carries a body through these poses"
         linkages = format_count(len(self.solutions) // 2, "four-bar")
         if not self.sound:
-            return f"{there}, {linkages}, driven from either side: each has a defect, so that no sound four-bar exists"
-        return f"{there}, {linkages}, driven from either side: {len(self.sound)} of {len(self.solutions)} sound"
+            return f"{there}; {linkages}, driven from either side: each has a defect, so that no sound four-bar exists"
+        return f"{there}; {linkages}, driven from either side: {len(self.sound)} of {len(self.solutions)} sound"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,8 +148,8 @@ class GuidanceMap(Shown):
         """Say in a sentence how many linkages there are."""
         n = len(self.points)
         return (
-            f"{n} dyads on the curve of four poses: {int(self.sound.sum())} of {n * (n - 1)} pairs make a sound four-bar with "
-            f"no link longer than {LONGEST:g} times the poses' size"
+            f"{n} links sampled of those that can guide the body: {int(self.sound.sum())} of {n * (n - 1)} pairs make a sound "
+            f"four-bar with no link longer than {LONGEST:g} times the poses' size"
         )
 
     def __repr__(self) -> str:
@@ -182,7 +183,7 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
     >>> points = [[1.5, 0.2], [1.4, 0.4], [0.9, 0.8], [-1.2, 0.6], [-1.3, 0.5]]
     >>> found = guidance(PrecisionPoints(points=points, angle=[-0.2, -0.1, 0.1, 0.5, 0.5]))
     >>> print(found.describe())
-    4 real dyads of 4, 6 four-bars, driven from either side: 7 of 12 sound
+    4 of 4 possible links guide the body; 6 four-bars, driven from either side: 7 of 12 sound
     """
     task, p, angle = _poses(task)
     return _guide_five_poses(task, p, angle) if len(p) == 5 else _guide_four_poses(task, p, angle, count)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -249,13 +249,15 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
         lines=tuple(lines),
         circles=tuple(circles),
         polylines=tuple(polylines),
-        dimensions=tuple(_links(pins, solution.linkage, height)),
+        dimensions=tuple(_links(pins, solution.linkage, height, [LineString(one.points) for one in polylines])),
         texts=tuple(texts),
     )
 
 
-def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterator[Dimension]:
-    """Yield the dimension of each link, beside it; of a slider-crank the offset of its guide."""
+def _links(
+    pins: Mapping[str, Point], linkage: Linkage, height: float, others: Sequence[LineString]
+) -> Iterator[Dimension]:
+    """Yield the dimension of each link, beside it and clear of the other lines; of a slider-crank the offset of its guide."""
     named = [ends for _, ends in linkage.bars]
     names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
     names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
@@ -263,19 +265,20 @@ def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterat
     links += [LineString([pins["C"], pins["P"]])] if "P" in pins and pins["P"] != pins["C"] else []
     placed: list[Dimension] = []
 
-    def covered(one: Dimension) -> int:
-        """Count what a dimension's number covers, other dimensions thrice, and the numbers that its lines cross."""
+    def covered(one: Dimension) -> tuple[int, int]:
+        """Count what a number covers of links and, thrice, of dimensions, with the numbers that its lines cross; of others."""
         room, strokes = _room(one), _strokes(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_room, _strokes))
-        return int(count + 3 * sum(strokes.intersects(_room(other)) for other in placed))
+        count += 3 * sum(strokes.intersects(_room(other)) for other in placed)
+        return int(count), sum(bool(room.intersects(line)) for line in others)
 
     # short links last: they have the fewest places
     for start, end in sorted(((pins[n[0]], pins[n[1]]) for n in names), key=lambda ends: -dist(*ends)):
         if dist(start, end) > height:
             choices = [
                 Dimension(layer="dimension", start=start, end=end, offset=side * rank * height, height=0.7 * height)
-                for rank in (1.5, 3.0, 4.5, 6.0, 7.5)
+                for rank in (1.5, 3.0, 4.5, 6.0, 7.5, 9.0, 10.5, 12.0)
                 for side in (1.0, -1.0)
             ]
             # the nearest of those that cover least
