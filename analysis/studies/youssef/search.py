@@ -191,7 +191,7 @@ def compute() -> StudyResult:
     short = (
         f"the least error is {least:.2f} cm2; the best of these ends is at {min(e[0] for e in errors.values()):.2f} cm2"
     )
-    columns = {"searches, of all [%]": 100.0 * (np.arange(SEARCHES) + 0.5) / SEARCHES}
+    columns = {"share of the searches [%]": 100.0 * (np.arange(SEARCHES) + 0.5) / SEARCHES}
     columns |= {f"error; {name} [cm2]": e for name, e in errors.items()} | {
         "least error [cm2]": np.full(SEARCHES, least)
     }
@@ -284,7 +284,7 @@ def compute() -> StudyResult:
 def draw(result: StudyResult) -> Figure:
     """Draw the errors at the ends of the searches in order."""
     c = result.columns
-    share = c["searches, of all [%]"]
+    share = c["share of the searches [%]"]
     names = [name for name in c if name.startswith("error; ")]
     curves = [
         Curve(x=share, y=c[name], label=name.removeprefix("error; ").removesuffix(" [cm2]"), marker=".", colour=colour)
