@@ -239,7 +239,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
             0,
             ("examples/linkages/jansen.toml", "out/jansen-linkage.png", "out/toggle-press.csv"),
         ),
-        ("linkages.md", 7, 2, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu", "out/motor.png")),
+        ("linkages.md", 8, 3, ("out/four-bar-linkage.png", "out/MyLinkage-native.fmu", "out/motor.png")),
         ("capture.md", 3, 4, ("out/capture.png", "out/capture-resonance.png")),
         ("systems.md", 17, 6, ("out/motor-crank.ssp", "out/press-check.png", "motor-crank.ssp", "runs/samples.npy")),
         ("real-time.md", 2, 0, ("out/motor-tracking-host/system.h", "out/motor-tracking-host/host")),
