@@ -21,7 +21,7 @@ from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ALIKE, READ, SMALL
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, curves_of, padded
-from . import rig_1, rig_2
+from . import rig_1
 from .rigs import (
     LOST,
     NOTICED,
@@ -704,7 +704,5 @@ STUDIES = {
         Study("8.4", compute_pulses, draw_pulses),
         Study("8.6", compute_decay, draw_decay),
         *(row.study for row in TURNS),
-        *rig_2.STUDIES,
-        *rig_1.STUDIES,
     )
 }

@@ -297,7 +297,8 @@ def draw_friction(result: StudyResult) -> Figure:
     return plot_curves(panels, title=result.heading, columns=2, size=(5.2, 3.6))
 
 
-STUDIES = (
-    Study("rig-1-resonance", compute_rig_1, draw_rig_1),
-    Study("rig-1-friction", compute_friction, draw_friction),
-)
+#: The studies by their names.
+STUDIES = {
+    "rig-1-resonance": Study("rig-1-resonance", compute_rig_1, draw_rig_1),
+    "rig-1-friction": Study("rig-1-friction", compute_friction, draw_friction),
+}

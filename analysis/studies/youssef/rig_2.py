@@ -367,11 +367,10 @@ def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: st
     )
 
 
-STUDIES = (
-    *(
-        Study(n, partial(compute_resonance, n, s), partial(draw_resonance, s))
-        for n, s in (("8.19", "C"), ("8.20", "D"))
-    ),
-    Study("8.21", compute_harmonics, draw_harmonics),
-    Study("rig-2-forces", compute_forces, draw_forces),
-)
+#: The studies by number and name.
+STUDIES = {
+    "8.19": Study("8.19", partial(compute_resonance, "8.19", "C"), partial(draw_resonance, "C")),
+    "8.20": Study("8.20", partial(compute_resonance, "8.20", "D"), partial(draw_resonance, "D")),
+    "8.21": Study("8.21", compute_harmonics, draw_harmonics),
+    "rig-2-forces": Study("rig-2-forces", compute_forces, draw_forces),
+}
