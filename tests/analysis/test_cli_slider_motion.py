@@ -89,7 +89,7 @@ def test_the_example_does_what_it_says(linkwork, tmp_path) -> None:
     assert names == {
         *("curve.csv", "report.txt", "linkage.dxf", "linkage.svg", "linkage.png", "linkage.toml"),
         *("motion.csv", "motion.png"),
-        *("force.csv", "five-bar-parameters.toml", "five-bar.toml", "tracking.csv", "tracking.png"),
+        *("force.csv", "five-bar-parameters.toml", "five-bar.toml", "system.toml", "tracking.csv", "tracking.png"),
     }
 
 
