@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
 from linkwork import five_bar, slider_crank
@@ -251,10 +253,11 @@ def residual_outputs() -> frozenset[str]:
     return frozenset(name for mechanism in MECHANISMS.values() for name in mechanism.names("residual"))
 
 
-def input_units(mechanism: Mechanism) -> dict[str, str]:
+@lru_cache(maxsize=64)
+def input_units(mechanism: Mechanism) -> Mapping[str, str]:
     """Return the units of the inputs of a mechanism by their arguments, those of rates left out."""
     units = {v.name: v.unit for v in mechanism.variables}
-    return {c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"}
+    return MappingProxyType({c.argument: units[c.name] for c in mechanism.channels if c.kind != "rate"})
 
 
 def variable_units() -> dict[str, str]:

@@ -9,6 +9,8 @@ from math import inf, isfinite, pi
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import (
@@ -313,7 +315,8 @@ class SliderCase:
         reference: dict[str, Any] = {"sample_time": with_unit(wanted.period, "s")}
         # at equal angles over a turn from 0, the angle that the crank starts at
         for name, unit, samples in (("motion", "m", drive.states[:, 1]), ("load", "N", drive.force)):
-            series = FourierSeries.from_samples(samples, HARMONICS)
+            forwards = samples if drive.crank_speed > 0.0 else np.roll(samples[::-1], 1)
+            series = FourierSeries.from_samples(forwards, HARMONICS)
             reference[f"{name}_0"] = with_unit(series.cos[0], unit)
             for n in range(1, HARMONICS + 1):
                 reference[f"{name}_cos_{n}"] = with_unit(series.cos[n], unit)

@@ -261,7 +261,7 @@ class _Stepper:
         else:
             # the last two steps share what is left
             left = self.stop_time - time
-            end = self.stop_time if left <= 1.0001 * self.step else time + min(self.step, max(0.5 * left, 1e-9 * left))
+            end = self.stop_time if left <= 1.0001 * self.step else time + min(self.step, 0.5 * left)
         self.number += 1
         return end - time, end
 
