@@ -240,6 +240,26 @@ class MotionReference(Controller):
         return value, slope
 
 
+#: Points of a `ForceTable` over a turn.
+POINTS = 72
+
+
+class ForceTable(Controller):
+    """A force over the crank angle by a table: 72 points, five degrees apart, straight lines between them, turn after turn."""
+
+    rows = (
+        *(Row(f"table_{n}", "parameter", "N", 0.0, f"Force at {n * 360 // POINTS} degrees") for n in range(POINTS)),
+        Row("angle", "input", "rad", 0.0, "Crank angle"),
+        Row("force", "output", "N", 0.0, "Force there"),
+    )
+
+    def sample(self, t: float) -> None:
+        place = POINTS * self.angle / (2.0 * pi)
+        before = floor(place)
+        first, second = (getattr(self, f"table_{n % POINTS}") for n in (before, before + 1))
+        self.force = first + (place - before) * (second - first)
+
+
 class DcServo(Controller):
     """DC motor with a current loop, limits of voltage and current, and an encoder; its rotor belongs to the load.
 
@@ -285,5 +305,6 @@ CONTROLLERS: dict[str, type[Controller]] = {
     "pid": Pid,
     "state-feedback": StateFeedback,
     "motion-reference": MotionReference,
+    "force-table": ForceTable,
     "dc-servo": DcServo,
 }

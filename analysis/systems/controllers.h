@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-enum { HARMONICS = 6 };
+enum { HARMONICS = 6, POINTS = 72 };
 
 static inline double limited(double value, double limit) {
     return fmin(fmax(value, -limit), limit);
@@ -58,6 +58,20 @@ static inline void MotionReferenceController_sample(MotionReferenceController *c
         c->force += c->load_cos[n] * cosine + c->load_sin[n] * sine;
     }
     c->velocity = slope * c->speed;
+}
+
+typedef struct {
+    double sample_time, table[POINTS], angle;
+    double force;
+    long count;
+} ForceTableController;
+
+static inline void ForceTableController_sample(ForceTableController *c) {
+    double place = POINTS * c->angle / (2.0 * 3.14159265358979323846), before = floor(place);
+    /* as in Python, the remainder of a negative number is positive */
+    int n = (int)(before - POINTS * floor(before / POINTS));
+    double first = c->table[n], second = c->table[(n + 1) % POINTS];
+    c->force = first + (place - before) * (second - first);
 }
 
 /* Take the samples before an instant. */

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -46,7 +47,8 @@ class PartTable:
     fmu : str
         An FMU of any make, of FMI 2.0.
     values : mapping
-        Parameters and inputs at the start by their FMI names; texts with units, or numbers in SI.
+        Parameters and inputs at the start by their FMI names; texts with units, or numbers in SI. Those of a table, ``table_0``
+        and so on, may be a list.
     """
 
     case: str = entry(files.text, "")
@@ -229,7 +231,13 @@ def _number(value: Any, name: str) -> float:
 
 
 def _read(values: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, float]:
-    """Read values by FMI name, each of its unit."""
+    """Read values by FMI name, each of its unit; a list has the values of ``name_0`` and so on."""
+    values = dict(values)
+    for key in [key for key, value in values.items() if isinstance(value, list)]:
+        names = [name for name in units if re.fullmatch(re.escape(key) + r"_\d+", name)]
+        if len(names) != len(values[key]):
+            raise ParameterError(f"{where}.{key}", f"{len(values[key])} values", f"have {len(names) or 'one'}")
+        values |= zip(names, values.pop(key), strict=True)
     for key in values:
         if key not in units:
             raise unknown_name(key, units, f"variable {key}, of {where}")

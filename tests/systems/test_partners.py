@@ -160,6 +160,16 @@ def test_a_motion_reference_is_its_series_and_the_rate_its_derivative() -> None:
     assert series.force == pytest.approx(7.0 * np.sin(1.4))
 
 
+def test_a_force_table_is_met_at_its_points_and_straight_between_them_in_every_turn() -> None:
+    right = 3.0 * np.cos(np.radians(np.arange(0.0, 360.0, 5.0))) + np.arange(72)
+    made = controller("force-table", **{f"table_{n}": float(value) for n, value in enumerate(right)})
+    for degrees in np.arange(-720.0, 720.0, 1.25):
+        made.angle = float(np.radians(degrees))
+        made.sample(0.0)
+        place = degrees % 360.0 / 5.0
+        assert made.force == pytest.approx(np.interp(place, np.arange(73), [*right, right[0]]), abs=1e-11)
+
+
 @pytest.mark.parametrize("name", PARTNERS)
 def test_the_balance_of_energy_of_a_partner_closes(name: str) -> None:
     run = simulate(

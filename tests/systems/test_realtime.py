@@ -6,16 +6,19 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import benchmarks.realtime
 from analysis.export import this_platform
-from analysis.systems import Wiring, WiringError, build_host, library, run_system, write_host
+from analysis.systems import System, Wiring, WiringError, build_host, library, run_system, write_host
 from analysis.systems.description import PartTable
 from analysis.systems.embedded import OPTIONS
+from analysis.systems.wiring import End
 from benchmarks.realtime import PERCENTILES, RATES, run_host
+from linkwork.errors import ParameterError
 
 from .conftest import system_of, wiring_of
 
@@ -52,6 +55,37 @@ def test_the_numbers_are_those_of_the_python_master(tracking: Path) -> None:
 @pytest.mark.parametrize("name", sorted({*library()} - {"motor-tracking"}))
 def test_every_system_of_the_library_is_a_program(name: str, tmp_path: Path) -> None:
     check_same(run_host(build_host(wiring_of(name), tmp_path), 200), wiring_of(name))
+
+
+def with_a_table(values: dict[str, Any]) -> System:
+    """The system slider-tracking, with a table for its feed-forward."""
+    system = system_of("slider-tracking")
+    parts = {**system.parts, "table": PartTable(controller="force-table", values=values)}
+    ends = {
+        End("table", "angle"): End("linkage", "crank.angle"),
+        End("controller", "feed_forward"): End("table", "force"),
+    }
+    return replace(system, parts=parts, connections={**system.connections, **ends})
+
+
+def test_a_table_as_feed_forward_is_a_list_and_is_the_same_in_c(tmp_path: Path) -> None:
+    series = wiring_of("slider-tracking").parts["reference"].values
+    degrees = np.arange(0.0, 360.0, 5.0)
+    forces = sum(
+        series.get(f"load_{kind}_{n}", 0.0) * of(n * np.radians(degrees))
+        for n in range(1, 7)
+        for kind, of in (("cos", np.cos), ("sin", np.sin))
+    )
+    wiring = with_a_table(
+        {"sample_time": "0.5 ms", "table": [f"{force + series['load_0']} N" for force in forces]}
+    ).wiring()
+    check_same(run_host(build_host(wiring, tmp_path), 2000), wiring)
+    # the table is the series but for what straight lines cut off, so that the slider goes as well
+    runs = [run_system(w, step=1e-3) for w in (wiring, wiring_of("slider-tracking"))]
+    errors = [np.abs(run["controller.error"])[run.time > 0.5].max() for run in runs]
+    assert errors[0] < 1.1 * errors[1]
+    with pytest.raises(ParameterError, match=r"71 values.*must have 72"):
+        with_a_table({"table": ["0 N"] * 71}).wiring()
 
 
 @pytest.mark.slow
