@@ -285,8 +285,8 @@ def test_counts_in_words(count: int, what: str, words: str) -> None:
 
 
 PACKAGES = ("run", "periodic", "linear", "youssef", "slider_crank", "slider")
-#: Functions that write or check parameters.
-OF_PARAMETERS = {"parameters_to", "save_parameters", "require_five_bar", "mass_origins"}
+#: Functions that write or check parameters, or tell where they come from.
+OF_PARAMETERS = {"parameters_to", "save_parameters", "require_five_bar", "mass_origins", "masses_of"}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

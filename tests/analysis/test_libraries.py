@@ -41,6 +41,8 @@ def imported(path: Path) -> Iterator[str]:
             yield from (alias.name.partition(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module is not None:
             yield node.module.partition(".")[0]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "lazy":
+            yield str(ast.literal_eval(node.args[0])).partition(".")[0]
 
 
 def test_every_library_that_is_imported_is_declared_and_no_other() -> None:
