@@ -2,7 +2,7 @@
 
     python -m benchmarks.coupling                          # every system of the library, and the other masters: an hour
     python -m benchmarks.coupling --system press           # one system (repeatable), without the other masters
-    python -m benchmarks.coupling --masters                # the other masters alone
+    python -m benchmarks.coupling --masters                # the other masters alone: ten minutes
     python -m benchmarks.coupling --decades 2              # a hundredth of the time
 
 The truth is the system as one model, by SciPy at a tolerance of 1e-12. Of each coupling of ours the error is the greatest of
@@ -81,7 +81,7 @@ def of_others(steps: Sequence[float], stop_time: float, out: Path) -> None:
         for master, (run, modes) in MASTERS.items():
             archive = str(started if modes else plain)
             ends = [
-                run_in_process(run, archive, h, round(stop_time / h), [name], options=(), timeout=600.0)[name]
+                run_in_process(run, archive, h, round(stop_time / h), [name], options=(), timeout=3600.0)[name]
                 for h in steps
             ]
             errors[master] = np.abs(np.array(ends) - right) / abs(right)
@@ -108,7 +108,7 @@ def main() -> None:
     for name in options.system or (() if options.masters else library()):
         of_ours(name, options.decades, options.out)
     if options.masters or not options.system:
-        of_others([1e-3 * 0.5**n for n in range(7)], 0.1, options.out)
+        of_others([10.0 ** -(3 + n) for n in range(options.decades + 1)], 1e-3 * POINTS, options.out)
 
 
 if __name__ == "__main__":
