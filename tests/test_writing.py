@@ -15,6 +15,8 @@ WRITERS = {
     "numerics/cache.py": "machine code and packages in the cache",
     "numerics/workers.py": "results of workers in a temporary folder",
     "display.py": "a picture in memory",
+    "studies/page.py": "plots of the theses' pages",
+    "systems/many.py": "runs of a system, with which a later call goes on",
 }
 METHODS = {"write_text", "write_bytes", "savefig", "savetxt", "tofile", "copyfile", "copytree"}
 

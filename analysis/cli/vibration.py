@@ -201,7 +201,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
         begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
-    over = "speed" if factor != 1.0 else response.family.name
+    over = "speed" if response.family.name == "drive.speed" else response.family.name
     table = (
         f"{title}: how it moves at each {over}, and where that jumps or becomes unstable (branches of periodic motions)"
     )

@@ -103,7 +103,7 @@ def _header(wiring: Wiring) -> str:
     ends = dict.fromkeys(wiring.connections.values())
     at = {end: f"y[{n}]" for n, end in enumerate(ends)}
     declared = [f"FMU({identifier})" for identifier in dict.fromkeys(native.values())]
-    begin, read, put, initialise, advance, finish = ([] for _ in range(6))
+    begin, ahead, back, read, put, initialise, advance, finish = ([] for _ in range(8))
     for name, part in wiring.parts.items():
         c, kind = names[name], native.get(name)
         if kind is None:
@@ -112,7 +112,9 @@ def _header(wiring: Wiring) -> str:
             starts = ", ".join(
                 f".{_field(port)} = {value!r}" for port, value in {**own, **part.values}.items() if value
             )
-            declared.append(f"static {kind} {c} = {{{starts}}}; /* {name} */")
+            declared.append(f"static {kind} {c} = {{{starts}}}, {c}_before; /* {name} */")
+            ahead.append(f"{c}_before = {c}, {kind}_sample(&{c});")
+            back.append(f"{c} = {c}_before;")
             initialise.append(f"SAMPLE({kind}, {c}, 0.5 * {c}.sample_time)")
             advance.append(f"SAMPLE({kind}, {c}, time + step)")
             continue
@@ -153,6 +155,8 @@ def _header(wiring: Wiring) -> str:
             *declared,
             *_function("begin(void)", begin),
             *_function("initialise(void)", initialise),
+            *_function("sample_ahead(void)", ahead),
+            *_function("go_back(void)", back),
             *_function("read_outputs(void)", read),
             *_function("set_inputs(void)", put),
             *_function("advance(double time, double step)", advance),

@@ -162,8 +162,11 @@ int main(int words, char **word) {
         return 2;
     }
     begin();
-    for (int part = 0; part < PARTS; part++) { /* what depends directly on an input settles */
+    /* what depends directly on an input settles; until the start, a controller tells what a sample would give */
+    for (int part = 0; part < PARTS; part++) {
+        sample_ahead();
         read_outputs();
+        go_back();
         set_inputs();
     }
     initialise();

@@ -270,7 +270,7 @@ def test_a_case_file_an_ensemble_and_the_command_line(linkwork: Callable[..., Re
     # without --vary it is the first commanded crank; the other one keeps its ratio to it
     done = linkwork("resonance", "--published", "two-rotors-demo", "--from", "18", "--to", "20", "--places", "0")
     assert done.exit_code == 0, done.output
-    assert "over left.speed" in done.output
+    assert "at each left.speed" in done.output
 
 
 def test_the_fmus_run_as_the_solver_does(tmp_path: Path) -> None:
