@@ -95,7 +95,9 @@ def orbit(parameters: FiveBarParameters, speed: float, start: NDArray[np.float64
 @cache
 def turn(spring: str, speed: float, **changes: float) -> Turn:
     """Return one turn of the steady motion at a speed (rpm), with changes of the rig's parameters."""
-    return orbit(rig(spring, **changes), speed).turn(SAMPLES)
+    # with friction it is found from the motion without: a run from rest to it takes minutes in all
+    start = orbit(rig(spring), speed).start if changes else None
+    return orbit(rig(spring, **changes), speed, start).turn(SAMPLES)
 
 
 def slider(of: Turn) -> NDArray[np.float64]:
@@ -164,8 +166,9 @@ def rise_at(spring: str, order: int) -> float:
 @cache
 def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
     """Return the amplitude (cm) at the speeds of `GRID` with a coefficient of friction in the guide."""
-    parameters, start, found = rig(spring, slider_friction_coefficient=coefficient), None, []
-    for speed in GRID[spring].tolist():
+    speeds, found = GRID[spring].tolist(), []
+    parameters, start = rig(spring, slider_friction_coefficient=coefficient), orbit(rig(spring), speeds[0]).start
+    for speed in speeds:
         motion = orbit(parameters, speed, start)
         start = motion.start
         found.append(CM_PER_METRE * motion.amplitude)
