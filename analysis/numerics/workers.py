@@ -200,13 +200,13 @@ def over_workers(
                     results.close()
 
 
-def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Any:
-    """Yield what other processes send, as it comes."""
+def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Generator[Any, None, None]:
+    """Yield what other processes send, as it comes; they may be lost before the first of it."""
     import joblib
 
     # small results in one batch would make a large message
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered", batch_size=1)
-    return parallel(joblib.delayed(_one)(task) for task in tasks)
+    yield from parallel(joblib.delayed(_one)(task) for task in tasks)
 
 
 def _in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, None]:
