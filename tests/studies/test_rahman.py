@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from functools import cache
+from math import cos, sin
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,41 @@ from ..published_rahman import (
     TWISTS_DEG,
 )
 from .results import check, every, result, statement
+
+#: For each erratum: the study, how the statement that fails begins, its case, and by how much.
+SHOWN = (
+    ("1", "rahman-closure", "The iterative process", "loop open, a4 = 10 in at S1 = 3.5 in", 27.02),
+    ("1", "rahman-closure", "The iterative process", "error of S4, a4 = 10 in at S1 = 3.5 in", 5.88),
+    # of an axis that is turned by 0.8 rad
+    ("2", "rahman-rates", "where symbols", "angular velocity", 2.0 * sin(0.4) * 2.1),
+    ("3", "rahman-rates", "The final", "row 37f where abs(sin theta2) > 0.15, a4 = 30 in at S1 = 9 in", 83.74),
+    ("3", "rahman-rates", "The final", "row 37f where abs(sin theta2) > 0.15, alpha4 = 310 deg", 215.17),
+    ("3", "rahman-rates", "Since rank", "coefficients with the right side", 6.0),
+    # the term that is too large, by 1 - cos^2 eta2
+    (
+        "4",
+        "rahman-rates",
+        "The final",
+        "theta2' by eq 39",
+        CRANK_IN * CRANK_SPEED * sin(2.1) * cos(1.3) * sin(0.35) ** 2 / (ROD_IN * sin(1.3)),
+    ),
+    ("8", "rahman-forces", "If not satisfied", "2F2i", 1.0),
+    ("9", "rahman-rates", "Now separating", "row 6", CRANK_IN * CRANK_SPEED * sin(2.1) * (1.0 - sin(0.35))),
+    ("9", "rahman-rates", "[equation (28a)", "alpha = 2", 2.0 * 2.0 * cos(1.8) * (1.0 - sin(1.8)) * CRANK_SPEED),
+    ("9", "rahman-forces", "Specific gravity", "m1", 1.0 - 62.43 / 12.0**3),
+)
+
+
+@pytest.mark.parametrize(
+    ("erratum", "study", "beginning", "label", "size"),
+    [row if row[1] == "rahman-forces" else pytest.param(*row, marks=pytest.mark.slow) for row in SHOWN],
+)
+def test_what_fails_by_an_erratum(erratum: str, study: str, beginning: str, label: str, size: float) -> None:
+    found = statement(study, beginning)
+    (case,) = (case for case in found.cases if case.label == label)
+    assert not case.holds
+    assert f"erratum {erratum}" in f"{found.why} {case.why}"
+    assert case.computed == pytest.approx(abs(size), rel=4e-4)
 
 
 @every("R", "rahman-")
