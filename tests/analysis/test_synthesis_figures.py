@@ -463,7 +463,7 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     shown = [line.split() for line in syn.report(function).split("\n\n")[-1].splitlines()]
     angles = np.degrees(np.column_stack(list(function.columns().values())))
     np.testing.assert_allclose([[float(cell) for cell in row[1:]] for row in shown[1:]], angles, atol=6e-5)
-    assert "stroke" in syn.report(timed(SLIDING))
+    assert f"slider at D: stroke {1e3 * SLIDING.pivot.stroke:.6g} mm" in syn.report(timed(SLIDING))
     assert "second crank at D: 2 turns" in syn.report(timed(GEARED))
 
 
