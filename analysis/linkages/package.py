@@ -61,22 +61,19 @@ from typing import ClassVar
 
 from linkwork import friction, planar
 from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Link, Mechanism, Mode, Part, PublishedSet
-from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import POSITION, RATE, Variable, energy_outputs, output, status_variables, tolerance_parameter
 
 from . import equations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(CheckedParameters):
     """SI units."""
 
     RULES: ClassVar[Rules] = Rules({rules})
 
 {fields}
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
 
     def constants(self) -> equations.Constants:
         """Return what the equations use."""
@@ -86,13 +83,10 @@ class Parameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Initial:
+class Initial(CheckedState):
     """State at the start."""
 
 {initial}
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 VARIABLES = (
