@@ -18,10 +18,10 @@ from ...files import write_csv
 from ...mechanisms import Parameters
 from ...run import takes_published
 from ..motion.discretisation import OperatingPoint
-from ..motion.drive import Drive, coordinate_ranges, starts_of
+from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, PLAIN, VARIATIONAL
-from ..motion.orbit import PeriodicOrbit, first_guess, require_turns
+from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, orbits_of
 from ..motion.variables import Plane
 from . import kernels
@@ -141,16 +141,13 @@ def coexistence(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys, rows = grid_points(operation, x, y)
-    first = rows[0][0]
-    guess = first_guess(first.flow, first.drive, start)
-    guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
+    xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
     data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
-        (len(xs), MOST_ORBITS, first.flow.size + 2),
+        (len(xs), MOST_ORBITS, guesses.shape[1] + 2),
     )
     return Coexistence(
         x=xs,
@@ -158,7 +155,7 @@ def coexistence(
         largest=np.ma.masked_invalid(data[..., 0]),
         amplitude=np.ma.masked_invalid(data[..., 1]),
         starts=data[..., 2:],
-        swing=first.flow.components[0],
+        swing=rows[0][0].flow.components[0],
         computed=computed,
     )
 

@@ -218,16 +218,13 @@ def grid(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys, rows = grid_points(operation, x, y)
-    first = rows[0][0]
-    guess = first_guess(first.flow, first.drive, start)
-    guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
+    xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_row, multipliers)
     data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_row).rows(
         partial(_compute_row, guesses, tolerance),
         rows,
         [row_name(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
-        (len(xs), len(guess) + 2),
+        (len(xs), guesses.shape[1] + 2),
     )
     status = data[..., -1].astype(np.int64)
     return Grid(
@@ -250,9 +247,9 @@ def _compute_row(guesses: FloatArray, tolerance: float, row: Sequence[OperatingP
 
 
 def grid_points(
-    operation: Plane, x: ArrayLike, y: ArrayLike
-) -> tuple[FloatArray, FloatArray, list[list[OperatingPoint]]]:
-    """Return the values of the axes of a grid and its operating points by rows.
+    operation: Plane, x: ArrayLike, y: ArrayLike, start: ArrayLike | None, count: int
+) -> tuple[FloatArray, FloatArray, list[list[OperatingPoint]], FloatArray]:
+    """Return the values of the axes of a grid, its operating points by rows, and the guesses for each row, shape (k, n).
 
     Raises InputError if an axis is empty or not finite.
     """
@@ -260,7 +257,10 @@ def grid_points(
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    return xs, ys, [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
+    rows = [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
+    first = rows[0][0]
+    guess = first_guess(first.flow, first.drive, start)
+    return xs, ys, rows, np.vstack([guess, starts_of(first.parameters, first.drive, guess, count)])
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:
