@@ -17,7 +17,7 @@ from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
 class Parameter(NamedTuple):
-    """A parameter: FMI name, unit, meaning, value, and rule: ``positive``, ``free`` (either sign), ``sign`` (+1, -1) or none."""
+    """A parameter: FMI name, unit, meaning, value, and rule: ``positive``, ``free`` (any sign), ``sign`` (+1, -1) or none."""
 
     name: str
     unit: str
