@@ -241,7 +241,7 @@ class Wiring:
             yield from walk([source])
 
     def bonds(self) -> list[Bond]:
-        """Return the power bonds: pairs of an effort and a flow in opposite directions between two parts, if the pair is unique."""
+        """Return the power bonds: unique pairs of an effort and a flow in opposite directions between two parts."""
         found = [
             Bond(source, target, flow, flow_to)
             for target, source in self.connections.items()

@@ -1,4 +1,4 @@
-"""Coexisting motions: how many are stable at each point of a plane, and on which of them a start settles."""
+"""Find coexisting motions: the stable ones at each point of a plane, and the basins of attraction of each motion."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Coexistence:
     starts : ndarray, shape (ny, nx, k, n)
         y at crank angle 0; NaN after the last.
     swing : (str, str)
-        Coordinate that the amplitude is of, and its unit.
+        Coordinate whose amplitude is given, and its unit.
     computed : int
         Rows that were not in the cache.
     """
@@ -121,7 +121,7 @@ def coexistence(
     """Find all periodic motions of one turn at every point of a grid.
 
     The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones
-    divided out. One that exists in a short part of a row only may be missed: `find_orbits` looks at one point more closely.
+    divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches one point closely.
     The rows are distributed over workers and kept as in `grid`.
 
     Parameters
@@ -194,8 +194,8 @@ class Basins(Shown):
     position, rate : ndarray, shapes (nx,) and (ny,)
         Starts of the first free coordinate, of a slider (m), and of its rate (m/s); the rest of y is that of the first motion.
     ends : ndarray of int, shape (ny, nx)
-        Number of the stable motion among ``motions``; -1 if the links come to the limit of assembly, -2 if none of them is
-        met within the turns that are followed.
+        Number of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the run reaches no
+        motion within the turns that are followed.
     found : Orbits
         All motions that were found; the unstable ones lie on the boundaries of the basins.
     computed : int
@@ -259,7 +259,7 @@ def basins(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Basins:
-    """Compute on which stable periodic motion each start of a plane settles; its rows are kept as those of `grid`.
+    """Compute basins of attraction: the stable periodic motion on which each start of a plane settles.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Grids of the largest Floquet multiplier, each point on its own periodic orbit: over cores, kept on disk, resumed."""
+"""Compute grids of the largest Floquet multiplier, a periodic orbit per point: on all cores, kept on disk, resumable."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ class GridInterrupted(Interrupted):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grid:
-    """The largest Floquet multiplier over a grid, each point on its own periodic orbit.
+    """The largest Floquet multiplier at each point of a grid, of the periodic orbit at that point.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Grid:
     starts : ndarray, shape (ny, nx, n)
         Starts of the orbits, see `PeriodicOrbit`; NaN if ``largest`` is masked.
     status : ndarray of int, shape (ny, nx)
-        `kernels.Status`: 0, or why there is no orbit.
+        `kernels.Status`: 0, or the reason why there is no orbit.
     computed : int
         Rows that were not in the cache.
     """
@@ -148,7 +148,7 @@ class Grid:
     computed: int
 
     def reason(self, row: int, column: int) -> str:
-        """Return why a point has no orbit; empty if it has one."""
+        """Return the reason why a point has no orbit; empty if it has one."""
         return REASONS.get(Status(self.status[row, column]), "")
 
     def around(self, x: float, y: float) -> FloatArray:
@@ -300,7 +300,7 @@ def row_name(
 
 @dataclass(frozen=True, slots=True)
 class Keeping:
-    """Computation of rows over workers, and their storage on disk.
+    """Computation of rows on several workers, and their storage on disk.
 
     Attributes
     ----------
