@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import cos, sin, tau
+from math import tau
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,7 +19,7 @@ from ...files import Choice, Kinds, Many, Quantity, Table, Whole, entry, flag, r
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..task.formula import function_from_formula, path_from_formula
-from ..task.target import TargetPath
+from ..task.target import TargetPath, transform_points
 from ..task.task import (
     Motion,
     Objective,
@@ -212,9 +212,7 @@ class _Curve(_Formula):
             found, closed = path.points, path.closed
         shift = np.zeros(2) if self.shift is None else read_plane_points([self.shift], "task.shift", self.unit)[0]
         if not (self.scale is None and self.turn is None and self.shift is None):
-            scale, turned = 1.0 if self.scale is None else self.scale, self.turn or 0.0
-            c, s = scale * cos(turned), scale * sin(turned)
-            found = found @ np.array([[c, s], [-s, c]]) + shift
+            found = transform_points(found, 1.0 if self.scale is None else self.scale, self.turn or 0.0, shift)
         return found, closed if self.closed is None else self.closed
 
 

@@ -54,6 +54,12 @@ def ring(points: FloatArray, closed: bool) -> FloatArray:
     return np.vstack([points, points[:1]]) if closed else points
 
 
+def transform_points(points: FloatArray, scale: float, angle: float, shift: ArrayLike) -> FloatArray:
+    """Return points, shape (n, 2), scaled and rotated (rad, counter-clockwise) about the origin, then shifted (m)."""
+    c, s = scale * cos(angle), scale * sin(angle)
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + shift)
+
+
 def arc_lengths(vertices: FloatArray) -> FloatArray:
     """Return the length along a polyline up to each vertex, from 0, shape (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
@@ -269,8 +275,7 @@ class TargetPath:
         """
         if not scale > 0.0:
             raise InputError(f"the scale is {scale!r}: it must be greater than zero")
-        c, s = scale * cos(angle), scale * sin(angle)
-        return TargetPath(points=self.points @ np.array([[c, s], [-s, c]]) + shift, closed=self.closed)
+        return TargetPath(points=transform_points(self.points, scale, angle, shift), closed=self.closed)
 
     def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
         """Fit a cubic smoothing spline to a noisy curve; return n points of it at equal arc length.
