@@ -85,7 +85,7 @@ def load_package(path: str | Path) -> Package:
 
 #: A number in SI, or a text with a unit such as "50 mm".
 Amount = float | str
-#: Coordinates x, y; 0 stands for one that is always zero.
+#: Coordinates x, y; 0 means that a coordinate is always zero.
 Place = Sequence[Amount]
 
 

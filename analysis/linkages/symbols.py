@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-#: Letter and further index by the last part of a name; of a force or a coordinate of a point the axis is the index.
+#: Letter and further index by the last part of a name; for a force or a coordinate of a point the index is the axis.
 _SYMBOLS = {
     "angle": (r"\theta", ""),
     "speed": (r"\dot\theta", ""),

@@ -34,9 +34,9 @@ WAYS = {
     "updates": Way("updates", fmi=3),
     "rollback": Way("rollback"),
 }
-#: Steps of a decade, as shares of its first: each divides that.
+#: Steps of a decade relative to its first, which each of them divides.
 _DECADE = (1.0, 0.5, 0.2)
-#: Errors below this are those of the parts' own integration, not of the coupling.
+#: Errors below this are due to the parts' own integrators, not to the coupling.
 _FLOOR = 1e-8
 
 

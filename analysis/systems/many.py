@@ -22,7 +22,7 @@ from ..run import CosimulationError, shown
 from .master import run_system
 from .wiring import End, Part, Wiring
 
-#: Runs that are given out together.
+#: Number of runs per batch.
 _BATCH = 16
 
 

@@ -24,18 +24,18 @@ from ..run import CosimulationError, RunInterrupted, shown
 from .instances import Floats, instance_of
 from .wiring import Bond, End, Wiring
 
-#: How the inputs go over a step.
+#: The inputs over a communication step, by coupling.
 COUPLINGS = {
     "hold": "constant: the outputs at the start of the step",
     "derivatives": "linear, with the outputs' slopes at the start; FMI 3.0: constant, the linear value in the middle",
     "updates": "linear, as before; an FMI 3.0 part receives the value at each step of its own integrator",
     "rollback": "linear between the outputs at start and end, so that each step is taken twice",
 }
-#: Gains of the controller of the communication step, proportional and integral; the least and greatest growth of a step, and of
-#: all steps, as shares of the first one (Sadjina et al., section 5).
+#: Controller of the communication step: proportional and integral gain; least and greatest growth of a step; least and greatest
+#: step relative to the first one (Sadjina et al., section 5).
 _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
-#: What a step leaves of the power that residuals are measured by: some fifty steps are remembered, so that zeros of a power do
-#: not count.
+#: Decay per step of the reference power for the residuals: it remembers some fifty steps, so that zeros of a power do not
+#: matter.
 _MEMORY = 0.98
 
 

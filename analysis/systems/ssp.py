@@ -34,7 +34,7 @@ etree = lazy("lxml.etree")
 _NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 #: Type of the annotation of the experiment with the communication step, for which the standard has no place.
 _STEP = "linkwork.communication-step"
-#: What the library would read past in silence.
+#: Elements that the library ignores silently.
 _UNREAD = ("LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "SignalDictionaries")
 
 

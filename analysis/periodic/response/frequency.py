@@ -144,7 +144,7 @@ def natural_frequency(parameters: Parameters) -> float:
 STRAYED = 4.0
 
 
-#: What ranges to avoid do not know if no motions were sought beside the branches.
+#: Warning about ranges to avoid if no motions off the branches were sought.
 UNSOUGHT = "motions that no branch leads to were not sought"
 
 

@@ -381,7 +381,7 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
-#: Deviation below which there is none.
+#: Deviation below which it counts as zero.
 TINY = 1e-300
 #: Turns of a run at least, and at most.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000

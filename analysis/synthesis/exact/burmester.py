@@ -31,13 +31,13 @@ from ..task.task import Motion, PrecisionPoints, Task, normal_form
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Poses = PrecisionPoints | Motion
-#: Below this share of the largest singular value the conditions of the poses are not independent.
+#: Singular value, relative to the largest, below which the conditions of the poses are not independent.
 INDEPENDENT = 1e-10
 #: Imaginary part, in units of the poses' size, up to which a dyad is real.
 REAL = 1e-7
-#: Points of the curve of four poses, on each of the two branches that a line through its pole meets.
+#: Points of the curve of four poses on each of its two branches, which a line through its pole meets.
 CURVE_POINTS = 180
-#: Links longer than this many times the poses' size are left out of the map of four poses, as in a search without bounds.
+#: Greatest length of links, in sizes of the poses, in the map of four poses, as in a search without bounds.
 LONGEST = 5.0
 
 

@@ -32,7 +32,7 @@ from .burmester import INDEPENDENT, REAL, Exact, dyads_of_five, exact_solution
 FloatArray = NDArray[np.float64]
 #: Crank, coupler and rocker in units of the ground link; the crank's phase and the output's mounting (rad).
 Links = tuple[float, float, float, float, float]
-#: The ground link of a function generator where none is asked for (m), as in a search.
+#: Default ground link of a function generator (m), as in a search.
 GROUND = 0.1
 #: Distance from the unit circle up to which a root of the determinant is an angle.
 ON_CIRCLE = 1e-6
@@ -201,7 +201,7 @@ def _make_generator(
     return exact_solution(task, linkage, np.asarray(task.rotation), sides)
 
 
-#: Rotations between two stations at which a link's angle is followed.
+#: Rotations between two stations at which a link's angle is tracked.
 BETWEEN = 90
 
 

@@ -34,7 +34,7 @@ from ..task.limits import GROUND, LARGEST
 from ..task.task import RockerFunction, SliderFunction
 
 FloatArray = NDArray[np.float64]
-#: Couplers that are looked at before the best is found exactly.
+#: Number of couplers that are tried before the best one is found exactly.
 COUPLERS = 2001
 #: Dimensions of a slider-crank that bounds may be of.
 BOUNDED = ("ground_length", "crank_length", "coupler_length")

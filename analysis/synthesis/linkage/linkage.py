@@ -34,13 +34,13 @@ from .kind import Kind
 from .pivot import SecondCrank, SliderMotion, format_ratio, geared
 
 FloatArray = NDArray[np.float64]
-#: Of a linkage: what must be greater than zero, what is a length of any sign, what is an angle.
+#: Dimensions of a linkage: those greater than zero, lengths of any sign, angles.
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
 #: Their units.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
-#: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
+#: Grashof types of a four-bar with a link that turns fully, by its shortest link, in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations at which a full turn is evaluated.
 TURN = 360

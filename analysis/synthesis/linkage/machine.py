@@ -27,9 +27,9 @@ from .linkage import Linkage, SliderCrank, on_line
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
-#: Distance of the rocker pivot that stands for one at infinity, in couplers.
+#: Distance of the rocker pivot that represents one at infinity, in coupler lengths.
 FAR = 1e7
-#: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
+#: Stiffness of the slider that represents a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
 
 
@@ -198,7 +198,7 @@ FloatArray = NDArray[np.float64]
 PINS = "ABCD"
 #: Samples of a turn that is run.
 SAMPLES = 720
-#: Mass of the slider that stands for a fixed pivot in such a run, in masses of the links.
+#: Mass of the slider that represents a fixed pivot in such a run, relative to the mass of the links.
 HEAVY = 1e8
 
 

@@ -15,7 +15,7 @@ from ...numerics.fourier import FourierSeries
 from ...units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
-#: Greatest number of turns of either crank until a geared five-bar is as it was.
+#: Greatest number of turns of either crank per period of a geared five-bar.
 TEETH = 6
 
 

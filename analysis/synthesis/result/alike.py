@@ -14,7 +14,7 @@ from ..linkage.pivot import SecondCrank, geared
 from ..task.task import RockerFunction
 from .solution import Solution
 
-#: Near copies differ by no more: place of a pin, as a share of the longest link; ratio of two lengths of one link.
+#: Greatest differences of near copies: position of a pin, relative to the longest link; ratio of two lengths of one link.
 SHARE, RATIO = 0.03, 1.25
 
 

@@ -23,7 +23,7 @@ from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
 
 FloatArray = NDArray[np.float64]
 
-#: Layers in the order in which they are drawn; their colours are seen on white and on black.
+#: Layers in the order in which they are drawn; their colours are visible on white and on black.
 LAYERS = {
     "poses": Layer(colour=0x808080, width=0.13e-3),
     "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
@@ -165,7 +165,7 @@ class LinkageScene:
 
 
 Point = tuple[float, float]
-#: Radius of a pin and height of a letter, as shares of the drawing's extent.
+#: Radius of a pin and height of a letter, relative to the drawing's extent.
 PIN, LETTER = 0.008, 0.022
 
 

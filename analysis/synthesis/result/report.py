@@ -24,16 +24,16 @@ from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, pa
 FloatArray = NDArray[np.float64]
 #: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
 LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
-#: Angles of a moved pivot, besides the coefficients of its motion.
+#: Angles of a moving pivot, besides the coefficients of its motion.
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
-#: Share of the target above which an answer is called poor, and what may do better by the kind of linkage.
+#: Error relative to the target above which a solution is called poor, and the improvements to suggest by kind of linkage.
 POOR = 0.05
 _BETTER = {
     "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions for it",
     "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions for it",
     "geared-five-bar": "other ratios of its gears (search.gears), or a smoother or smaller target, may do better",
 }
-#: Step of the differences of exact derivatives, in rad or as a share of the longest link.
+#: Step of the differences of exact derivatives, in rad or relative to the longest link.
 DIFFERENCE = 1e-5
 
 

@@ -26,9 +26,9 @@ from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, Untime
 from .described import description, drives
 
 FloatArray = NDArray[np.float64]
-#: Share of the target's size squared below which an error is rounding.
+#: Fraction of the target's size squared below which an error is due to rounding.
 EXACT = 1e-14
-#: Points of a coupler curve by which an untimed path is judged: the thesis's 360.
+#: Points of a coupler curve with which an untimed path is evaluated: the thesis's 360.
 CURVE = 360
 
 

@@ -35,32 +35,32 @@ from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, 
 from .statement import PARTS, Objective
 
 FloatArray = NDArray[np.float64]
-#: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
+#: Number of untimed stations up to which least squares is as fast as IPOPT, whose Jacobian is sparse.
 FEW = 20
-#: How many of the fits go on to the greatest error.
+#: Number of fits after which the greatest error is minimised.
 ONWARDS = 6
-#: How many paths go on to the measure between the curves, and by how many iterations: many by a few, the best of them further.
-#: Of an open path, whose ends are free too, the first laps tell less.
+#: Numbers of paths whose measure between the curves is minimised, with their iterations: many paths by a few iterations, the
+#: best of them by more. For an open path, whose ends are free, too, the first laps say less.
 RACE = {
     "area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)),
     "open area": ((40, 12), (12, 40), (3, 100), (1, 100), (1, 200)),
     "worst": ((ONWARDS, ITERATIONS),),
 }
-#: Fits of squares that a path's race begins with besides the starts themselves: most end at the same few optima.
+#: Least-squares fits from which paths are refined, besides the starts themselves: most end at the same few optima.
 FITTED = 8
-#: How many of the best are followed to the end, by so many iterations more, where they were cut off.
+#: Number of the best answers that are continued if they reached the limit of iterations, and further iterations for each.
 FINISHED, LONG = 4, 1500
-#: How many triangles of a region that is not convex are tried at a time.
+#: Number of triangles of a region that are tried at a time.
 PIECES = 3
-#: Starts of one part of the work of several cores, at most: what is lost where it is interrupted.
+#: Greatest number of starts per piece of work on several cores, which is lost on an interruption.
 MOST = 32
-#: Linkages that differ by less than this, in shares of the longest link and in rad, count as one.
+#: Linkages that differ by less than this, relative to the longest link and in rad, count as one.
 DIFFERENT = 1e-3
-#: The same for paths that race: less than this would end at the same optimum.
+#: The same for paths during refinement: closer ones end at the same optimum.
 RACED = 0.02
-#: Rotations on the way of a task at which a start is judged, more than a search can afford.
+#: Rotations during a task at which a start is checked, more than a search can afford.
 JUDGED = 400
-#: Share of the quality below which points count as met exactly (units squared).
+#: Quality below which points count as passed exactly (units squared).
 EXACT = 1e-14
 
 

@@ -27,7 +27,7 @@ from .start import Answer, Start, inside, outside, pivot_size
 from .statement import FURTHER, GRID, SOUGHT, Statement
 
 FloatArray = NDArray[np.float64]
-#: How IPOPT follows its barrier: freely from a start that is only near, with care from one that a first solution gave.
+#: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution.
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},
@@ -36,9 +36,9 @@ FOLLOWING: dict[str, dict[str, Any]] = {
 }
 #: Iterations of IPOPT: most optima are reached in a hundred, or in many.
 ITERATIONS = 250
-#: How far a constraint may be exceeded and yet be kept: units, rad, or a share of the bound.
+#: Tolerance of a constraint: units, rad, or a fraction of the bound.
 KEPT = 1e-7
-#: Share of the bounds of the pivot's motion that is left free at its extremes, and how often these are looked for again.
+#: Margin of the bounds of the pivot's motion at its extremes, and the greatest number of times that these are found anew.
 HELD, ROUNDS = 2e-7, 6
 
 

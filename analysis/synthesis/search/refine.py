@@ -27,19 +27,19 @@ from .start import Answer, Start
 
 FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
-#: Iterations of SLSQP, and the change of the measure, as a share of what it was at first, at which it ends.
+#: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
 ITERATIONS, CHANGE = 100, 1e-7
-#: Share of the greatest mean square displacement of the curve by a unit of a direction; stiffer ones are not stretched further.
+#: Least mean square displacement of the curve by a direction, relative to the greatest, down to which directions are scaled.
 STIFF = 1e-6
-#: Pieces of the target, at least, along which distances are taken.
+#: Least number of pieces of the target at which distances are computed.
 PIECES = 360
-#: Of the greatest distance: every so many of all are held first, then those that are at least this share of it.
+#: For the greatest distance: every so many of all distances are bounded first, then those of at least this fraction of it.
 STRIDE, GREAT = 3, 0.5
-#: Way of the first station from where it was, and rotation by which successive stations are kept apart (rad).
+#: Greatest rotation of the first station from its former place, and least rotation between successive stations (rad).
 WINDOW, APART = 0.6, 1e-10
-#: Share of the bound of the greatest distance by which it may be exceeded: its places on the curve change from step to step.
+#: Fraction by which the bound of the greatest distance may be exceeded: its points on the curve change from step to step.
 WITHIN = 1e-5
-#: Where the crank begins to turn says nothing of a closed curve.
+#: The crank rotation at the start does not affect a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
 
 

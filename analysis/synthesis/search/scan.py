@@ -34,19 +34,19 @@ from .start import Start, apart
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-#: Ranges of l2/l1, l3/l1, l4/l1 that are searched, evenly in the logarithm.
+#: Ranges of l2/l1, l3/l1, l4/l1 that are sampled, uniformly in the logarithm.
 SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
-#: Of a slider-crank of l1/l3 and l2/l3; of l5/l1, of a second crank; crank rotations at which a five-bar is looked at.
+#: Ranges of l1/l3 and l2/l3 of a slider-crank; of l5/l1 of a second crank; crank rotations at which a five-bar is checked.
 GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
 #: Candidates in one piece of work.
 CHUNK = 4096
-#: One of so many coupler curves is that of the crank pin.
+#: One of so many coupler points is at the crank pin.
 PINNED = 64
-#: Of a chunk of coupler curves, how many are placed over the target: the most alike.
+#: Number of coupler curves of a chunk that are placed over the target: the most similar ones.
 PLACED = 160
-#: Steps of a coupler curve and points of it at even arc length.
+#: Steps of a coupler curve, and its points at equal arc lengths.
 CURVE, EVEN = 128, 64
-#: Pieces of a coupler curve that an open target is laid over: points at even arc length, first steps, lengths in steps.
+#: Pieces of a coupler curve that are compared with an open target: points at equal arc lengths, first steps, numbers of steps.
 PIECE = 24
 STARTS = np.arange(0, CURVE, 8)
 SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])

@@ -49,9 +49,9 @@ from .start import (
     start_of,
 )
 
-#: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
+#: Stations of an untimed path with a moving pivot: more than with a fixed one, because harmonics cause waves in the curve.
 STATIONS = 144
-#: Untimed points that a four-bar can meet exactly, and how many times the starts they are searched from until they are met.
+#: Untimed points that a four-bar can pass exactly, and the factor by which starts are increased until it passes them.
 MOST_EXACT, AGAIN = 9, 4
 
 

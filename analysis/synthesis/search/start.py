@@ -91,7 +91,7 @@ def over_cores(
 
 
 FloatArray = NDArray[np.float64]
-#: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
+#: Initial amplitudes of the motion of a pivot, relative to the ground link.
 AMPLITUDE = 0.1
 
 

@@ -26,24 +26,24 @@ from .start import pivot_bounds
 
 FloatArray = NDArray[np.float64]
 Objective = Literal["squares", "worst", "transmission", "curve", "least", "least curve"]
-#: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
-#: to the least transmission angle for what is between them (rad).
+#: Number of crank rotations at which assembly, speed and acceleration of a moving pivot are bounded, and the margin of the
+#: least transmission angle for the rotations between them (rad).
 GRID, BETWEEN = 96, 2.5e-3
-#: Margin of a Grashof type, as a share of the links' sum: at zero a four-bar is a change-point.
+#: Margin of a Grashof type, relative to the sum of the links: at zero a four-bar is a change-point.
 MARGIN = 1e-4
-#: Parts of the way from one station to the next at whose ends a search holds the transmission angle.
+#: Parts between two stations at whose ends a search bounds the transmission angle.
 PARTS = 4
-#: Least rotation of the crank from one untimed station to the next, as a share of an even one.
+#: Least crank rotation between untimed stations, relative to equal steps.
 ADVANCE = 1e-3
 #: Least rotation over which an open path is traced (rad).
 LEAST_WAY = 1e-3
-#: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
+#: Greatest crank rotation between untimed stations, relative to equal steps: a wider gap would leave the path uncontrolled.
 GAP = 8.0
-#: Objectives in the place of an error.
+#: Objectives that replace an error.
 SOUGHT = ("least", "least curve")
-#: Name of the bound of the greatest error; share of it by which an error of zero has a slope.
+#: Name of the bound of the greatest error; fraction of it that smooths the absolute value at an error of zero.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
-#: Rotations beside the given ones at which what holds all along is held: its greatest values in the solution before.
+#: Further rotations at which an `Along` is bounded: those of its greatest values in the solution before.
 FURTHER = 8
 
 

@@ -478,9 +478,9 @@ class LeastPinForce(_Forces):
 
 #: The constraints that are about pin forces.
 FORCES = (MaxPinForce, LeastPinForce)
-#: Rotations at which what holds along the crank's rotation is held from the beginning.
+#: Number of rotations at which an `Along` is bounded from the beginning.
 GRID = 48
-#: Rotation by which more than a turn is looked at (rad).
+#: Rotation beyond a turn in which peaks are sought (rad).
 BEYOND = 0.02
 
 

@@ -367,12 +367,12 @@ def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
 
 #: Rotations among which the greatest values of a function are looked for.
 DENSE = 721
-#: What a function of the user's may take from `math` or NumPy.
+#: Names that a user's function may take from `math` or NumPy.
 TRACED = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
     "exp", "log", "sqrt", "hypot", "fabs",
 )  # fmt: skip
-#: And what CasADi has under another name, or not at all.
+#: Functions that CasADi has under another name, or not at all.
 RENAMED: dict[str, Callable[..., Any]] = {
     "degrees": lambda x: x * (180.0 / pi),
     "radians": lambda x: x * (pi / 180.0),

@@ -29,7 +29,7 @@ from ..linkage.linkage import Linkage
 from .constraint import TURNING, Along, Demand, Require, Way, even_rotations, search_range
 
 FloatArray = NDArray[np.float64]
-#: Two links in one line: one beyond the other, or one over the other.
+#: Two collinear links: one extends the other, or lies over it.
 InLine = Literal["stretched", "folded"]
 
 
@@ -111,7 +111,7 @@ class _SliderCrankPositions(_FourBarPositions):
         return (g.s3 * c2 - g.c3 * s2) / g.s3
 
 
-#: Of a geared five-bar nothing rests.
+#: A geared five-bar has no dead centres.
 POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
     "four-bar": _FourBarPositions,
     "slider-crank": _SliderCrankPositions,

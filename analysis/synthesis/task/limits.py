@@ -40,7 +40,7 @@ from .constraint import (
 from .task import Normal, RockerFunction, SliderFunction, Task
 
 FloatArray = NDArray[np.float64]
-#: Largest link by default, in sizes of the target; and, of a rocker function, in ground links.
+#: Default bound of the links, in sizes of the target; for a rocker function in ground links.
 LARGEST = 5.0
 #: Ground link of a rocker function by default (m): its angles do not depend on the size.
 GROUND = 0.1
@@ -322,16 +322,16 @@ def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, const
         )
 
 
-#: Ratios of the gears of a five-bar that are tried.
+#: Default gear ratios of five-bars.
 GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
-#: Constraints that any linkage can keep, and those of a slider-crank.
+#: Constraints that apply to any linkage, and those for slider-cranks.
 _ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
 _KEPT: Mapping[Kind, tuple[type, ...]] = {
     "four-bar": get_args(Constraint),
     "slider-crank": (*_ANY, Demand, Stroke),
     "geared-five-bar": _ANY,
 }
-#: Why a five-bar can keep none of the demands.
+#: Reason why these constraints do not apply to a five-bar.
 _NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant of the pin forces has no second crank"
 
 

@@ -18,12 +18,12 @@ from linkwork.errors import InputError
 from ...files import read_points
 
 FloatArray = NDArray[np.float64]
-#: Share of a curve's extent below which two points are the same one, and of its length squared below which it has no area.
+#: Fraction of a curve's extent below which two points coincide, and of its length squared below which its area is zero.
 COINCIDENT = 1e-12
-#: Most points that the smoothing takes; a curve of more is first resampled to as many.
+#: Greatest number of points for smoothing; a curve with more points is resampled first.
 MOST_SMOOTHED = 1000
-#: Weight of the degrees of freedom in the generalised cross-validation: 1 is the plain one, which smooths too little now
-#: and then; 1.4 is advised by Kim and Gu, J. R. Statist. Soc. B 66 (2004), p 337.
+#: Weight of the degrees of freedom in the generalised cross-validation: 1 sometimes smooths too little; Kim and Gu advise
+#: 1.4 (J. R. Statist. Soc. B 66, 2004, p 337).
 FREEDOM_WEIGHT = 1.4
 
 
