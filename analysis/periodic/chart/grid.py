@@ -58,7 +58,7 @@ def largest_multipliers(
     turns: int = 1,
     tolerance: float = INTEGRATOR_TOLERANCE,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Compute the largest Floquet multiplier of each of a row of mechanisms, each on its own periodic orbit.
+    """Compute the largest Floquet multiplier of each mechanism of a row, on its periodic orbit.
 
     Each orbit is sought from the start of its neighbour, then from the guesses: the mechanisms should be ordered along a line.
 

@@ -130,7 +130,7 @@ def shift(size, path):
 
 @part
 def solve_from_left(section, points, search, guess, found):
-    """Find the orbits of a row from left to right: by collocation as far as it goes, else by shooting."""
+    """Find the orbits of a row from left to right: by collocation if it converges, otherwise by shooting."""
     starts, monodromies, status = found
     n = guess.shape[0]
     z = np.empty(n * (1 + n))

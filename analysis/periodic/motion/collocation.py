@@ -312,7 +312,7 @@ class Desk(NamedTuple):
 
 @part
 def make_desk(n, most):
-    """Make work space for y of n components and at most so many elements."""
+    """Make work space for y of n components and at most ``most`` elements."""
     return Desk(
         make_bench(n, False),
         np.zeros((most, n)),

@@ -296,7 +296,7 @@ def _arguments(
 
 @cache
 def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
-    """Return the inputs of a mechanism that are forces, but for the torque on its crank if it has one, by FMI name."""
+    """Return the force inputs of a mechanism, without the torque on its crank if it has only one crank, by FMI name."""
     crank = mechanism.cyclic[0] if len(mechanism.cyclic) == 1 else -1
     return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
 
@@ -451,7 +451,7 @@ def scale_in(
 def is_smooth(parameters: Parameters) -> bool:
     """Return whether the rates are smooth over a turn.
 
-    Friction changes fast where a motion reverses, which only an integrator that chooses its own steps is sure to resolve.
+    Friction changes fast when a motion reverses, which only an integrator with step size control resolves reliably.
     """
     mechanism = mechanism_of(parameters)
     rough = mechanism.names("friction")

@@ -399,7 +399,7 @@ def orbit_of(
 def settle_motion(
     point: OperatingPoint, start: FloatArray, *, tolerance: float, change: float, turns: int
 ) -> tuple[Status, FloatArray]:
-    """Follow the motion from ``start`` until a turn changes y by less than ``change``, or for so many turns."""
+    """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most."""
     settled = start.copy()
     section = point.section(start, PLAIN, tolerance=tolerance)
     status = kernels.settle(section, point.flow.period, change, turns, settled)
@@ -459,7 +459,7 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray
 
 
 def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:
-    """Raise InputError if a period cannot have so many turns.
+    """Raise InputError if a period cannot have this number of turns.
 
     A mechanism with a freedom driven by a groove, for example, may need several turns to return to its configuration. This is
     checked if an operating point and a start are given.

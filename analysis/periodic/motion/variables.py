@@ -109,7 +109,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
 
 
 def _ratio_of(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
-    """Return the turns of a commanded crank for each turn of the crank of the drive; 0 where it is held or not commanded."""
+    """Return the turns of a commanded crank per turn of the drive's crank; 0 if it is held or not commanded."""
     if freedom == drive.reference(mechanism).freedom:
         return 1.0
     commanded = freedom in drive.flow(mechanism).commanded

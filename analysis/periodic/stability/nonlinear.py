@@ -277,7 +277,7 @@ class FormRun:
     expected: float
 
     def agrees(self, form: NormalForm) -> bool:
-        """Return whether the run does what the form predicts: it stays within twice the distance, or departs if subcritical."""
+        """Return whether the run follows the form: at its distance, within a factor of two, or away if it is subcritical."""
         if form.words == "supercritical":
             return 0.5 * self.expected < self.distance < 2.0 * self.expected
         return form.words == "subcritical" and self.distance > 3.0 * self.expected

@@ -39,7 +39,7 @@ joined, _guided = inner(kinematics.joined), inner(guided)
 
 @inner
 def closed(c2, s2, dx, dy, l3, l4, branch):
-    """Close the loop of a four-bar, or of a slider-crank where there is no rocker."""
+    """Close the loop of a four-bar, or of a slider-crank if the rocker has length zero."""
     if l4 > 0.0:
         return joined(c2, s2, dx, dy, l3, l4, branch)
     return _guided(c2, s2, dx, dy, l3, l4, branch)

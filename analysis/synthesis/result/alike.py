@@ -35,7 +35,7 @@ def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
 
 
 def format_variants(solution: Solution) -> str:
-    """Format how many mirror images and near copies a solution stands for, such as "2 mirror images, 1 near copy"."""
+    """Format the number of mirror images and near copies that a solution represents, as in "2 mirror images, 1 near copy"."""
     mirrored = sum(_alike(solution, other) == -1 for other in solution.variants)
     counts = (("mirror image", mirrored), ("near copy", len(solution.variants) - mirrored))
     return ", ".join(format_count(count, name) for name, count in counts if count)

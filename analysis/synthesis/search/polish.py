@@ -432,7 +432,7 @@ def residuals(
     jacobian : ndarray, shape (m, 11)
         Derivatives with respect to `UNKNOWNS`.
     rate : ndarray, shape (m,)
-        With respect to the crank rotation at the residual's own station.
+        Derivatives with respect to the crank rotation at the residual's station.
     """
     n = normal.n
     c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)

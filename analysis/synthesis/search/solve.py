@@ -152,7 +152,7 @@ def synthesize(
     constraints : sequence
         See `task.constraint`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
-        One weight per target, which replace the task's own.
+        Weights that replace those of the task, one per target.
     pivot : SliderUnknown or CrankUnknown, optional
         Unknown motion of the rocker pivot, which is found together with the links.
     guesses : sequence of Solution
