@@ -168,8 +168,7 @@ def synthesize(
     Raises
     ------
     InputError
-        If the task, the weights or another argument is not usable, or a kind of linkage cannot do the task or meet a
-        constraint.
+        If an argument is not usable, or a kind of linkage cannot do the task or meet a constraint.
     InfeasibleError
         If no linkage meets all bounds and constraints; it names the one that the nearest linkage violates most.
     SynthesisInterrupted
@@ -554,8 +553,7 @@ def solve_both_ways(
     order : sequence of int
         Numbers of the problems, the loosest first.
     search : callable
-        Function of the number of a problem, the guesses, and whether it is the way back; it returns solutions or raises
-        `InfeasibleError`.
+        Function of a problem's number, guesses, and whether on the way back: it returns solutions or raises `InfeasibleError`.
     begin : sequence of Solution
         Guesses for the first problem.
 
