@@ -12,17 +12,9 @@ from analysis.synthesis import Linkage, turn
 
 #: A crank-rocker for the tests that move its rocker pivot.
 BASE = Linkage(
-    pivot_x=0.02,
-    pivot_y=-0.03,
-    ground_length=0.20,
-    crank_length=0.06,
-    coupler_length=0.18,
-    rocker_length=0.16,
-    point_distance=0.12,
-    ground_angle=0.3,
-    crank_phase=0.7,
-    point_angle=0.8,
-)
+    pivot_x=0.02, pivot_y=-0.03, ground_length=0.20, crank_length=0.06, coupler_length=0.18,
+    rocker_length=0.16, point_distance=0.12, ground_angle=0.3, crank_phase=0.7, point_angle=0.8,
+)  # fmt: skip
 
 
 def ellipse(n: int) -> NDArray[np.float64]:

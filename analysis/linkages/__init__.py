@@ -1,4 +1,4 @@
-"""Planar linkages of the user's own: described in a file or in Python, compiled into mechanisms that every analysis takes."""
+"""Planar linkages that the user describes, in a file or in Python: compiled into mechanisms that every analysis accepts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ways to a described linkage: the tables of a file, or calls in Python that fill the same tables."""
+"""Read a described linkage from the tables of a file, or build it by calls in Python that fill the same tables."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def described_in(tables: Mapping[str, Any]) -> bool:
 
 
 def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Return the tables of a case with the linkage that they describe compiled, and its name as their published set.
+    """Compile the linkage described in the tables of a case; return tables that name it as their published set.
 
     Raises
     ------
     InputError
-        If the file that they name describes no linkage.
+        If the file named in the tables describes no linkage.
     LinkageError, ParameterError
         If the description is wrong.
     """
@@ -52,13 +52,13 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 
 
 def _package(tables: Mapping[str, Any]) -> Package:
-    """Return the package of the linkage in the tables of a file, whose title is its own where it has no other."""
+    """Return the package of the linkage in the tables of a file; a linkage without a title has that of the file."""
     title = {"title": tables["title"]} if "title" in tables else {}
     return Package(described({**title, **tables[LINKAGE]}))
 
 
 def load_linkage(path: str | Path) -> Mechanism:
-    """Compile the linkage that a file describes, or names the file of; see `docs/linkages.md`.
+    """Compile the linkage that a file describes, itself or by the name of another file; see `docs/linkages.md`.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def load_linkage(path: str | Path) -> Mechanism:
 
 
 def load_package(path: str | Path) -> Package:
-    """Return the package of the linkage that a file describes, or names the file of.
+    """Return the package of the linkage that a file describes, itself or by the name of another file.
 
     Raises
     ------
@@ -85,14 +85,14 @@ def load_package(path: str | Path) -> Package:
 
 #: A number in SI, or a text with a unit such as "50 mm".
 Amount = float | str
-#: Coordinates x, y; 0 stands for one that is always zero.
+#: Coordinates x, y; 0 means that a coordinate is always zero.
 Place = Sequence[Amount]
 
 
 class Builder:
-    """A description in the making: each method adds an entry of the table of that name, as a file has it.
+    """Builder of a description: each method adds one entry to the table of the same name in a linkage file.
 
-    Amounts are numbers in SI or texts with a unit, such as ``"50 mm"``. What is left out has the default of the file. Every
+    Amounts are numbers in SI or texts with a unit, such as ``"50 mm"``. An omitted argument has the default of the file. Every
     method returns the builder.
 
     Examples
@@ -126,7 +126,7 @@ class Builder:
         inertia: Amount | None = None,
         section: Mapping[str, Any] | None = None,
     ) -> Builder:
-        """Add a moving body; bodies that have a point of the same name are pinned to each other there.
+        """Add a moving body; two bodies with a point of the same name are pinned together at that point.
 
         Parameters
         ----------
@@ -136,26 +136,27 @@ class Builder:
         length : optional
             Of the bar (m).
         points : mapping of str to (x, y), optional
-            Further points, or all of a body that is no bar (m).
+            Further points, or all points of a body that is not a bar (m).
         mass, cog, inertia : optional
             Mass (kg), centre of mass (m), by default the middle of the bar, and moment of inertia about it (kg.m2).
         section : mapping, optional
-            From which these follow: ``kind`` (``"bar"`` with ``width`` and ``thickness``, ``"rod"`` with ``diameter``,
-            ``"tube"`` with ``outer`` and ``inner``, ``"plate"`` with ``thickness`` and ``corners``) and a ``material``.
+            Cross-section from which mass, centre of mass and inertia are computed: a ``material`` and a ``kind``, which is
+            ``"bar"`` with ``width`` and ``thickness``, ``"rod"`` with ``diameter``, ``"tube"`` with ``outer`` and ``inner``, or
+            ``"plate"`` with ``thickness`` and ``corners``.
         """
         return self._add(
             "bodies", name, bar=bar, length=length, points=points, mass=mass, cog=cog, inertia=inertia, section=section
         )
 
     def pin(self, name: str, **places: Place) -> Builder:
-        """Pin bodies to each other, and to the ground, at a point of each.
+        """Pin bodies together, and to the ground, at a point of each.
 
         Parameters
         ----------
         name : str
             Of the joint and of the points.
         **places : (x, y)
-            Own coordinates of the point in each body, by the body's name, or ``ground`` (m).
+            Coordinates of the point in the frame of each body, by the body's name, or ``ground`` (m).
 
         Raises
         ------
@@ -179,7 +180,7 @@ class Builder:
     def slide(
         self, name: str, *, body: str, through: str, on: str | None = None, direction: Amount | None = None
     ) -> Builder:
-        """Add a body that slides on another along a line without turning against it.
+        """Add a block that slides along a line of another body without rotating relative to it.
 
         Parameters
         ----------
@@ -188,16 +189,16 @@ class Builder:
         body : str
             The block: its origin is on the line, and its x axis along it.
         through : str
-            A point on the line, of the body that has it; positions are counted from it.
+            A point of the guiding body on the line; positions are measured from it.
         on : str, optional
-            That body, by default the ground.
+            The guiding body, by default the ground.
         direction : optional
-            Of the line in that body (rad).
+            Direction of the line in the guiding body (rad).
         """
         return self._add("slides", name, body=body, on=on, through=through, direction=direction)
 
     def slot(self, name: str, *, pin: str, on: str, through: str, direction: Amount | None = None) -> Builder:
-        """Add a straight slot of the body ``on`` in a ``direction`` (rad) through a point of it, and a ``pin`` of another."""
+        """Add a straight slot in the body ``on``, ``through`` a point in a ``direction`` (rad), for the ``pin`` of another."""
         return self._add("slots", name, pin=pin, on=on, through=through, direction=direction)
 
     def gear(self, name: str, *, bodies: Sequence[str], ratio: Amount, phase: Amount | None = None) -> Builder:
@@ -208,16 +209,16 @@ class Builder:
         name : str
         bodies : (str, str)
         ratio : float
-            Speed of the second by that of the first, seen from the third body; negative for external gears.
+            Speed of the second gear divided by that of the first, relative to the third body; negative for external gears.
         phase : optional
-            Angle of the second at which that of the first is zero (rad).
+            Angle of the second gear when the angle of the first is zero (rad).
         """
         return self._add("gears", name, bodies=bodies, ratio=ratio, phase=phase)
 
     def rack(self, name: str, *, gear: str, rack: str, radius: Amount, offset: Amount | None = None) -> Builder:
-        """Add a toothed rack: a body that slides on the one to which its ``gear`` is pinned.
+        """Add a toothed rack, which slides on the body to which its ``gear`` is pinned.
 
-        ``radius`` is the travel by the angle of the gear (m), of either sign; ``offset`` the position at the angle 0 (m).
+        ``radius`` is the travel of the rack per radian of the gear (m), of either sign, ``offset`` its position at angle 0 (m).
         """
         return self._add("racks", name, gear=gear, rack=rack, radius=radius, offset=offset)
 
@@ -236,7 +237,7 @@ class Builder:
         constants: Mapping[str, Amount] | None = None,
         driven: bool | None = None,
     ) -> Builder:
-        """Add a spring with damper, dry friction and law: between two points, at a joint, or between two bodies.
+        """Add a spring with damper, dry friction and force law: between two points, at a joint, or between two bodies.
 
         Parameters
         ----------
@@ -246,19 +247,19 @@ class Builder:
         at : str, optional
             a pin or a slide; or
         bodies : (str, str), optional
-            two bodies, that twist it.
+            two bodies whose relative rotation twists the spring.
         stiffness, damping : optional
-            In N/m and N.s/m; about a pin or of bodies in N.m/rad and N.m.s/rad.
+            In N/m and N.s/m; about a pin or between two bodies in N.m/rad and N.m.s/rad.
         free : optional
-            Length, position (m) or angle (rad) at which it is free.
+            Length, position (m) or angle (rad) at which the spring exerts no force.
         friction : optional
             Level of Coulomb friction (N, N.m).
         law : str or sequence of (x, force), optional
-            A further force against the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or a table of it (SI).
+            A further force that opposes the stretch x and its rate v, such as ``"a*x**3 + 4*v"``, or a table of it (SI).
         constants : mapping, optional
-            Of the law, by their names in it.
+            Constants of the law, by their names in it.
         driven : bool, optional
-            Whether an input drives it, as of a cylinder or a motor at a joint that is no freedom.
+            Whether an input drives it, such as a cylinder, or a motor at a joint whose coordinate is not a freedom.
         """
         return self._add(
             "springs", name, between=between, at=at, bodies=bodies, stiffness=stiffness, damping=damping, free=free,
@@ -281,11 +282,11 @@ class Builder:
         name : str
         joint : str
         start : optional
-            At the start (rad, m).
+            Initial angle or position (rad, m).
         speed : optional
-            Commanded (rad/s, m/s); of a freedom that is not driven its rate at the start.
+            Commanded rate (rad/s, m/s); for a freedom that is not driven, its initial rate.
         driven : bool, optional
-            Whether its rate can be commanded, by default the first freedom's.
+            Whether its rate can be commanded; by default only the first freedom can be.
         """
         return self._add("freedoms", name, joint=joint, start=start, speed=speed, driven=driven)
 
@@ -298,23 +299,23 @@ class Builder:
         speed: Amount | None = None,
         start: Amount | None = None,
     ) -> Builder:
-        """Drive a joint, whose coordinate becomes a freedom, or two points by a force, as a cylinder does.
+        """Drive a joint, whose coordinate becomes a freedom, or press two points apart by a force, as a cylinder does.
 
         Parameters
         ----------
         name : str
-            Of the freedom, or of the cylinder.
+            Name of the freedom, or of the cylinder.
         joint : str, optional
-            A pin or a slide; its ``speed`` is commanded (rad/s, m/s), or else a torque or force is an input; or
+            A pin or a slide: its ``speed`` is commanded (rad/s, m/s), or without a speed its torque or force is an input; or
         between : (str, str), optional
-            two points, between which a force acts that is an input.
+            two points: the force between them is an input.
         speed, start : optional
-            Of a joint: see `freedom`.
+            For a joint: see `freedom`.
 
         Raises
         ------
         InputError
-            If there are both a joint and points, or neither.
+            If both a joint and points are given, or neither.
         """
         if (joint is None) == (between is None):
             raise InputError(
@@ -325,7 +326,7 @@ class Builder:
         return self.spring(name, between=between, driven=True)
 
     def mechanism(self) -> Mechanism:
-        """Compile the linkage; its name is that of a published set, too, so that every function takes it.
+        """Compile the linkage and register a published set under its name, which every function accepts.
 
         Raises
         ------
@@ -354,13 +355,13 @@ def linkage(
     name : str
         Letters, digits and hyphens.
     ground : mapping of str to (x, y)
-        Points of the ground: numbers in metres, texts with a unit, or 0 for what is always zero.
+        Points of the ground: numbers in metres, texts with a unit, or 0 for a coordinate that is always zero.
     title, source : str, optional
-        What it is, and where it is from.
+        Title, and source of the data.
     gravity, gravity_direction : optional
         Acceleration of gravity (m/s2), by default none, and its direction (rad), by default downwards.
     assembly : mapping of str to int, optional
-        +1 or -1 by the joint between the two bodies of a dyad, +1 by default.
+        Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
     friction : mapping, optional
         Friction that grows with the force in a joint: the friction radius of a pin (m), the coefficient of a slide or slot.
     loads : sequence, optional
@@ -385,12 +386,12 @@ def linkage(
 
 
 def _given(entries: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries that are given, as a file has them."""
+    """Return the entries that are not None, in the form of a file."""
     return {key: _plain(value) for key, value in entries.items() if value is not None}
 
 
 def _plain(value: Any) -> Any:
-    """Return mappings and sequences as a file has them."""
+    """Return mappings and sequences as the dicts and lists of a file."""
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items()}
     return [_plain(inner) for inner in value] if isinstance(value, (list, tuple)) else value

@@ -1,4 +1,4 @@
-"""Write the friction in the joints of a described linkage that grows with the forces in them."""
+"""Write the equations of Coulomb friction in the joints of a described linkage, proportional to the joint forces."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .writing import function
 
 
 class Contacts:
-    """Functions of the friction of one linkage: for forces of 1 N, the forces in the joints, and how they change with it."""
+    """Writer of the friction functions of one linkage: joint forces, and their changes with a contact force of 1 N."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion, self.interface = motion, motion.interface

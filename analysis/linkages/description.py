@@ -1,6 +1,6 @@
-"""A planar linkage as data: bodies with named points, what joins them, what acts on them.
+"""Describe a planar linkage as data: bodies with named points, the joints between them, the forces on them.
 
-Bodies that have a point of the same name are pinned to each other there. Whatever else joins them has a table of its own.
+Bodies with a point of the same name are pinned together there. Every other kind of joint has a table of its own.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*")
 
 
 class LinkageError(LinkworkError):
-    """A described linkage is none that can be moved: its bodies, joints and freedoms do not fit together."""
+    """A described linkage cannot move as described: its bodies, joints and freedoms do not fit together."""
 
 
 def coordinate(value: Any, name: str) -> float:
-    """Read a length; the whole number 0 stands for a coordinate that is always zero, and no parameter."""
+    """Read a length; the whole number 0 means that the coordinate is always zero and is not a parameter."""
     return value if value == 0 and isinstance(value, int) and value is not False else Quantity("m")(value, name)
 
 
 def given(value: Any) -> bool:
-    """Return whether an entry of a spring is there: the whole number 0 stands for none."""
+    """Return whether an entry of a spring is given: the whole number 0 means that it is not."""
     return value != 0 or not isinstance(value, int)
 
 
@@ -47,7 +47,7 @@ def _name(value: Any, name: str) -> str:
 
 
 def _named(reader: Any) -> Any:
-    """Return the reader of a table whose entries have names of the user's choice."""
+    """Return the reader of a table whose entries have names chosen by the user."""
 
     def read(value: Any, name: str) -> dict[str, Any]:
         return {
@@ -62,12 +62,12 @@ _PLACE = Many(coordinate, length=2)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """A moving body, in coordinates of its own.
+    """A moving body, described in its own coordinate frame.
 
     Attributes
     ----------
     points : mapping of str to (x, y)
-        Its points (m). Either these, or ``bar``, or a bar and further points.
+        Its points (m). Give these, or ``bar``, or a bar and further points.
     bar : tuple of str
         Two points: the first is the body's origin, the second lies at ``length`` along its x axis.
     length : float
@@ -75,9 +75,9 @@ class Body:
     mass, inertia : float
         Mass (kg) and moment of inertia about the centre of mass (kg.m2).
     cog : tuple of float
-        Centre of mass (m); by default the body's origin, of a bar its middle.
+        Centre of mass (m); by default the body's origin, for a bar its midpoint.
     section : table
-        Section and material, from which mass, centre of mass and inertia follow: of a bar, or a plate with corners.
+        Cross-section and material, which give mass, centre of mass and inertia: for a bar, or a plate with corners.
     """
 
     points: Mapping[str, tuple[float, float]] = entry(_named(_PLACE), factory=dict)
@@ -90,7 +90,7 @@ class Body:
 
     @property
     def all_points(self) -> dict[str, tuple[float, float]]:
-        """The points with those of the bar (m)."""
+        """All points, including those of the bar (m)."""
         ends = {self.bar[0]: (0, 0), self.bar[1]: (self.length, 0)} if self.bar else {}
         return {**ends, **self.points}
 
@@ -104,9 +104,9 @@ class Line:
     on : str
         The body.
     through : str
-        A point of the body on the line, the zero of positions along it.
+        A point of the body on the line, from which positions along the line are measured.
     direction : float
-        Of the line in the body (rad).
+        Direction of the line in the body (rad).
     """
 
     on: str = entry(_name)
@@ -116,7 +116,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slide(Line):
-    """A body that slides along a line of another, by default of the ground, without turning against it.
+    """A block that slides along a line of another body, by default of the ground, without rotating relative to it.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Slide(Line):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slot(Line):
-    """A straight slot of a body, and a pin of another in it.
+    """A straight slot in a body, and a pin of another body in the slot.
 
     Attributes
     ----------
@@ -143,16 +143,16 @@ class Slot(Line):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gear:
-    """A pair of gears: two bodies, each pinned to the same third.
+    """A pair of gears: two bodies, each pinned to the same third body.
 
     Attributes
     ----------
     bodies : tuple of str
         The gears.
     ratio : float
-        Speed of the second by that of the first, seen from the third body; negative for external gears.
+        Speed of the second gear divided by that of the first, relative to the third body; negative for external gears.
     phase : float
-        Angle of the second at which that of the first is zero, from the third body (rad).
+        Angle of the second gear when the angle of the first is zero, both relative to the third body (rad).
     """
 
     bodies: tuple[str, str] = entry(Many(_name, length=2))
@@ -162,16 +162,16 @@ class Gear:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rack:
-    """A toothed rack and its gear, on one body: the rack slides on it, or it on the rack, and the gear is pinned to it.
+    """A toothed rack and its gear on a carrier body: the gear is pinned to the carrier; rack and carrier slide on each other.
 
     Attributes
     ----------
     gear, rack : str
         The bodies.
     radius : float
-        Pitch radius of the gear (m): travel of the slide by the angle of the gear, seen from the third body; of either sign.
+        Pitch radius of the gear (m): travel of the slide per radian of the gear relative to the carrier; of either sign.
     offset : float
-        Position of the slide at which that angle is zero (m).
+        Position of the slide when the angle of the gear is zero (m).
     """
 
     gear: str = entry(_name)
@@ -182,7 +182,7 @@ class Rack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spring:
-    """A spring with a damper and dry friction: between two points, about a pin or along a slide, or a shaft of two bodies.
+    """A spring with a damper and dry friction: between two points, about a pin, along a slide, or as a shaft of two bodies.
 
     Attributes
     ----------
@@ -191,20 +191,20 @@ class Spring:
     at : str
         a joint, or
     bodies : tuple of str
-        two bodies: it is twisted by the angle of the second from the first, up to half a turn, wherever they are.
+        two bodies: the angle of the second relative to the first twists the spring, up to half a turn, wherever they are.
     stiffness, damping : float
         In N/m and N.s/m; about a pin in N.m/rad and N.m.s/rad.
     free : float
-        Length, position (m) or angle (rad) at which the spring is free.
+        Length, position (m) or angle (rad) at which the spring exerts no force.
     friction : float
         Level of Coulomb friction (N, N.m), smooth about rest.
     law : str or list of (x, force)
-        A further force against the stretch x, as a formula in x and its rate v such as "2e5*x**3 + 4*v", or as a table,
-        between whose rows it is straight (SI). Its work counts as dissipated.
+        A further force that opposes the stretch x: a formula in x and its rate v such as "2e5*x**3 + 4*v", or a table,
+        which is interpolated linearly (SI). Its work counts as dissipated.
     constants : mapping of str to (float, str)
-        Of the formula, by their names in it: values and units. They are parameters.
+        Constants of the formula, by their names in it: values and units. They become parameters of the mechanism.
     driven : bool
-        Whether an input drives it, as of a cylinder or a linear motor: a force that lengthens it, a torque that turns it.
+        Whether an input drives it, as in a cylinder or a linear motor: a force that lengthens it, or a torque that twists it.
     """
 
     between: tuple[str, ...] = entry(Many(_name, length=2), ())
@@ -226,9 +226,9 @@ class PointLoad:
     Attributes
     ----------
     point : str
-        Of a moving body; where several are pinned it acts on the first.
+        Name of the point, on a moving body; where several bodies are pinned the force acts on the first.
     frame : str
-        Whose axes its components have: ``ground``, or ``body``, the one on which it acts.
+        Axes of the components: ``ground``, or ``body`` for the axes of the body on which the force acts.
     """
 
     point: str = entry(_name)
@@ -236,7 +236,7 @@ class PointLoad:
 
 
 def _load(value: Any, name: str) -> PointLoad:
-    """Read a load: a table, or its point alone."""
+    """Read a load from a table, or from the name of its point alone."""
     return files.read(PointLoad, {"point": value} if isinstance(value, str) else value, name)
 
 
@@ -247,14 +247,14 @@ class FreedomTable:
     Attributes
     ----------
     joint : str
-        A pin: the angle of its second body from the first; or a slide: the position of its block.
+        A pin, whose coordinate is the angle of its second body relative to the first; or a slide: the position of its block.
     start : float
-        At the start (rad, m).
+        Initial coordinate (rad, m).
     speed : float
-        Commanded at the start and by default (rad/s, m/s), also where it is given as 0 with a unit; of a freedom that is not
-        driven its rate at the start.
+        Commanded rate at the start and by default (rad/s, m/s), also if it is given as 0 with a unit; for a freedom that is
+        not driven, its initial rate.
     driven : bool
-        Whether its rate can be commanded; by default the first freedom's.
+        Whether its rate can be commanded; by default only the first freedom can be.
     """
 
     joint: str = entry(_name)
@@ -264,7 +264,7 @@ class FreedomTable:
 
 
 def _freedom(value: Any, name: str) -> FreedomTable:
-    """Read a freedom: a table, or the name of its joint alone."""
+    """Read a freedom from a table, or from the name of its joint alone."""
     return files.read(FreedomTable, {"joint": value} if isinstance(value, str) else value, name)
 
 
@@ -277,26 +277,26 @@ class Description:
     name : str
         Letters, digits and hyphens.
     title, source : str
-        What it is, and where it is from.
+        Title, and source of the data.
     ground : mapping of str to (x, y)
         Points of the ground (m).
     bodies, slides, slots, gears, racks, springs : mapping
         By name.
     freedoms : mapping of str to FreedomTable
-        By name, one to four; where none are given they are proposed.
+        By name, one to four; if none is given, the program chooses them.
     assembly : mapping of str to int
-        +1 or -1 by the joint between the two bodies of a dyad, +1 by default.
+        Assembly of each dyad, +1 or -1, by the name of the joint between its two bodies; +1 by default.
     friction : mapping
-        Friction that grows with the force in a joint, by its name: of a pin the friction radius (m), coefficient times its
-        radius; of a slide or a slot the coefficient.
+        Coulomb friction proportional to the joint force, by the name of the joint: for a pin the friction radius (m), which is
+        coefficient times pin radius; for a slide or a slot the coefficient.
     loads : tuple of PointLoad
-        Forces that can act on points, in the axes of the ground where only the point is named.
+        Forces that can act on points; in the axes of the ground if only the point is named.
     torques : tuple of str
         Bodies on which torques can act.
     gravity : float
         Acceleration of gravity (m/s2).
     gravity_direction : float
-        Direction in which it acts (rad).
+        Direction of gravity (rad).
     """
 
     name: str = entry(files.text)

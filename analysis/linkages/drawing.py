@@ -11,7 +11,7 @@ from .writing import function, quoted
 
 
 class Marked(NamedTuple):
-    """A joint of the picture: its name, what it is, and the expression of its place."""
+    """A point of the picture: its name, its label, and the expression of its position."""
 
     name: str
     text: str
@@ -19,13 +19,13 @@ class Marked(NamedTuple):
 
 
 class Picture:
-    """The picture of one linkage: its joints and parts."""
+    """Writer of the picture of one linkage: its joints and parts."""
 
     def __init__(self, interface: Interface) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
 
     def drawn(self) -> tuple[list[Marked], list[str]]:
-        """Return the joints of the picture, and its parts from the back to the front."""
+        """Return the points of the picture, and its parts from the back to the front."""
         d, parts, length = self.description, [], size(self.interface)[0]
         points = dict.fromkeys(own for of in self.interface.points.values() for own in of)
         joints = [Marked(own, f"point {own}", f"*(b.at_{own}.x, b.at_{own}.y, 0.0)") for own in points]
@@ -61,13 +61,13 @@ class Picture:
         return joints, parts
 
     def positions(self) -> str:
-        """Write the function of the places of the picture's joints."""
+        """Write the function that computes the positions of the picture's points."""
         rows = ("b = places(x, p)", "return (", *(f"    {joint.place}," for joint in self.drawn()[0]), ")")
         signature = "positions(x: tuple[float, ...], i: Applied, p: Constants) -> tuple[float, ...]"
         return function(signature, "Compute the places of the points of the picture.", rows)
 
     def moves(self, own: str) -> str:
-        """Return the parameters that change where a point of the picture is dragged."""
+        """Return the parameters that change when a point of the picture is dragged."""
         names = {p.name for p in self.interface.parameters}
         for body, points in self.interface.points.items():
             if own in points:
@@ -88,7 +88,7 @@ class Picture:
         return ""
 
     def paths(self) -> list[str]:
-        """Return the points whose paths are drawn: those that are no joint, or else the pins between bodies that move."""
+        """Return the points whose paths are drawn: those that are not joints, or else the last pin between moving bodies."""
         moving = [own for body in self.description.bodies for own in self.interface.points[body]]
         alone = [own for own in dict.fromkeys(moving) if own not in self.structure.joints]
         return alone or [own for own in dict.fromkeys(moving) if own not in self.description.ground][-1:]

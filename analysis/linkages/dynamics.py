@@ -1,4 +1,4 @@
-"""Write what acts on a described linkage, its equations of motion, and the forces in its joints."""
+"""Write the applied forces, the equations of motion and the joint forces of a described linkage."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .writing import function, record, tupled
 
 
 class Reaction(NamedTuple):
-    """A joint whose force is an output: its name there, the joint, the body that exerts the force and the one it acts on."""
+    """A joint force that is an output: its name, the joint, the body that exerts the force and the body on which it acts."""
 
     name: str
     joint: Joint
@@ -22,13 +22,13 @@ class Reaction(NamedTuple):
 
 
 def springs_at(description: Description, interface: Interface) -> dict[str, int]:
-    """Return the springs that act along a freedom, with its number."""
+    """Return the springs that act along a freedom, by name, with the number of the freedom."""
     numbers = {drive.joint: n for n, drive in enumerate(interface.drives)}
     return {name: numbers[s.at] for name, s in description.springs.items() if s.at in numbers}
 
 
 class Motion:
-    """The dynamics of one linkage, function by function."""
+    """Writer of the dynamics of one linkage, function by function."""
 
     def __init__(self, interface: Interface) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
@@ -40,14 +40,14 @@ class Motion:
         self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, Racked)]
 
     def owner(self, own: str) -> str:
-        """Return a body that has a point, one that moves if there is one."""
+        """Return the body that has a point: a moving one if there is one, otherwise the ground."""
         having = [body for body in self.bodies if own in self.interface.points[body]]
         return having[0] if having else GROUND
 
     # What acts
 
     def springs(self) -> Iterator[str]:
-        """Write the function of the stretches of all springs and their rates."""
+        """Write the function that computes the stretches of all springs and their rates."""
         rows, fields = [], []
         for name, spring in self.description.springs.items():
             free = f" - p.{name}_free" if given(spring.free) else ""
@@ -80,7 +80,7 @@ class Motion:
         )
 
     def turned(self, spring: Spring) -> tuple[str, ...]:
-        """Return the two bodies between which a spring is twisted; none where it is not."""
+        """Return the two bodies between which a spring is twisted; empty if it is no torsion spring."""
         joint = self.structure.joints.get(spring.at)
         return spring.bodies or (joint.bodies if isinstance(joint, Pin) else ())
 
@@ -88,7 +88,7 @@ class Motion:
         return "angle" if isinstance(self.structure.joints[spring.at], Pin) else "position"
 
     def resistance(self, name: str, spring: Spring) -> str:
-        """Return the force of damper and friction of a spring; empty where it has neither."""
+        """Return the expression of the damper and friction force of a spring; empty if it has neither."""
         words = []
         if given(spring.damping):
             words.append(f"p.{name}_damping * s.{name}_rate")
@@ -103,11 +103,11 @@ class Motion:
         return f"p.{name}_stiffness * s.{name}_stretch" if given(spring.stiffness) else ""
 
     def tension(self, name: str, spring: Spring) -> str:
-        """Return the whole force of a spring that is not driven, against its stretch."""
+        """Return the expression of the whole force of a spring that is not driven; it opposes the stretch."""
         return " + ".join(filter(None, (self._pull(name, spring), self.resistance(name, spring))))
 
     def laws(self) -> Iterator[str]:
-        """Write the functions of the springs' own laws."""
+        """Write the functions of the springs' force laws."""
         for name, spring in self.description.springs.items():
             if spring.law:
                 doc = f"Return the force of {name} at a stretch and its rate (N, N.m)."
@@ -116,7 +116,7 @@ class Motion:
                 yield function(f"{name}_law(x: float, v: float{p}) -> float", doc, [f"return {text}"])
 
     def acting(self) -> Iterator[str]:
-        """Write the function of the forces on all bodies and along all freedoms."""
+        """Write the function that computes the applied forces on all bodies and along all freedoms."""
         on: dict[str, list[str]] = {body: [] for body in self.bodies}
         along: list[list[str]] = [[] for _ in range(self.n)]
         rows, lost, gained = [], [], []
@@ -185,7 +185,7 @@ class Motion:
         yield function(signature, "Compute what acts on the bodies and along the freedoms, but for the drives.", rows)
 
     def masses(self) -> str:
-        """Write the function of the bodies' masses."""
+        """Write the function that returns the mass properties of all bodies."""
         names = {parameter.name for parameter in self.interface.parameters}
         rows = ["return ("]
         for body in self.bodies:
@@ -203,7 +203,7 @@ class Motion:
     # Forces in the joints
 
     def forces(self) -> Iterator[str]:
-        """Write the function of the forces in all joints, from the last dyad back to the ground."""
+        """Write the function that computes all joint forces, from the last dyad back to the ground."""
         rows = [f"on_{body} = needed(m[{n}], e, wrenches[{n}])" for n, body in enumerate(self.bodies)]
         rows += [f"on_{body} = Wrench(0.0, 0.0, 0.0)" for body in self.structure.bodies if body not in self.bodies]
         taken: dict[str, int] = {}
@@ -264,7 +264,7 @@ class Motion:
         return f"mesh(b.at_{step.pin.name}, b.at_{pins[0].name}, {ratio}, on_{step.body})"
 
     def _teeth(self, step: Racked) -> str:
-        """Return the force of its mate on a rack or a gear."""
+        """Return the expression of the tooth force that a rack or a gear receives from its mate."""
         side = "" if step.slide.bodies[0] == step.parent else "-"
         call = "rack_on_gear" if step.turns else "gear_on_rack"
         line = f"b.{step.slide.name}_line"
@@ -290,7 +290,7 @@ class Motion:
     # Equations of motion
 
     def applied(self) -> Iterator[str]:
-        """Write the record of the inputs in force, and the function that makes it."""
+        """Write the record of the inputs that are in effect, and the function that selects them by the modes."""
         fields, values, names = [], [], []
         modes = [f"{drive.name}_mode" for drive in self.interface.drives if drive.table]
         for drive in self.interface.drives:
@@ -312,7 +312,7 @@ class Motion:
         yield function(signature, "Return what acts on the linkage from the values of the modes and the inputs.", rows)
 
     def _held(self) -> tuple[str, str]:
-        """Return the tuples of which rates are commanded and of their accelerations."""
+        """Return the expressions of two tuples: which rates are commanded, and the commanded accelerations."""
         held = ", ".join(f"i.{d.name}_held" if d.table else "0.0" for d in self.interface.drives)
         known = ", ".join(f"i.{d.name}_given" if d.table else "0.0" for d in self.interface.drives)
         return f"({held},)", f"({known},)"

@@ -1,4 +1,8 @@
-"""Write the equations of a described linkage as a module of Python, in terms of `linkwork.planar`."""
+"""Write the equations of a described linkage as a Python module that calls `linkwork.planar`.
+
+The pose of a body, its `Frame`, is the position of its origin and its direction. A direction is a `Turn`: cosine and sine
+of the angle, with its derivatives. The expressions below are the right sides of the lines of that module.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ from .writing import function, record
 
 
 class Places:
-    """The function of the places of all bodies of one linkage, line by line."""
+    """Writer of the function that computes the poses of all bodies of one linkage."""
 
     def __init__(self, interface: Interface) -> None:
         self.structure, self.interface = interface.structure, interface
@@ -28,7 +32,7 @@ class Places:
     # Places
 
     def point(self, body: str, own: str, frame: str = "") -> str:
-        """Return the expression of a point of a body; ``frame`` is the body's place where it is not that in the ground."""
+        """Return the expression of a point of a body; ``frame`` is the body's pose if it is not the one in the ground."""
         x, y = self.interface.own(body, own)
         if body == GROUND or frame == "own":
             return f"fixed({x}, {y}, {self.n})"
@@ -36,27 +40,27 @@ class Places:
         return f"{frame}.origin" if (x, y) == ("0.0", "0.0") else f"point({frame}, {x}, {y})"
 
     def at(self, body: str, own: str) -> str:
-        """Return the variable of a point of a known body, written where it is first used."""
+        """Return the variable of a point of a body whose pose is known; write its line at the first use."""
         if own not in self.places:
             self.lines.append(f"at_{own} = {self.point(body, own)}")
             self.places[own] = f"at_{own}"
         return self.places[own]
 
     def hung(self, pin: str, turn: str, body: str, own: str) -> str:
-        """Return the expression of the place of a body whose point ``own`` is at a place."""
+        """Return the expression of the pose of a body from the position of its point ``own`` and its direction ``turn``."""
         x, y = self.interface.own(body, own)
         if (x, y) == ("0.0", "0.0"):
             return f"Frame({pin}, {turn})"
         return f"Frame(minus({pin}, arm({turn}, {x}, {y})), {turn})"
 
     def inclined(self, turn: str, joint: Slider, sign: int = 1) -> str:
-        """Return the direction of a line from that of its body, or with sign -1 of the body from that of its line."""
+        """Return the direction of a body's guide line from that of the body; with sign -1, the body's from the line's."""
         if not joint.inclined:
             return turn
         return f"inclined({turn}, p.{joint.name}_c, {'-' if sign < 0 else ''}p.{joint.name}_s)"
 
     def freed(self, step: Freed, lead: str = "") -> None:
-        """Write the place of a body that follows through a freedom, in the ground or in the body ``lead``."""
+        """Write the pose of a body that a freedom joins to a known one, in the ground or relative to the body ``lead``."""
         suffix = f"in_{lead}" if lead else "frame"
         parent = "" if step.parent in (GROUND, lead) else f"{step.parent}_{suffix}"
         own = "own" if lead and step.parent == lead else parent
@@ -83,7 +87,7 @@ class Places:
         self.lines.append(f"{step.body}_{suffix} = {frame}")
 
     def slid(self, step: Freed | Racked, joint: Slider, parent_turn: str, travel: str, own: str = "") -> str:
-        """Write the direction of a body that slides on its parent or the parent on it, and return its place."""
+        """Write the direction of a body that slides on its parent, or guides its parent, and return its pose."""
         turn = f"{step.body}_turn"
         if joint.bodies[1] == step.body:
             self.lines.append(f"{turn} = {self.inclined(parent_turn, joint)}")
@@ -93,7 +97,7 @@ class Places:
         return self.hung(through, turn, step.body, joint.through)
 
     def pinion(self, step: Racked) -> None:
-        """Write the place of a gear from the position of its rack."""
+        """Write the pose of a gear from the position of its rack."""
         radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
         turn = f"{step.body}_turn"
         if step.linear:
@@ -114,7 +118,7 @@ class Places:
         self.lines.append(f"{step.body}_frame = {self.hung(pin, turn, step.body, step.pin.name)}")
 
     def rack(self, step: Racked) -> None:
-        """Write the place of a rack from the angle of its gear."""
+        """Write the pose of a rack from the angle of its gear."""
         radius, offset = f"p.{step.rack}_radius", f"p.{step.rack}_offset"
         (terms, constants), (own_terms, own_constants) = self.angles[step.mate], self.angles[step.parent]
         share = {
@@ -133,11 +137,11 @@ class Places:
         self.lines.append(f"{step.body}_frame = {frame}")
 
     def share(self, terms: dict[int, str]) -> str:
-        """Return the derivatives of an angle by the coordinates, as a tuple."""
+        """Return the derivatives of an angle with respect to the coordinates, as a tuple."""
         return f"({', '.join(terms.get(n, '0.0') for n in range(self.n))},)"
 
     def angled(self, terms: dict[int, str], constants: Iterable[str]) -> str:
-        """Return the expression of the direction at an angle that is linear in the coordinates."""
+        """Return the expression of a direction whose angle is linear in the coordinates."""
         words = []
         for number, factor in terms.items():
             name = self.interface.drives[number].variable
@@ -146,7 +150,7 @@ class Places:
         return f"angled({angle.replace('+ -', '- ')}, {self.share(terms)}, v)"
 
     def geared(self, step: Geared) -> None:
-        """Write the place of a gear from the angle of its mate."""
+        """Write the pose of a gear from the angle of its mate."""
         ratio, phase = f"p.{step.gear}_ratio", f"p.{step.gear}_phase"
         (mate, mate_constants), (carrier, carrier_constants) = self.angles[step.mate], self.angles[step.parent]
         terms: dict[int, str] = {}
@@ -168,7 +172,7 @@ class Places:
     # Dyads
 
     def end(self, side: Side, body: str, joint: Pin) -> str:
-        """Return the arm of a side from its outer joint to the pin on ``body``, in the axes of the side's body or its line."""
+        """Return the vector from a side's outer joint to the dyad's inner pin, in the axes of the side's body or guide line."""
         if isinstance(side.joint, Pin):
             start, axes = side.joint.name, ""
         elif side.joint.bodies[1] == side.body:
@@ -178,7 +182,7 @@ class Places:
         return self.own_arm(side, body, joint.name, start, axes)
 
     def own_arm(self, side: Side, body: str, to: str, start: str, axes: str) -> str:
-        """Return an arm in a side's body from its point ``start`` to the point ``to`` of one of the side's bodies."""
+        """Return the vector, in a side's body, from its point ``start`` to the point ``to`` of one of the side's bodies."""
         sx, sy = self.interface.own(side.body, start)
         if body == side.body:
             x, y = self.interface.own(body, to)
@@ -190,7 +194,7 @@ class Places:
         return f"turned(held(p.{axes}_c, -p.{axes}_s, {self.n}), {result})" if axes else result
 
     def line(self, side: Side) -> tuple[str, str]:
-        """Write the line along which a side slides: variables of its origin and direction."""
+        """Write the line along which a side slides; return the variables of its origin and direction."""
         joint = side.joint
         assert isinstance(joint, Slider)
         parent = self.interface.turn(side.parent)
@@ -202,7 +206,7 @@ class Places:
         return f"{side.parent}_frame.origin", name
 
     def placed(self, side: Side, turn: str, along: str = "", origin: str = "", line: str = "") -> None:
-        """Write the places of a side's bodies from the direction of the first, or from its position along a line."""
+        """Write the poses of a side's bodies from the direction of the first, or from its position along a line."""
         joint, body = side.joint, side.body
         if isinstance(joint, Pin):
             frame = self.hung(self.at(side.parent, joint.name), turn, body, joint.name)
@@ -218,7 +222,7 @@ class Places:
             self.lines.append(f"{own}_frame = within({body}_frame, {own}_in_{body})")
 
     def insides(self, step: Dyad) -> None:
-        """Write the places of what follows from the bodies of a dyad, in these."""
+        """Write the poses of the bodies that hang on the two bodies of a dyad, relative to these."""
         for side in step.sides:
             kept = dict(self.angles)
             self.angles[side.body] = {}, []
@@ -230,7 +234,7 @@ class Places:
             self.angles = kept
 
     def nested(self, step: Dyad, lead: str) -> None:
-        """Write the places of a dyad RRR in the body ``lead``, whose own place is not known yet."""
+        """Write the poses of an RRR dyad relative to the body ``lead``, whose own pose is not known yet."""
         name, (one, other) = step.inner.name, step.sides
         assert isinstance(step.inner, Pin)
         self.lines.append(f"# dyad RRR in the {lead}: {one.body} and {other.body}, joined at {name}")
@@ -248,7 +252,7 @@ class Places:
                 self.lines.append(f"{own}_in_{lead} = within({side.body}_in_{lead}, {own}_in_{side.body})")
 
     def dyad(self, step: Dyad) -> None:
-        """Write the places of the bodies of a dyad."""
+        """Write the poses of the bodies of a dyad."""
         name = step.inner.name
         self.lines.append(f"# dyad {step.kind}: {' and '.join(s.body for s in step.sides)}, joined at {name}")
         self.insides(step)
@@ -315,7 +319,7 @@ class Places:
     # Functions of the module
 
     def blocks(self) -> Iterator[str]:
-        """Write the record of the places of all bodies and the function that computes it."""
+        """Write the record of the poses of all bodies and the function that computes it."""
         for n, drive in enumerate(self.interface.drives):
             self.lines.append(f"{drive.variable} = x[{n}]")
         self.lines.append(f"v = ({', '.join(f'x[{self.n + n}]' for n in range(self.n))},)")

@@ -1,4 +1,4 @@
-"""Force laws of springs: formulas with constants, and tables, as straight lines of arithmetic."""
+"""Read force laws of springs: formulas with constants, or tables, written as arithmetic without branches."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m"
 
 
 def law(value: Any, name: str) -> str:
-    """Read a force law, a formula or a table of (x, force), and return it as an expression in x, v and the constants.
+    """Read a force law, a formula or a table of (x, force); return it as an expression in x, v and the constants.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def law(value: Any, name: str) -> str:
 
 
 def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
-    """Read the constants of a law, quantities of any usual dimension, and return their values in SI with their units."""
+    """Read the constants of a law, quantities of any usual dimension; return their values in SI with their units."""
     return {own: _constant(given, f"{name}.{own}") for own, given in as_table(value, name).items()}
 
 
@@ -70,7 +70,7 @@ def _constant(value: Any, name: str) -> tuple[float, str]:
 
 
 def check_law(formula: str, known: Mapping[str, Any], name: str) -> None:
-    """Raise ParameterError where a law has names that are no constants, or a constant has a name of something else."""
+    """Raise ParameterError if a law contains a name that is not a constant, or a constant has a reserved name."""
     names = {node.id for node in ast.walk(ast.parse(formula)) if isinstance(node, ast.Name)}
     if not names <= {"x", "v", *FUNCTIONS, *known}:
         raise ParameterError(name, formula, _WANTED)
@@ -81,7 +81,7 @@ def check_law(formula: str, known: Mapping[str, Any], name: str) -> None:
 
 
 def with_constants(formula: str, known: Mapping[str, Any], prefix: str) -> str:
-    """Return a law with its constants as fields of the parameters p."""
+    """Return a law with each constant written as a field of the parameters p."""
     if not known:
         return formula
     return re.sub(rf"\b({'|'.join(known)})\b", rf"p.{prefix}_\1", formula)
@@ -92,7 +92,7 @@ def _finite(value: object) -> bool:
 
 
 def _table(rows: tuple[tuple[float, float], ...], name: str) -> str:
-    """Return a broken line, continued at both ends, as the sum of a straight line and magnitudes."""
+    """Return piecewise linear interpolation, extrapolated at both ends, as a straight line plus terms in abs(x - x_k)."""
     if any(b[0] <= a[0] for a, b in pairwise(rows)):
         raise ParameterError(name, [list(row) for row in rows], "have rows of rising x")
     slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(rows)]

@@ -1,4 +1,4 @@
-"""Mistakes in a description that no entry shows alone: names that stand twice, and what joins or moves nothing."""
+"""Find mistakes in a description that involve several entries: duplicate names, and parts that join or move nothing."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .laws import check_law
 
 
 def check_entries(description: Description) -> None:
-    """Make sure that the entries of a description fit together.
+    """Check that the entries of a description fit together.
 
     Raises
     ------
     LinkageError, ParameterError
-        With the place in the file of the first that does not, and what would be right.
+        For the first entry that does not fit: its place in the file, and what would be right.
     """
     d = description
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9-]*", d.name):

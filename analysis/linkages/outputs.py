@@ -14,7 +14,7 @@ from .writing import function, quoted
 
 
 class Output(NamedTuple):
-    """An output: name, unit, meaning, further arguments of its variable, and its value as an expression of the equations."""
+    """An output: name, unit, meaning, further arguments of its variable, and the expression of its value."""
 
     name: str
     unit: str
@@ -24,7 +24,7 @@ class Output(NamedTuple):
 
     @property
     def variable(self) -> str:
-        """The variable, as an expression of the package."""
+        """Source text of the variable in the package."""
         known = f'"{self.name}", "{self.unit}", {quoted(self.text)}, {quoted(symbol(self.name, self.unit))}'
         return f"output({known}{self.rest and f', {self.rest}'})"
 
@@ -33,20 +33,20 @@ _DEGREES = 'display="deg"'
 
 
 class Outputs:
-    """The outputs of one linkage."""
+    """Writer of the outputs of one linkage."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion, self.description = motion, motion.description
         self.structure, self.interface = motion.structure, motion.interface
 
     def variables(self) -> Iterator[str]:
-        """Yield the variables in their order."""
+        """Yield the source texts of the output variables, in their order."""
         yield from (output.variable for output in self._all())
         sources = ("springs and gravity", "dampers and friction", "drives and loads")
         yield f"*energy_outputs({', '.join(map(quoted, sources))})"
 
     def _all(self) -> Iterator[Output]:
-        """Yield the outputs in their order, but for the energies."""
+        """Yield the outputs in their order, without the energies."""
         n = len(self.interface.drives)
         for k, drive in enumerate(self.interface.drives):
             turn, rate_unit = drive.turns, f"{drive.unit}/s"
@@ -132,12 +132,12 @@ class Outputs:
             yield Output(f"{rack.rack}.force", "N", text, "", along)
 
     def _following(self) -> list[Slider]:
-        """Return the slides whose positions follow from the freedoms."""
+        """Return the slides whose positions are not freedoms but follow from them."""
         freed = {drive.joint for drive in self.interface.drives}
         return [slide for name, slide in sliders(self.structure).items() if name not in freed]
 
     def function(self) -> str:
-        """Write the function of all outputs."""
+        """Write the function that computes all outputs."""
         s = "s, " if self.description.springs else ""
         rows = [
             "m = motion(x, i, p)",

@@ -1,4 +1,4 @@
-"""Write a described linkage as a package of Python, in the form that a hand-written mechanism has, and import it."""
+"""Write a described linkage as a Python package of the same form as a hand-written mechanism, and import it."""
 
 from __future__ import annotations
 
@@ -61,22 +61,19 @@ from typing import ClassVar
 
 from linkwork import friction, planar
 from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Link, Mechanism, Mode, Part, PublishedSet
-from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import POSITION, RATE, Variable, energy_outputs, output, status_variables, tolerance_parameter
 
 from . import equations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(CheckedParameters):
     """SI units."""
 
     RULES: ClassVar[Rules] = Rules({rules})
 
 {fields}
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
 
     def constants(self) -> equations.Constants:
         """Return what the equations use."""
@@ -86,13 +83,10 @@ class Parameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Initial:
+class Initial(CheckedState):
     """State at the start."""
 
 {initial}
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 VARIABLES = (
@@ -160,7 +154,7 @@ MECHANISM = Mechanism(
 
 
 class Package:
-    """The texts of the package of one linkage.
+    """Source texts of the package of one linkage.
 
     Attributes
     ----------
@@ -168,7 +162,7 @@ class Package:
     structure : Structure
     motion : Motion
     name : str
-        Name of the linkage, as Python spells it, with a hash of the texts.
+        Name of the linkage as a Python identifier, with a hash of the texts.
     files : dict of str to str
         Texts by file name.
 
@@ -192,12 +186,12 @@ class Package:
         self.name = f"{re.sub(r'[^a-z0-9]', '_', description.name.lower())}_{digest[:12]}"
 
     def mechanism(self, folder: Path | None = None) -> Mechanism:
-        """Return the mechanism, registered.
+        """Import the package and return its mechanism, registered.
 
         Parameters
         ----------
         folder : path, optional
-            Where the package is kept; by default below the user's cache.
+            Folder in which the package is stored; by default one in the user's cache.
 
         Raises
         ------
@@ -239,7 +233,7 @@ class Package:
         return made
 
     def _apart(self, made: Mechanism) -> str:
-        """Return in words the two bodies that do not reach each other at the start; empty where all do."""
+        """Say which two bodies do not reach each other at the start; empty if all do."""
         start = made.published[made.name]
         try:
             made.modules[-1].places(made.state(start.initial), start.parameters.constants())
@@ -252,7 +246,7 @@ class Package:
         return ""
 
     def _check_motion(self, made: Mechanism) -> None:
-        """Raise LinkageError where the accelerations at the start are no finite numbers."""
+        """Raise LinkageError if the accelerations at the start are not finite."""
         start = made.published[made.name]
         x, p = made.state(start.initial), start.parameters.constants()
         try:
@@ -316,7 +310,7 @@ class Package:
 
 
 def _imports(body: str) -> str:
-    """Return the imports that a text needs, of all that the equations of a linkage may use."""
+    """Return the import lines that the text of the equations needs."""
     library = [name for name, value in vars(planar).items() if getattr(value, "__module__", "") == planar.__name__]
     wanted = {"math": FUNCTIONS, "typing": ("NamedTuple",), "linkwork.friction": _FRICTION, "linkwork.planar": library}
     found = []
@@ -332,7 +326,7 @@ def _imports(body: str) -> str:
 
 
 def _error_scale(drives: tuple[Drive, ...], length: float, mass: float) -> str:
-    """Write the function of the magnitudes below which errors are absolute, of a linkage of that size and mass."""
+    """Write the function that returns the magnitudes below which the integrator's errors are absolute."""
     squares = " + ".join(f"x[{len(drives) + k}] * x[{len(drives) + k}]" for k, d in enumerate(drives) if d.turns)
     coordinates = ", ".join("1.0" if d.turns else repr(length) for d in drives)
     rates = ", ".join("speed" if d.turns else f"{length!r} * speed" for d in drives)

@@ -1,4 +1,4 @@
-"""The parameters of a described linkage: their names in the interface, their values, and how its equations refer to them."""
+"""Parameters of a described linkage: their FMI names, their values, and the expressions by which the equations use them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
 class Parameter(NamedTuple):
-    """A parameter: FMI name, unit, meaning, value, and its rule: ``positive``, ``free`` (in sign), ``sign`` or none."""
+    """A parameter: FMI name, unit, meaning, value, and rule: ``positive``, ``free`` (any sign), ``sign`` (+1, -1) or none."""
 
     name: str
     unit: str
@@ -29,15 +29,15 @@ class Parameter(NamedTuple):
 
     @property
     def field(self) -> str:
-        """Its name in the dataclass of the parameters."""
+        """Name of the field in the dataclass of the parameters."""
         return field_name(self.name)
 
 
 class Drive(NamedTuple):
-    """A freedom: its name, unit and place in the interface, its start, and the table of its inputs if it can be driven.
+    """A freedom: its names and unit in the FMI interface, its start, and the table of its inputs if it can be driven.
 
-    ``commanded`` says whether its rate is commanded unless the mode says otherwise; ``turns_back`` are the turns after which
-    all bodies are in the same places; 0 where there are none.
+    ``commanded`` says whether its rate is commanded by default; ``turns_back`` is the number of turns after which all bodies
+    are back in the same poses, or 0 if they never are.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Drive(NamedTuple):
 
     @property
     def variable(self) -> str:
-        """The coordinate's name in the equations."""
+        """Name of the coordinate in the equations."""
         return f"q_{self.name}"
 
     @property
@@ -63,7 +63,7 @@ class Drive(NamedTuple):
 
     @property
     def load(self) -> str:
-        """Name of the input that drives it, in its table."""
+        """Name of the torque or force input in the freedom's table."""
         return "torque" if self.turns else "force"
 
     @property
@@ -73,7 +73,7 @@ class Drive(NamedTuple):
 
 
 class Load(NamedTuple):
-    """An input that drives no freedom: its FMI name, unit and meaning, and the output along which it acts."""
+    """An applied force or torque that drives no freedom: FMI name, unit, meaning, and the output along which it acts."""
 
     name: str
     unit: str
@@ -82,13 +82,13 @@ class Load(NamedTuple):
 
     @property
     def field(self) -> str:
-        """Its name among the inputs of the equations."""
+        """Name of the field among the inputs of the equations."""
         return field_name(self.name)
 
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """What the interface of a described linkage consists of.
+    """The FMI interface of a described linkage: parameters, freedoms, loads, and the expressions of its points.
 
     Attributes
     ----------
@@ -99,9 +99,9 @@ class Interface:
         The freedoms in their order.
     loads : tuple of Load
     points : mapping
-        Own coordinates of each point of each body, as expressions of the equations.
+        Coordinates of each point in the frame of its body, as expressions in the parameters.
     centres : mapping
-        The same of the centres of mass; bodies without a mass are left out.
+        The same for the centres of mass; massless bodies are left out.
     """
 
     description: Description
@@ -113,11 +113,11 @@ class Interface:
     centres: Mapping[str, tuple[str, str]]
 
     def own(self, body: str, point: str) -> tuple[str, str]:
-        """Return the own coordinates of a point of a body; those of its origin where it has no such point."""
+        """Return the coordinates of a point in the frame of its body; zero if the body has no such point."""
         return self.points[body].get(point, ("0.0", "0.0"))
 
     def frame(self, body: str, of: str = "") -> str:
-        """Return the expression of the place of a body, a field of the record ``of``."""
+        """Return the expression of the pose of a body, a field of the record ``of``."""
         return f"{of}{body}_frame" if body != GROUND else f"ground({len(self.drives)})"
 
     def turn(self, body: str, of: str = "") -> str:
@@ -125,13 +125,13 @@ class Interface:
         return f"{of}{body}_frame.turn" if body != GROUND else f"held(1.0, 0.0, {len(self.drives)})"
 
     def travel(self, slide: Slider) -> str:
-        """Return the expression of position and velocity of a block on its line, from the places b."""
+        """Return the expression of position and velocity of a block along its line, from the record of poses b."""
         (holder, block), (x, y) = slide.bodies, self.own(slide.bodies[0], slide.through)
         return f"position_along({self.frame(holder, 'b.')}, {x}, {y}, b.{slide.name}_line, b.{block}_frame)"
 
 
 def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...]:
-    """Return the freedoms with their names in the interface."""
+    """Return the freedoms with their names in the FMI interface."""
     tables = structure.freedoms
     driven = [
         name for n, (name, table) in enumerate(tables.items()) if (n == 0 if table.driven is None else table.driven)
@@ -160,7 +160,7 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
 
 
 def _turns_back(description: Description, structure: Structure, freedom: int) -> int:
-    """Count the turns of a freedom after which all gears are back; 0 where they never are, or a rack goes on."""
+    """Count the turns of a freedom after which all gears are back at their angles; 0 if they never are, or a rack moves on."""
     angles, turns = {GROUND: 0.0}, 1
     for step in structure.steps:
         carrier = angles.get(step.parent, 0.0) if not isinstance(step, Dyad) else 0.0
@@ -306,7 +306,7 @@ def _assemblies(description: Description, structure: Structure) -> Iterator[Para
 def _loads(
     description: Description, structure: Structure, points: Mapping[str, Mapping[str, tuple[str, str]]]
 ) -> Iterator[Load]:
-    """Yield the inputs that drive no freedom."""
+    """Yield the applied forces and torques that drive no freedom."""
     moving = {own for body in description.bodies for own in points[body]}
     for load in description.loads:
         own = load.point
@@ -333,7 +333,7 @@ def _loads(
 
 
 class _Mass(NamedTuple):
-    """Mass, centre of mass and moment of inertia of a body, the last None where it has none."""
+    """Mass, centre of mass and moment of inertia of a body; the moment of inertia may be None."""
 
     mass: float
     centre: tuple[float, float]
@@ -341,7 +341,7 @@ class _Mass(NamedTuple):
 
 
 def _mass(name: str, body: Body) -> _Mass | None:
-    """Return the mass of a body, as given or of its section; None where it has none."""
+    """Return the mass properties of a body, as given or from its section; None for a massless body."""
     where = f"linkage.bodies.{name}"
     if body.section is not None:
         if body.inertia is not None or body.cog is not None:
@@ -364,7 +364,7 @@ def _mass(name: str, body: Body) -> _Mass | None:
 
 
 def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
-    """Yield the parameters of a spring, those that are given."""
+    """Yield the parameters of a spring that are given."""
     where = f"linkage.springs.{name}"
     if (bool(spring.between), bool(spring.at), bool(spring.bodies)).count(True) != 1:
         raise LinkageError(
@@ -403,7 +403,7 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
 
 
 def _check_names(found: list[Parameter]) -> None:
-    """Raise LinkageError where two parameters have one name."""
+    """Raise LinkageError if two parameters have the same name."""
     names = [parameter.name for parameter in found]
     for name in names:
         if names.count(name) > 1:
@@ -413,7 +413,7 @@ def _check_names(found: list[Parameter]) -> None:
 
 
 def size(found: Interface) -> tuple[float, float]:
-    """Return a length (m), the greatest coordinate of a point, and the mass of all bodies (kg); 1 where there is none."""
+    """Return the greatest coordinate of a point (m) and the mass of all bodies (kg), each 1 if there is none."""
     lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

@@ -1,4 +1,4 @@
-"""How far a linkage can move as one freedom runs through its range, and where what it drives stands still."""
+"""Find the range through which one freedom can move, and the dead centres of the bodies that it drives."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .structure import Pin, Slider
 
 
 class Reach(NamedTuple):
-    """The range of a freedom about its start in which the bodies can be joined, the other freedoms at their start.
+    """Range of a freedom about its start in which the linkage can be assembled, with the other freedoms at their start.
 
     Attributes
     ----------
     freedom : int
     unit : str
-        Of its coordinate, rad or m.
+        Unit of its coordinate, rad or m.
     low, high : float
-        Ends of the range (rad, m): dead centres, or the ends of a turn.
+        Ends of the range (rad, m): limits of assembly, or the ends of a turn.
     turns : bool
         Whether the freedom can make a whole turn.
     least : float
-        Least clearance of any dyad in the range, the sine of its transmission angle.
+        Least clearance of any dyad in the range: the sine of its transmission angle.
     """
 
     freedom: int
@@ -41,16 +41,16 @@ class Reach(NamedTuple):
 
 
 def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, samples: int = 360) -> Reach:
-    """Find the range of a freedom.
+    """Find the range in which a freedom can move.
 
     Parameters
     ----------
     mechanism : Mechanism
     freedom : int
     most : float, optional
-        The distance from the start that is looked at: by default half its period, or half a turn; of a slide 1 m.
+        Greatest distance from the start that is searched: by default half the period, or half a turn; for a slide 1 m.
     samples : int
-        Places looked at to either side.
+        Positions that are tried to either side.
     """
     coordinate, period = mechanism.freedoms[freedom].coordinate, mechanism.freedoms[freedom].period
     unit = next(v.unit for v in mechanism.variables if v.name == coordinate)
@@ -62,7 +62,7 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
     middle = x[freedom]
 
     def margin(q: float) -> float:
-        """Return the clearance to the limit at a coordinate; less than -1 where the bodies do not reach each other."""
+        """Return the clearance to the limit of assembly at a coordinate; below -1 if the bodies do not reach each other."""
         x[freedom] = q
         try:
             return float(mechanism.equations.clearance(x, acting, p)) - LIMIT_SINE
@@ -84,12 +84,12 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
 
 
 class DeadCentre(NamedTuple):
-    """A place at which what a freedom drives stands still while the freedom goes on.
+    """A position at which a driven body stands still while the freedom moves on.
 
     Attributes
     ----------
     name : str
-        Of the body that is pinned to the ground, or of the slide on it.
+        Name of the body that is pinned to the ground, or of its slide on the ground.
     at : float
         Coordinate of the freedom (rad, m).
     """
@@ -99,9 +99,9 @@ class DeadCentre(NamedTuple):
 
 
 def dead_centres(package: Package, freedom: int = 0, samples: int = 720) -> list[DeadCentre]:
-    """Find the places in the range of a freedom at which a body pinned to the ground, or sliding on it, stands still.
+    """Find the positions of a freedom at which a body that is pinned to the ground, or slides on it, stands still.
 
-    The other freedoms are at their start. A place is found where the velocity coefficient changes its sign.
+    The other freedoms are at their start. At such a position the velocity coefficient of the body changes its sign.
     """
     made, joints = package.mechanism(), package.structure.joints.values()
     found, known = reach(made, freedom), made.first_set

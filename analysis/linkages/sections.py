@@ -1,4 +1,4 @@
-"""Sections of links in files: tables with a kind, dimensions and a material."""
+"""Read the cross-sections of links from files: tables with a kind, dimensions and a material."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..sections import Bar, MassProperties, Plate, Rod, Section, Tube, density
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """What a link is made of: a section as long as the link and an ``overhang`` (m) beyond each pin, or a plate."""
+    """Body of a link: a bar of constant cross-section with an ``overhang`` (m) beyond each pin, or a plate."""
 
     section: Section | Plate
     words: str
@@ -20,19 +20,19 @@ class Made:
     corners: tuple[tuple[float, float], ...] = ()
 
     def properties(self, length: float) -> MassProperties:
-        """Return mass, centre of mass from the first pin along and across the link, and moment of inertia about it."""
+        """Return mass, centre of mass along and across the link from its first pin, and moment of inertia about that centre."""
         if isinstance(self.section, Plate):
             return self.section.properties(self.corners)
         body = length + 2.0 * self.overhang
         return MassProperties(self.section.mass(body), (0.5 * length, 0.0), self.section.inertia(body))
 
     def origin(self, weighed: bool) -> str:
-        """Return in words where a mass comes from that this gives, or whose centre and radius of gyration it gives."""
+        """Say where the mass properties come from: all from the section, or the mass from weighing (``weighed``)."""
         return f"{'weighed, shaped as a ' if weighed else 'of a '}{self.words}"
 
 
 def millimetres(*lengths: float) -> str:
-    """Return lengths in SI as text in millimetres."""
+    """Write lengths, given in metres, as text in millimetres."""
     return " x ".join(f"{1e3 * length:g}" for length in lengths) + " mm"
 
 

@@ -1,4 +1,8 @@
-"""The structure of a described linkage: its joints, its freedoms, and the dyads through which all bodies follow from them."""
+"""Split a described linkage into freedoms and dyads, pairs of bodies whose poses follow in closed form.
+
+The solution begins at the ground. Each step adds a body whose joint with a known body is a freedom, a gear or rack that
+meshes with a known one, or a dyad: two bodies joined to each other and each to a known body (Assur group of class II).
+"""
 
 from __future__ import annotations
 
@@ -16,14 +20,14 @@ MOST_FREEDOMS = 4
 
 
 class Pin(NamedTuple):
-    """Bodies pinned to each other at a point that all of them have."""
+    """Bodies pinned together at a point that all of them have."""
 
     name: str
     bodies: tuple[str, ...]
 
 
 class Slider(NamedTuple):
-    """A block on a line of another body, through one of its points; ``inclined`` where it is not parallel to its x axis."""
+    """A block on a line through a point of another body; ``inclined`` if the line is not parallel to that body's x axis."""
 
     name: str
     bodies: tuple[str, str]
@@ -35,7 +39,7 @@ Joint = Pin | Slider
 
 
 class Freed(NamedTuple):
-    """A body that follows through a freedom, its joint with ``parent``; ``sign`` is -1 where it is the joint's first body."""
+    """A body whose joint with the known body ``parent`` is a freedom; ``sign`` is -1 if it is the first body of the joint."""
 
     body: str
     parent: str
@@ -50,7 +54,7 @@ class Freed(NamedTuple):
 
 
 class Geared(NamedTuple):
-    """A gear that follows from its mate's angle, both on ``parent``; ``inverse`` where the mate is the second of the pair."""
+    """A gear whose angle follows from its mate's, both pinned to ``parent``; ``inverse`` if the mate is the pair's second."""
 
     body: str
     parent: str
@@ -61,10 +65,10 @@ class Geared(NamedTuple):
 
 
 class Racked(NamedTuple):
-    """A rack or its gear that follows from the other, ``mate``; both are on ``parent``, which ``joint`` joins to ``body``.
+    """A rack that follows from its gear, or the gear from its rack: ``body`` from ``mate``; ``joint`` joins it to ``parent``.
 
-    ``rack`` is its name in the description, ``pin`` and ``slide`` are the joints of the two with ``parent``; ``linear`` says
-    whether the travel is linear in the coordinates.
+    ``rack`` is the name of the pair in the description; ``pin`` joins the gear and ``slide`` the rack to ``parent``. ``linear``
+    says whether the travel is linear in the coordinates.
     """
 
     body: str
@@ -83,7 +87,7 @@ class Racked(NamedTuple):
 
 
 class Side(NamedTuple):
-    """A body of a dyad with what follows from it by freedoms and dyads: its joint with ``parent``, whose place is known."""
+    """One side of a dyad: a body, its joint with the known body ``parent``, and the bodies that hang on it."""
 
     body: str
     parent: str
@@ -97,9 +101,10 @@ class Side(NamedTuple):
 
 
 class Dyad(NamedTuple):
-    """Two bodies that follow from the places of others; ``ends`` are the bodies of each side that the inner joint joins.
+    """Two bodies joined to known ones and to each other; ``ends`` are the bodies of the two sides at the inner joint.
 
-    ``kind`` is RRR, RRP, PRP, RPR or RPP; where one side is pinned and the other slides the pinned one is the first.
+    ``kind`` is RRR, RRP, PRP, RPR or RPP: R a pin, P a slide, the inner joint in the middle. If one side is pinned and the
+    other slides, the pinned one is the first.
     """
 
     kind: str
@@ -114,7 +119,7 @@ class Dyad(NamedTuple):
 
     @property
     def inner_dyads(self) -> Iterator[Dyad]:
-        """The dyads inside its sides, in their order, and itself as the last."""
+        """The dyads inside its sides, in their order, and then itself."""
         for side in self.sides:
             for step in side.inside:
                 if isinstance(step, Dyad):
@@ -132,16 +137,16 @@ Step = Freed | Geared | Racked | Dyad
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """How a linkage is solved.
+    """Order in which the poses of a linkage are computed.
 
     Attributes
     ----------
     bodies : tuple of str
-        All bodies that move, the massless pins of slots included.
+        All moving bodies, including the massless pins of slots.
     joints : mapping of str to Joint
     freedoms : mapping of str to FreedomTable
     steps : tuple of Step
-        In the order in which the places of the bodies follow.
+        In the order of the computation.
     """
 
     bodies: tuple[str, ...]
@@ -151,7 +156,7 @@ class Structure:
 
     @property
     def dyads(self) -> tuple[Dyad, ...]:
-        """The dyads in their order, those inside others before these."""
+        """The dyads in the order of the computation, inner dyads before those that contain them."""
         return tuple(dyad for step in self.steps if isinstance(step, Dyad) for dyad in step.inner_dyads)
 
 
@@ -161,7 +166,7 @@ def joints(description: Description) -> dict[str, Joint]:
     Raises
     ------
     LinkageError
-        If a joint names what is not there, or a body is joined to nothing.
+        If a joint names a body or point that does not exist, or a body is joined to nothing.
     """
     owners: dict[str, list[str]] = {name: [GROUND] for name in description.ground}
     for name, body in description.bodies.items():
@@ -230,7 +235,7 @@ def on_one_body(name: str, rack: Rack, found: Mapping[str, Joint]) -> tuple[Pin,
 def _check_line(
     where: str, bodies: tuple[str, ...], through: str, owners: Mapping[str, list[str]], known: tuple[str, ...]
 ) -> None:
-    """Raise an error if a line is on a body that is not there, or through a point that the body has not."""
+    """Raise an error if the body of a line does not exist, or does not have the point of the line."""
     for body in bodies:
         if body not in known:
             raise unknown_name(body, known, f"body {body}, of {where}")
@@ -244,7 +249,7 @@ def sliders(structure: Structure) -> dict[str, Slider]:
 
 
 def lost_freedoms(description: Description, found: Mapping[str, Joint]) -> dict[str, int]:
-    """Return the freedoms that each joint, gear pair and rack takes away."""
+    """Return the number of freedoms that each joint, gear pair and rack removes."""
     lost = {name: 2 * (len(joint.bodies) - 1) for name, joint in found.items()}
     return lost | dict.fromkeys((*description.gears, *description.racks), 1)
 
@@ -256,7 +261,7 @@ def _count(description: Description) -> int:
 
 
 def _excess(description: Description) -> str:
-    """Return in words an entry without which a linkage that cannot move can; empty where there is no such entry."""
+    """Name an entry whose removal would let an immobile linkage move; empty if there is none."""
     for table in ("racks", "gears", "slots", "slides", "bodies"):
         entries = getattr(description, table)
         for name in reversed(entries):
@@ -271,13 +276,13 @@ def _excess(description: Description) -> str:
 
 
 def analyse(description: Description) -> Structure:
-    """Find the order in which the bodies of a linkage follow from its freedoms, in closed form.
+    """Find the order in which the poses of all bodies follow in closed form from the freedoms.
 
     Raises
     ------
     LinkageError
-        If the number of freedoms is not the linkage's, or the bodies are no chain of dyads from these freedoms; the error
-        names the bodies that are left, and other choices of freedoms that would do.
+        If the number of freedoms is wrong, or the bodies are not a chain of dyads with these freedoms; the error names the
+        bodies that are left, and other choices of freedoms that are possible.
     """
     if not description.bodies:
         raise LinkageError("linkage.bodies has none: one at least must move")
@@ -320,21 +325,21 @@ def analyse(description: Description) -> Structure:
 
 
 def _choices(description: Description, found: Mapping[str, Joint], count: int) -> Iterator[tuple[str, ...]]:
-    """Yield the sets of joints from whose coordinates all bodies follow, those with most joints of the ground first."""
+    """Yield the sets of joints that determine all bodies if taken as freedoms; sets with most joints on the ground first."""
     simple = [name for name, joint in found.items() if len(joint.bodies) == 2 and name not in description.slots]
     simple.sort(key=lambda name: GROUND not in found[name].bodies)
     return (some for some in combinations(simple, count) if not _solve(description, found, list(some))[1])
 
 
 def _proposed(description: Description, found: Mapping[str, Joint], count: int) -> dict[str, FreedomTable]:
-    """Return the first set of freedoms that does, each named after its body."""
+    """Return the first set of freedoms that determines all bodies, each named after its body."""
     for some in _choices(description, found, count):
         return {found[name].bodies[1]: FreedomTable(joint=name) for name in some}
     raise LinkageError(f"{description.name} is no chain of dyads, whatever joints are taken as freedoms")
 
 
 def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed]:
-    """Return the bodies that freedoms join to one body, each after its parent."""
+    """Return the bodies that freedoms connect to one body, each after its parent."""
     steps: list[Freed] = []
     there = {root}
     growing = True
@@ -351,7 +356,7 @@ def _tree(root: str, found: Mapping[str, Joint], freed: list[str]) -> list[Freed
 
 
 def _solve(description: Description, found: Mapping[str, Joint], freed: list[str]) -> tuple[list[Step], list[str]]:
-    """Return the steps from the ground on, and the bodies that do not follow."""
+    """Return the steps that start at the ground, and the bodies that remain undetermined."""
     steps: list[Step] = list(_tree(GROUND, found, freed))
     #: bodies whose places are known, in order, and those whose angles are linear in the coordinates
     known = dict.fromkeys((GROUND, *(step.body for step in _freed(steps))))
@@ -378,7 +383,7 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
 
 
 def _next_dyad(fixed: list[Joint], trees: Mapping[str, list[Freed]], known: Mapping[str, None]) -> Dyad | None:
-    """Return a dyad of bodies with what freedoms join to them, else with what follows from them by dyads too."""
+    """Return a dyad whose sides are bodies with those that freedoms join to them; if none, with inner dyads too."""
     if dyad := next(_dyads(fixed, trees, known), None):
         return dyad
     groups: dict[str, list[Freed | Dyad]] = {}
@@ -408,7 +413,7 @@ def _freed(steps: list[Step]) -> Iterator[Freed]:
 def _geared(
     description: Description, fixed: list[Joint], known: Mapping[str, None], linear: set[str], unknown: list[str]
 ) -> Iterator[Geared]:
-    """Yield the gears whose mates' angles are known."""
+    """Yield the unknown gears whose mates' angles are known."""
     pins = [joint for joint in fixed if isinstance(joint, Pin)]
     for name, gear in description.gears.items():
         for (mate, body), inverse in ((gear.bodies, False), (gear.bodies[::-1], True)):
@@ -428,7 +433,7 @@ def _racked(
     linear: set[str],
     travels: set[str],
 ) -> Iterator[Racked]:
-    """Yield the racks whose gears' angles are known, and the gears whose racks are; ``travels`` are the linear slides."""
+    """Yield the racks whose gears are known and the gears whose racks are; ``travels`` are slides with linear positions."""
     for name, rack in description.racks.items():
         pin, slide, carrier = on_one_body(name, rack, found)
         if rack.rack not in known and slide in fixed and {rack.gear, carrier} <= linear:
@@ -439,7 +444,7 @@ def _racked(
 
 
 def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tuple[Joint, str, str]]:
-    """Yield the joints between two sets of bodies, with the body of each that it joins."""
+    """Yield the joints between two sets of bodies, with the body of each set."""
     for joint in fixed:
         ends = [next((body for body in joint.bodies if body in some), "") for some in (first, second)]
         if all(ends):
@@ -449,7 +454,7 @@ def _links(fixed: list[Joint], first: set[str], second: set[str]) -> Iterator[tu
 def _dyads(
     fixed: list[Joint], trees: Mapping[str, Sequence[Freed | Dyad]], known: Mapping[str, None]
 ) -> Iterator[Dyad]:
-    """Yield the pairs of groups that follow from known bodies; ``trees`` are the steps from each body on."""
+    """Yield the dyads on known bodies; ``trees`` are the steps by which further bodies hang on each body."""
     base = set(known)
     sides = [
         Side(body, parent, joint, tuple(inside))
@@ -470,7 +475,7 @@ def _dyads(
 
 
 def _kind(sides: tuple[Side, Side], inner: Joint) -> str:
-    """Return the kind of a dyad whose first side is pinned if one is; empty where its three joints do not determine it."""
+    """Return the kind of a dyad from its three joints; empty if they do not determine its pose."""
     pinned = sum(isinstance(side.joint, Pin) for side in sides)
     if isinstance(inner, Pin):
         return ("PRP", "RRP", "RRR")[pinned]

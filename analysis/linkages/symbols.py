@@ -1,8 +1,8 @@
-"""Symbols of the variables of a described linkage, in LaTeX, from their names."""
+"""Derive the LaTeX symbols of the variables of a described linkage from their names."""
 
 from __future__ import annotations
 
-#: Letter and further index by the last part of a name; of a force or a coordinate of a point the axis is the index.
+#: Letter and further index by the last part of a name; for a force or a coordinate of a point the index is the axis.
 _SYMBOLS = {
     "angle": (r"\theta", ""),
     "speed": (r"\dot\theta", ""),
@@ -48,9 +48,9 @@ _SYMBOLS = {
 
 
 def symbol(name: str, unit: str, at: str = "") -> str:
-    r"""Return the symbol of a variable: a letter by what it is, and as index whose it is; empty where there is none.
+    r"""Return the symbol of a variable: a letter for the quantity, with the body as index; empty if there is none.
 
-    ``at`` is a further index, such as 0 of a value at the start.
+    ``at`` is a further index, such as 0 for an initial value.
 
     >>> symbol("crank.length", "m"), symbol("coupler.P_x", "m"), symbol("crank.acceleration", "rad/s2")
     ('l_{\\mathrm{crank}}', 'x_{\\mathrm{coupler},P}', '\\ddot\\theta_{\\mathrm{crank}}')

@@ -1,4 +1,4 @@
-"""The file that `linkwork new linkage` writes: a four-bar linkage with every table explained."""
+"""Text of the file that `linkwork new linkage` writes: a four-bar linkage with every table explained."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write the parameters, the inputs and the freedoms of a described linkage, as its package has them."""
+"""Write the parameters, inputs and freedoms of a described linkage as source text of its package."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .writing import quoted
 
 
 class Start(NamedTuple):
-    """A field of the state at the start: its name and unit, its value in the description, and its default."""
+    """A field of the initial state: its name and unit, its value in the description, and its default."""
 
     name: str
     unit: str
@@ -22,13 +22,13 @@ class Start(NamedTuple):
 
 
 def display(unit: str) -> str:
-    """Return the argument of a variable that names the unit people think in; empty for the unit itself."""
+    """Return the argument that names a variable's display unit, deg or rpm; empty if it is the unit itself."""
     shown = {"rad": "deg", "rad/s": "rpm"}.get(unit)
     return f', display="{shown}"' if shown else ""
 
 
 class Variables:
-    """The variables of one linkage, but for its outputs."""
+    """Writer of the variables of one linkage, except its outputs."""
 
     def __init__(self, interface: Interface) -> None:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
@@ -77,7 +77,7 @@ class Variables:
             yield f"{p.field}: {'int' if p.rule == 'sign' else 'float'} = {p.value!r}"
 
     def parameters(self) -> Iterator[str]:
-        """Yield the variables of parameters, modes and start."""
+        """Yield the variables of the parameters, the modes and the initial state."""
         for p in self.interface.parameters:
             sign = quoted(symbol(p.name, p.unit))
             if p.rule == "sign":
@@ -99,7 +99,7 @@ class Variables:
         yield "tolerance_parameter()"
 
     def placing(self) -> list[str]:
-        """Return the parameters that set the places of the bodies at the start."""
+        """Return the parameters that determine the poses of the bodies at the start."""
         names = [p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and not p.role]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
@@ -117,12 +117,12 @@ class Variables:
         return f"{drive.name}_{name}" if self.several or not drive.table else name
 
     def driven(self) -> str:
-        """Return the entries of what the linkage is run at."""
+        """Return the entries of the published set that command its rates."""
         driven = [d for d in self.interface.drives if d.commanded]
         return ", ".join(f'"{self._argument(d, "speed")}": {d.speed!r}' for d in driven)
 
     def origins(self) -> Iterator[str]:
-        """Yield the entries that say where the masses come from."""
+        """Yield the entries that say where the mass properties come from."""
         for name, body in self.description.bodies.items():
             if body.section is not None:
                 yield f'"{name}.mass": {quoted(body.section.origin(body.mass is not None))}'

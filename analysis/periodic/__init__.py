@@ -1,4 +1,4 @@
-"""Periodic motions of a mechanism: orbits and their Floquet multipliers, branches, charts, resonance, stability.
+"""Analyse periodic motions of a mechanism: orbits and Floquet multipliers, branches, charts, resonance, stability.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

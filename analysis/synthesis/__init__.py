@@ -1,4 +1,4 @@
-"""Dimensional synthesis: from what is to be traced to ranked linkages that really do it.
+"""Synthesise linkages: find the dimensions of linkages that do a task, and rank them by error and defects.
 
 >>> import numpy as np
 >>> from analysis.synthesis import LargestLink, LeastTransmission, TimedPath, synthesize, turn

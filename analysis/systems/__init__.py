@@ -1,4 +1,4 @@
-"""Systems of FMUs: partners of the mechanisms, files of SSP, a master, and how far its couplings can be trusted.
+"""Systems of connected FMUs: description, SSP files, a co-simulation master, and the errors of its couplings.
 
 The public names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

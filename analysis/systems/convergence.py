@@ -1,4 +1,4 @@
-"""How far a coupling can be trusted: the error of a system over the communication step, against the system as one model."""
+"""Measure coupling errors: compare co-simulations of a system at several communication steps with the system as one model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .master import SystemRun, run_system
 
 
 class Way(NamedTuple):
-    """A way of coupling: of the master, whether rates of commanded speeds are connected, the version of FMI."""
+    """A way of coupling: the master's coupling, whether rates of commanded speeds are connected, and the FMI version."""
 
     coupling: str
     rates: bool = True
@@ -34,29 +34,29 @@ WAYS = {
     "updates": Way("updates", fmi=3),
     "rollback": Way("rollback"),
 }
-#: Steps of a decade, as shares of its first: each divides that.
+#: Steps of a decade relative to its first, which each of them divides.
 _DECADE = (1.0, 0.5, 0.2)
-#: Errors below this are those of the parts' own integration, not of the coupling.
+#: Errors below this are due to the parts' own integrators, not to the coupling.
 _FLOOR = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
 class Convergence:
-    """Errors of a system's couplings over the communication step.
+    """Errors of a system's couplings at several communication steps.
 
     Attributes
     ----------
     title : str
     steps : (N,) float array
-        Communication steps (s), falling.
+        Communication steps (s), in descending order.
     errors : mapping of str to (N,) float array
-        By coupling the greatest error of all connected outputs, accelerations left out, at the points of the greatest step,
-        each relative to its greatest magnitude; NaN where a part refused a step.
+        For each coupling, the greatest error of all connected outputs without accelerations, at the points of the greatest
+        step, relative to the greatest magnitude of each output; NaN if a part refused a step.
     powers : mapping of str to (N,) float array
-        By coupling the work that it brought in, as a share of the work that went through the power bonds; 0 without bonds, NaN
-        where a part refused a step.
+        For each coupling, the work that the coupling added, as a fraction of the work transmitted by the power bonds; 0
+        without bonds, NaN if a part refused a step.
     messages : mapping of str to str
-        What a part said that refused a step, by coupling and step.
+        Message of the part that refused a step, by coupling and step.
     """
 
     title: str
@@ -66,9 +66,9 @@ class Convergence:
     messages: Mapping[str, str]
 
     def order(self, way: str) -> float:
-        """Return the order of a coupling, the slope of the error over the step by regression; NaN with less than two errors.
+        """Return the order of a coupling: the slope of log error over log step by regression; NaN with fewer than two errors.
 
-        Errors above a tenth, where the step is too long for the system, and those of the parts' own integration do not count.
+        It leaves out errors above 0.1, where the step is too long for the system, and those of the parts' own integrators.
         """
         good = np.isfinite(self.errors[way]) & (self.errors[way] > _FLOOR) & (self.errors[way] < 0.1)
         if np.count_nonzero(good) < 2:
@@ -85,30 +85,30 @@ def convergence(
     ways: Sequence[str] = tuple(WAYS),
     progress: bool = False,
 ) -> Convergence:
-    """Run a system in several couplings at several steps, and compare with its equations joined.
+    """Run a system with several couplings and communication steps, and compare each run with the joined equations.
 
     Parameters
     ----------
     system : System
     steps : sequence of float, optional
-        Communication steps (s), each a whole fraction of the first; by default three a decade from the system's own, or a
-        controller's sample time, on.
+        Communication steps (s), each a whole fraction of the first; by default three per decade, from the shorter of the
+        system's step and the controllers' sample times downwards.
     decades : int
-        Number of them.
+        Number of decades of the default steps.
     stop_time : float, optional
-        By default 50 times the first step, or the system's, if that is less (s).
+        End of the runs (s); by default 50 times the first step, or the system's stop time if that is earlier.
     ways : sequence of str
-        Of `WAYS`.
+        Ways of coupling, keys of `WAYS`.
     progress : bool
 
     Raises
     ------
     InputError
-        If a step does not divide the first, or that the stop time.
+        If a step does not divide the first step, or the first step the stop time.
     UnknownNameError
         If a way is not one of `WAYS`.
     WiringError
-        If a part is an FMU, of which no equations are known.
+        If a part is an FMU, whose equations are not known.
     """
     for way in ways:
         if way not in WAYS:

@@ -1,4 +1,4 @@
-"""A system as one program in C for real-time targets: its native FMUs linked from their sources, no heap, no Python."""
+"""Write a system as one C program for real-time targets, with the sources of its native FMUs: no heap, no Python."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ OPTIONS = (
 def write_host(wiring: Wiring, folder: str | Path) -> list[str]:
     """Write a system as C files into a folder, and return the names of those to compile.
 
-    These are ``host.c``, the master with its clock, and one file of each native FMU. ``system.h`` has the start values and
-    the connections.
+    These are ``host.c``, which is the master with its clock, and one file for each native FMU. ``system.h`` has the start
+    values and the connections.
 
     Raises
     ------
     WiringError
-        If a part is neither a native FMU with its sources nor a controller that the host has.
+        If a part is neither a native FMU with its sources nor a controller known to the host.
     """
     folder = Path(folder)
     files = {name: (resources.files(__package__) / name).read_text(encoding="utf-8") for name in (_HOST, _CONTROLLERS)}
@@ -71,7 +71,7 @@ def build_host(wiring: Wiring, folder: str | Path) -> Path:
     Raises
     ------
     BuildError
-        If it is not Linux, whose clock the host goes by, or the files do not compile.
+        If the machine does not run Linux, whose clock the host uses, or the files do not compile.
     """
     architecture, _, name = this_platform().partition("-")
     if name != "linux":
@@ -86,7 +86,7 @@ def _identifier(part: Part) -> str:
 
 
 def _compiled(part: Part) -> list[str]:
-    """Return the C files of an FMU that are to be compiled."""
+    """Return the C files of an FMU that must be compiled."""
     return [
         name
         for configuration in part.description.buildConfigurations or ()
@@ -97,7 +97,7 @@ def _compiled(part: Part) -> list[str]:
 
 
 def _header(wiring: Wiring) -> str:
-    """Return system.h: instances of the parts, their start values, and functions that call all of them in turn."""
+    """Return the text of system.h: instances of the parts, start values, and functions that call all parts in turn."""
     names = {name: f"part{n}" for n, name in enumerate(wiring.parts)}
     native = {name: _identifier(part) for name, part in wiring.parts.items() if _compiled(part)}
     ends = dict.fromkeys(wiring.connections.values())
@@ -171,5 +171,5 @@ def _function(head: str, lines: Iterable[str]) -> list[str]:
 
 
 def _field(port: str) -> str:
-    """Return the field of a controller's structure: harmonics are elements of an array."""
+    """Return the field of a controller's C structure for a port: harmonics are elements of an array."""
     return re.sub(r"_(\d+)$", r"[\1]", port)

@@ -1,4 +1,4 @@
-"""Instances of the parts of a system through FMPy, of FMI 2.0 and 3.0."""
+"""Instantiate and step the FMUs of a system through FMPy, in FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ Floats: TypeAlias = NDArray[np.float64]
 
 @lru_cache(maxsize=64)
 def _unpacked(fmu: Path, changed: int, folder: str | None) -> tempfile.TemporaryDirectory[str]:
-    """Unpack an FMU once in a process, into a folder that goes with it."""
+    """Unpack an FMU once per process, into a folder that is removed when the process ends."""
     place = tempfile.TemporaryDirectory(dir=folder, prefix="linkwork-", ignore_cleanup_errors=True)
     extract(str(fmu), place.name)
     return place
 
 
 class Instance:
-    """An instance of a part of FMI 2.0: `begin`, `begun`, then steps.
+    """An instance of an FMI 2.0 part; call `begin`, `begun`, then `step`.
 
     Attributes
     ----------
     messages : list of str
-        What it has logged; FMPy gives the messages of all FMUs of FMI 2.0 to one of them.
+        Logged messages; FMPy passes the messages of all FMI 2.0 FMUs to one of them.
     outputs : tuple of str
         Its real outputs, in the order of `read`.
     goes_back : bool
-        Whether it can return to a saved state.
+        Whether it can save and restore its state.
     """
 
     _running: type = FMU2Slave
@@ -74,7 +74,7 @@ class Instance:
         self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def begin(self) -> None:
-        """Set the start values and enter the initialisation."""
+        """Set the start values and enter initialisation mode."""
         self._fmu.setupExperiment(startTime=0.0)
         self._set_start_values()
         self._fmu.enterInitializationMode()
@@ -90,7 +90,7 @@ class Instance:
     _enumerations = "Integer"
 
     def begun(self) -> None:
-        """Leave the initialisation."""
+        """Leave initialisation mode."""
         self._fmu.exitInitializationMode()
 
     def read(self) -> NDArray[np.float64]:
@@ -104,13 +104,13 @@ class Instance:
         ----------
         names : sequence of str
         values : float array
-            At the start of the step.
+            Values at the start of the step.
         slopes : float array or None
-            Over the step; None where the inputs are held.
+            Slopes over the step; None if the inputs are held.
         middle : float
-            Time after which a part that takes no slopes gets the values, for the whole step (s).
+            Time (s) at which a part that accepts no slopes evaluates the lines; it holds these values for the whole step.
         updated : bool
-            Whether a part of FMI 3.0 goes along the lines by intermediate updates.
+            Whether an FMI 3.0 part follows the lines by intermediate updates.
         """
         references = [self.part.ports[name].reference for name in names]
         lines = slopes is not None and self._interpolates
@@ -123,19 +123,19 @@ class Instance:
                 self._fmu.setRealInputDerivatives(references, [1] * len(references), self._slopes.tolist())
 
     def at_end(self, step: float) -> Floats:
-        """Return what the inputs came to at the end of a step."""
+        """Return the values of the inputs at the end of a step."""
         return self._values + step * self._slopes
 
     def step(self, time: float, step: float) -> None:
-        """Take a step; raises FMPy's FMICallException where the part refuses it."""
+        """Take a step; raises FMPy's FMICallException if the part refuses it."""
         self._fmu.doStep(time, step)
 
     def saved(self) -> Any:
-        """Return its present state."""
+        """Save the present state and return it."""
         return self._fmu.getFMUState()
 
     def restore(self, state: Any) -> None:
-        """Return to a state."""
+        """Restore a saved state."""
         self._fmu.setFMUState(state)
 
     def forget(self, state: Any) -> None:
@@ -148,7 +148,7 @@ class Instance:
 
 
 class Instance3(Instance):
-    """An instance of a part of FMI 3.0, where inputs have no derivatives but can be set at each step of its own integrator."""
+    """An instance of an FMI 3.0 part: inputs have no derivatives, but can be updated at each step of the part's integrator."""
 
     _running = FMU3Slave
     _enumerations = "Int64"
@@ -165,7 +165,7 @@ class Instance3(Instance):
             self._fmu.setFloat64(self._references_set, self._last.tolist())
 
     def begin(self) -> None:
-        """Set the start values and enter the initialisation."""
+        """Set the start values and enter initialisation mode."""
         self._set_start_values()
         self._fmu.enterInitializationMode(startTime=0.0)
 
@@ -174,7 +174,7 @@ class Instance3(Instance):
         return np.array(self._fmu.getFloat64(self._references))
 
     def put(self, names: Sequence[str], values: Floats, slopes: Floats | None, *, middle: float, updated: bool) -> None:
-        """Set inputs for a step as `Instance.put` does; without updates lines are held at what they are in the middle."""
+        """Set inputs for a step as `Instance.put` does; without updates they are held at the values in the middle of it."""
         references = [self.part.ports[name].reference for name in names]
         self._values, self._slopes = values, np.zeros(len(values)) if slopes is None else slopes
         self._lines = bool(references) and slopes is not None and updated
@@ -184,7 +184,7 @@ class Instance3(Instance):
             self._fmu.setFloat64(references, self._last.tolist())
 
     def at_end(self, step: float) -> Floats:
-        """Return what the inputs came to at the end of a step: what was set last, or the ends of their lines."""
+        """Return the values of the inputs at the end of a step: those of the last update, or the ends of their lines."""
         return self._last if self._lines else self._values + step * self._slopes
 
     def step(self, time: float, step: float) -> None:
@@ -198,5 +198,5 @@ class Instance3(Instance):
 
 
 def instance_of(part: Part) -> Instance:
-    """Return an instance of a part, by the version of its FMI."""
+    """Return an instance of a part, according to its FMI version."""
     return (Instance3 if part.description.fmiVersion.startswith("3") else Instance)(part)

@@ -1,7 +1,7 @@
-"""A system as one model: the equations of all mechanisms joined, integrated by SciPy, the truth that couplings are measured by.
+"""Integrate a system as one model, with the equations of all mechanisms joined: the reference for coupling errors.
 
-A commanded speed is here the speed that it is connected to, at every instant, and its rate the derivative of that. Controllers
-take their samples at their instants, and what they answer acts at once.
+A commanded speed equals the speed that it is connected to at every instant, and its rate is the derivative of that speed.
+Controllers sample at their sample times, and their outputs act at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .wiring import End, WiringError
 
 
 class _Model:
-    """A mechanism of the system: its symbols, its numbers, its state at the start."""
+    """A mechanism of the system: its symbols, its constants, its initial state."""
 
     def __init__(self, member: Member, mechanism: Mechanism) -> None:
         self.mechanism, values = mechanism, member.values
@@ -49,25 +49,25 @@ class _Model:
         self.constants = [float(values.get(channel.name, 0.0)) for channel in mechanism.channels]
 
     def commanded(self) -> dict[int, str]:
-        """Return the freedoms whose rates are commanded, with the input's name."""
+        """Return the freedoms whose rates are commanded, each with the name of the commanding input."""
         chosen = {mode.name: int(value) for mode, value in zip(self.mechanism.modes, self.modes)}
         commands = (self.mechanism.channels[number] for number in self.mechanism.commands(chosen))
         return {channel.freedom: channel.name for channel in commands}
 
 
 class Joined:
-    """The system as one set of equations.
+    """One set of equations for the whole system.
 
     Parameters
     ----------
     system : System
-        All parts mechanisms or controllers.
+        A system whose parts are all mechanisms or controllers.
 
     Raises
     ------
     WiringError
-        If a part is an FMU, of which no equations are known, or there is a loop whose values depend on each other otherwise
-        than linearly.
+        If a part is an FMU, whose equations are not known, or the values in an algebraic loop depend on each other
+        nonlinearly.
     """
 
     def __init__(self, system: System) -> None:
@@ -132,7 +132,7 @@ class Joined:
         self.start = np.concatenate([model.start for model in self.models.values()])
 
     def _settled(self, casadi: Any, symbols: list[Any], values: list[Any]) -> Any:
-        """Return what the wires carry as expressions of the states alone."""
+        """Solve the connections: return the connected values as expressions of the states alone."""
         if not symbols:
             return casadi.SX(0, 1)
         w, found = casadi.vertcat(*symbols), casadi.vertcat(*values)
@@ -147,12 +147,12 @@ class Joined:
         return -casadi.solve(matrix, casadi.substitute(found - w, w, casadi.SX.zeros(len(symbols))))
 
     def run(self, stop_time: float, step: float, *, tolerance: float = 1e-12) -> SystemRun:
-        """Integrate by SciPy's DOP853, and return all outputs at multiples of a step.
+        """Integrate with SciPy's DOP853; return all outputs at multiples of a step.
 
         Raises
         ------
         IntegrationError
-            If it does not reach the end.
+            If the integration does not reach the end.
         """
         times = step * np.arange(round(stop_time / step) + 1)
         period = min((c.sample_time for c in self.controllers.values()), default=stop_time)
@@ -181,7 +181,7 @@ class Joined:
         )
 
     def _sampled(self, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what the controllers hold from an instant of sampling on; each sees what the others held until then."""
+        """Sample the controllers that are due at t; return the held outputs of all. Each sees the others' outputs before t."""
         due = {name: c for name, c in self.controllers.items() if c.count * c.sample_time <= t + 1e-6 * c.sample_time}
         # at the start what one controller is told by another settles after as many rounds as there are
         for _ in due if t == 0.0 else ():
@@ -198,7 +198,7 @@ class Joined:
         return np.array([getattr(self.controllers[end.part], end.port) for end in self.given])
 
     def _tell(self, controllers: Mapping[str, Controller], x: NDArray[np.float64]) -> None:
-        """Set the inputs of controllers to what is connected to them."""
+        """Set the inputs of controllers to the values of the connected outputs."""
         held = self._held()
         told = dict(zip(self.names, self._outputs(x, held).full().ravel())) | dict(zip(self.given, held))
         for target, source in self.system.connections.items():

@@ -1,4 +1,4 @@
-"""Where the parts of a system stand in its diagram: in columns, each behind those that feed it most."""
+"""Place the parts of a system in its diagram, from left to right in the order of the file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ WIDTH, ROOM, PORT, HEAD = 105.0, 70.0, 6.0, 10.0
 
 
 class Box(NamedTuple):
-    """Edges of a part (mm), y up, and its ports from the top: inputs at the left edge, outputs at the right one."""
+    """Box of a part: its edges (mm, y upwards), and its ports from the top, inputs at the left edge, outputs at the right."""
 
     left: float
     bottom: float
@@ -21,13 +21,13 @@ class Box(NamedTuple):
     outputs: tuple[str, ...]
 
     def height_of(self, port: str) -> float:
-        """Return the height of a port."""
+        """Return the y coordinate of a port (mm)."""
         ports = self.inputs if port in self.inputs else self.outputs
         return self.top - HEAD - PORT * (ports.index(port) + 0.5)
 
 
 def boxes(wiring: Wiring) -> dict[str, Box]:
-    """Return the box of each part: in the order of the file from left to right, two above each other from four parts on."""
+    """Return the box of each part; four and more parts stand in columns of two."""
     placed: dict[str, Box] = {}
     names = list(wiring.parts)
     rows = 1 if len(names) < 4 else 2

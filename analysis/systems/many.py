@@ -1,4 +1,4 @@
-"""Many runs of a system over processes or a cluster, each with its own values; kept on disk, continued where they stopped."""
+"""Run a system many times with different values, on several processes or a cluster; interrupted studies can be continued."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from ..run import CosimulationError, shown
 from .master import run_system
 from .wiring import End, Part, Wiring
 
-#: Runs that are given out together.
+#: Number of runs per batch.
 _BATCH = 16
 
 
 class SystemRunsEnded(LinkworkError):
-    """Runs were stopped, or their workers lost; ``runs`` has those that are done, and a folder keeps them."""
+    """The runs were interrupted, or workers were lost; ``runs`` has the finished ones, which a given folder keeps."""
 
     def __init__(self, reason: str, runs: SystemRuns, folder: Path | None) -> None:
         self.runs = runs
@@ -42,15 +42,15 @@ class SystemRuns:
     Attributes
     ----------
     time : (M,) float array
-        Of the samples (s).
+        Times of the samples (s).
     names : tuple of str
         Outputs, as ``part.output``.
     samples : (N, K, M) float array
-        By run, output and time; see `output`.
+        Values by run, output and time; see `output`.
     lengths : (N,) int array
-        Samples of each run; 0 where it was not begun, or could not be.
+        Number of samples of each run; 0 if it was not begun or could not begin.
     messages : mapping of int to str
-        What a part said that ended a run early or could not begin, by its number.
+        Message of the part that ended a run early or could not begin, by the number of the run.
     """
 
     time: NDArray[Any]
@@ -63,7 +63,7 @@ class SystemRuns:
         return len(self.lengths)
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        """Return an output of all runs, (N, M), masked where a run had ended."""
+        """Return an output of all runs, shape (N, M), masked after the end of a run."""
         if name not in self.names:
             raise unknown_name(name, self.names, f"output {name!r}")
         after = np.arange(len(self.time)) >= self.lengths[:, None]
@@ -71,7 +71,7 @@ class SystemRuns:
 
 
 class _Task(NamedTuple):
-    """A batch: the parts' FMUs and values and the connections, what is varied, and how it is run."""
+    """A batch of runs: FMUs and values of the parts, connections, varied values, and settings of the run."""
 
     parts: tuple[tuple[str, Path, tuple[tuple[str, float], ...]], ...]
     connections: tuple[tuple[End, End], ...]
@@ -94,30 +94,30 @@ def run_many(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> SystemRuns:
-    """Run a system many times, with values of its own in each run.
+    """Run a system many times, each time with different values.
 
     Parameters
     ----------
     wiring : Wiring
-        Its FMUs lie where all workers see them.
+        Its FMUs must lie in a folder that all workers can read.
     vary : mapping of str to array
-        Values of parameters and inputs by ``part.variable``, one for each run (SI).
+        Values of parameters and inputs by ``part.variable``, one value for each run (SI).
     outputs : sequence of str
         Outputs to keep, as ``part.output``.
     coupling, step, stop_time
-        As of `run_system`.
+        See `run_system`.
     every : int
-        Every so many communication points is a sample.
+        Number of communication points per sample.
     folder : path, optional
-        Where the runs are kept; what is there of the same runs is not run again.
+        Folder in which the runs are kept; runs that it already has are not repeated.
     n_jobs : int, optional
-        Processes; by default, or within `joblib.parallel_config`, as `over_workers` has it.
+        Number of processes; the default, also within `joblib.parallel_config`, is that of `over_workers`.
     progress : bool
 
     Raises
     ------
     InputError
-        If the numbers of values differ, or the folder has other runs.
+        If the numbers of values differ, or the folder has runs of another study.
     SystemRunsEnded
         On Ctrl-C, and if workers are lost.
     UnknownNameError
@@ -152,7 +152,7 @@ def run_many(
 
 
 def _sets(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-    """Return the values by run and variable."""
+    """Check the varied values and return them, by run and variable."""
     arrays = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in vary.items()}
     known = [f"{n}.{v}" for n, p in wiring.parts.items() for k in ("parameter", "input") for v in p.named(k)]
     for name in arrays:
@@ -165,7 +165,7 @@ def _sets(wiring: Wiring, vary: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
 
 
 class _Kept:
-    """Samples, lengths and messages, in memory or in a folder, where those of the same runs are taken over."""
+    """Storage of samples, lengths and messages, in memory or in a folder, from which finished runs are read."""
 
     def __init__(self, task: _Task, count: int, folder: Path | None) -> None:
         self.folder, self.messages = folder, dict[int, str]()
@@ -189,7 +189,7 @@ class _Kept:
             self.messages[number] = message
 
     def add(self, numbers: Sequence[int], found: list[tuple[NDArray[np.float64], str]]) -> None:
-        """Keep a batch: first what was found, then that it was."""
+        """Store a batch: first its samples, then the lengths that mark it as finished."""
         for number, (samples, _) in zip(numbers, found):
             self.samples[number, :, : samples.shape[1]] = samples
         said = {number: message for number, (_, message) in zip(numbers, found) if message}
@@ -203,7 +203,7 @@ class _Kept:
 
 
 def _key(task: _Task) -> str:
-    """Return a digest of all that the runs depend on."""
+    """Return a hash of everything on which the runs depend."""
     digest = hashlib.sha256(task.sets.tobytes())
     for _, fmu, _ in task.parts:
         digest.update(fmu.read_bytes())
@@ -218,7 +218,7 @@ def _parts(parts: tuple[tuple[str, Path, tuple[tuple[str, float], ...]], ...]) -
 
 
 def _batch(task: _Task) -> list[tuple[NDArray[np.float64], str]]:
-    """Return samples by output and time of each run of a batch, and what ended it early."""
+    """Run a batch; return for each run its samples by output and time, and the message that ended it early."""
     coupling, step, stop_time, every = task.run
     found = []
     for values in task.sets.tolist():

@@ -1,9 +1,9 @@
-"""Running the parts of a system together, in equal communication steps or in steps that the power bonds ask for.
+"""Co-simulate the parts of a system, with equal communication steps or with steps that a power error controls.
 
-Over a step the inputs are what the outputs were at its start, or straight lines: `COUPLINGS`. Where two parts exchange power,
-what the coupling brings in over a step is known at its end (S. Sadjina, L. T. Kyllingstad, S. Skjong and E. Pedersen, Energy
-conservation and power bonds in co-simulations, Engineering with Computers 33, 2017): it says how far a run can be trusted and
-which step would do, and it can choose the steps.
+Over a communication step the inputs are constant or linear in time: see `COUPLINGS`. If two parts exchange power, the work
+that the coupling adds over a step is known at its end (S. Sadjina, L. T. Kyllingstad, S. Skjong and E. Pedersen, Energy
+conservation and power bonds in co-simulations, Engineering with Computers 33, 2017). It estimates the error of a run and the
+step that a wanted error needs, and it can control the step.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from ..run import CosimulationError, RunInterrupted, shown
 from .instances import Floats, instance_of
 from .wiring import Bond, End, Wiring
 
-#: How the inputs go over a step.
+#: The inputs over a communication step, by coupling.
 COUPLINGS = {
-    "hold": "held at what the outputs were at its start",
-    "derivatives": "on straight lines with the slopes that the outputs had there; FMI 3.0: held at what they are in the middle",
-    "updates": "on the same lines, which a part of FMI 3.0 is told again at each step of its own integrator",
-    "rollback": "on straight lines to what the outputs are at its end: the step is taken again from its start",
+    "hold": "constant: the outputs at the start of the step",
+    "derivatives": "linear, with the outputs' slopes at the start; FMI 3.0: constant, the linear value in the middle",
+    "updates": "linear, as before; an FMI 3.0 part receives the value at each step of its own integrator",
+    "rollback": "linear between the outputs at start and end, so that each step is taken twice",
 }
-#: Gains of the controller of the communication step, proportional and integral; the least and greatest growth of a step, and of
-#: all steps, as shares of the first one (Sadjina et al., section 5).
+#: Controller of the communication step: proportional and integral gain; least and greatest growth of a step; least and greatest
+#: step relative to the first one (Sadjina et al., section 5).
 _GAINS, _GROWTH, _STEPS = (0.2, 0.15), (0.2, 1.5), (1e-3, 1e2)
-#: What a step leaves of the power that residuals are measured by: some fifty steps are remembered, so that zeros of a power do
-#: not count.
+#: Decay per step of the reference power for the residuals: it remembers some fifty steps, so that zeros of a power do not
+#: matter.
 _MEMORY = 0.98
 
 
@@ -50,21 +50,21 @@ class SystemRun:
     values : mapping of str to (N,) float array
         Every real output, as ``part.output``.
     powers : mapping of str to (N,) float array
-        Of each power bond, named by its effort, the power residual: what the coupling has brought in at the end of the step,
-        since either part knew the other only from its start (W).
+        Power residual of each power bond, named by its effort: the power that the coupling adds at the end of the step, because
+        each part knew the other only from the start of the step (W).
     flows : mapping of str to (N,) float array
-        Power that goes through each bond (W).
+        Power transmitted by each bond (W).
     status : int
-        0, or 3 where a part refused a step: the data end before it.
+        0, or 3 if a part refused a step: the data end before it.
     message : str
-        What it said.
+        Message of that part.
     notes : tuple of str
-        What is perhaps not meant.
+        Hints at possible mistakes.
     title, coupling : str
     units : mapping of str to str
-        Of the outputs.
+        Units of the outputs.
     connected : tuple of str
-        Outputs that another part has as an input.
+        Outputs that are connected to another part's input.
     """
 
     time: NDArray[Any]
@@ -88,9 +88,9 @@ class SystemRun:
         return len(self.time)
 
     def brought_in(self) -> float:
-        """Return the work that the coupling brought in, as a share of the work that went through all bonds; 0 without bonds.
+        """Return the work that the coupling added, as a fraction of the work that all bonds transmitted; 0 without bonds.
 
-        Over a step a residual grows from 0, so that its mean is half of what it is at the end.
+        Over a step a residual grows from 0, so that its mean is half of its value at the end.
         """
         steps = np.diff(self.time)
         through = sum(float(steps @ np.abs(flow[1:])) for flow in self.flows.values())
@@ -98,10 +98,10 @@ class SystemRun:
         return brought / through if through > 0.0 else 0.0
 
     def step_for(self, share: float) -> float | None:
-        """Return the communication step with which the coupling would bring in a share of the work (s).
+        """Return the communication step with which the coupling would add a given share of the work (s).
 
-        It holds for equal steps small enough that a residual goes with the step, or with its square where inputs are lines.
-        None without power bonds, and for couplings whose error the residuals do not tell.
+        It is valid for equal steps so small that a residual is proportional to the step, or to its square if inputs are linear.
+        None without power bonds, and for couplings whose error the residuals do not measure.
         """
         brought = self.brought_in()
         orders = {"hold": 1.0, "derivatives": 2.0}
@@ -111,7 +111,7 @@ class SystemRun:
 
 
 class _Together:
-    """All instances of a system, their inputs and outputs at the present communication point."""
+    """All instances of a system, with their inputs and outputs at the present communication point."""
 
     def __init__(self, wiring: Wiring, bonds: Sequence[Bond]) -> None:
         self.wiring = wiring
@@ -181,7 +181,7 @@ class _Together:
     def _exchange(
         self, outputs: Floats, slopes: Floats | None = None, *, middle: float = 0.0, updated: bool = False
     ) -> None:
-        """Set all connected inputs; a part that takes no slopes gets the values after ``middle`` (s)."""
+        """Set all connected inputs; a part that accepts no slopes receives the values at ``middle`` (s) after the start."""
         values = outputs[self.sources]
         for name, (ports, numbers) in self.own.items():
             own = None if slopes is None else slopes[numbers]
@@ -190,7 +190,7 @@ class _Together:
             self.instances[name].put(ports, values[numbers], own, middle=later, updated=updated)
 
     def _slopes(self) -> Floats:
-        """Return the slopes of all connected inputs, those without a known rate from the step before."""
+        """Return the slopes of all connected inputs; without a known rate they are those of the step before."""
         found = self.outputs[self.rates]
         unknown = self.rates == self.sources
         found[unknown] = (self.outputs - self.before)[self.sources[unknown]] / self.last
@@ -222,7 +222,7 @@ class _Together:
             self.outputs = self._read()
 
     def _note_given(self, before: Floats, slopes: Floats | None, step: float) -> None:
-        """Keep what the inputs came to at the end of a step; an input with a connected rate goes with that."""
+        """Keep the values of the inputs at the end of a step; an input whose rate is connected, too, moves at that rate."""
         values = before[self.sources]
         self.given = values.copy()
         for name, (_, numbers) in self.own.items():
@@ -237,7 +237,7 @@ class _Together:
             instance.step(time, step)
 
     def powers(self) -> tuple[Floats, Floats]:
-        """Return the power residual of each bond at the end of the last step, and the power that goes through it then (W)."""
+        """Return the power residual of each bond at the end of the last step, and the power that it transmits then (W)."""
         effort, flow, effort_to, flow_to = self.bonds
         through = self.reached[effort] * self.reached[flow]
         return self.given[effort_to] * self.reached[flow] - self.reached[effort] * self.given[flow_to], through
@@ -248,14 +248,14 @@ class _Together:
 
 
 class _Stepper:
-    """Length of the next communication step: always the same, or such that the coupling brings in about a share of the work."""
+    """Controller of the communication step: constant, or such that the coupling adds about a given share of the work."""
 
     def __init__(self, step: float, stop_time: float, share: float | None) -> None:
         self.step, self.stop_time, self.share = step, stop_time, share
         self.first, self.number, self.before, self.scale = step, 0, 0.0, 0.0
 
     def next(self, time: float) -> tuple[float, float]:
-        """Return the length of the step from a time, and the time at its end."""
+        """Return the length of the next step, and the time at its end."""
         if self.share is None:
             end = (self.number + 1) * self.step
         else:
@@ -271,7 +271,7 @@ class _Stepper:
         return round(self.stop_time / self.first)
 
     def learn(self, powers: Floats, flows: Floats) -> None:
-        """Take note of the power residuals and the powers after a step: PI control of the share that is brought in."""
+        """Adapt the step to the power residuals and the powers of the last one, by PI control of the share of added work."""
         if self.share is None:
             return
         self.scale = max(_MEMORY * self.scale, float(np.sqrt(np.mean(flows**2))))
@@ -304,22 +304,22 @@ def run_system(
     step, stop_time : float, optional
         Communication step and end (s); by default the wiring's.
     share : float, optional
-        With it the steps, of which ``step`` is the first, become as long as the coupling brings in about this share of the
-        power that has gone through the bonds lately, such as 1e-3.
+        Wanted power residual, such as 1e-3, as a fraction of the power that the bonds transmitted lately: it controls the
+        steps, of which ``step`` is the first.
     progress : bool
 
     Returns
     -------
     SystemRun
-        A refused step ends it, with all data before and what the part said.
+        If a part refuses a step, the run ends there and has the part's message.
 
     Raises
     ------
     CosimulationError
         If a part cannot be loaded or initialised.
     InputError
-        If the step is not positive and below the stop time, a part cannot go back to the start of a step, or ``share`` is given
-        where there is no power bond.
+        If the step is not positive and below the stop time, a part cannot restore the state at the start of a step, or
+        ``share`` is given but there is no power bond.
     """
     if coupling not in COUPLINGS:
         raise unknown_name(coupling, COUPLINGS, f"coupling {coupling!r}")
@@ -385,6 +385,6 @@ def run_system(
 
 
 def _said(together: _Together, time: float, error: FMICallException) -> str:
-    """Return that a part refused a step, and what was said last; FMPy tells the messages of all FMUs to one of them."""
+    """Return the message that a part refused a step, with the last logged text; FMPy passes all FMUs' texts to one of them."""
     said = [text for instance in together.instances.values() for text in instance.messages]
     return f"{together.stepping} refused the step from t = {time:.9g} s: {said[-1] if said else error}"

@@ -1,9 +1,8 @@
-"""Systems as files of SSP (System Structure and Parameterization), written and read with pyssp-standard.
+"""Write and read systems as SSP archives (System Structure and Parameterization), with pyssp-standard.
 
-An archive is of SSP 1.0, which knows FMI 2.0; with a part of FMI 3.0 it is of SSP 2.0.
-
-What the library does not know is added here: the geometry of the diagram; and its units are put where the schema has them. It
-reads no transformations of connections and no signal dictionaries: a file with one is refused.
+An archive follows SSP 1.0, which supports FMI 2.0; with an FMI 3.0 part it follows SSP 2.0. This module adds the geometry of
+the diagram, which the library does not write, and moves the units to their place in the schema. The library ignores
+transformations of connections and signal dictionaries: a file that has one is refused.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ etree = lazy("lxml.etree")
 _NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 #: Type of the annotation of the experiment with the communication step, for which the standard has no place.
 _STEP = "linkwork.communication-step"
-#: What the library would read past in silence.
+#: Elements that the library ignores silently.
 _UNREAD = ("LinearTransformation", "BooleanMappingTransformation", "IntegerMappingTransformation", "SignalDictionaries")
 
 
@@ -77,14 +76,14 @@ def write_ssp(wiring: Wiring, path: str | Path) -> Path:
 
 
 def _source(parts: Mapping[str, Part], name: str) -> str:
-    """Return the name of a part's FMU in the archive: that of its file, of two with one name that of the part."""
+    """Return the name of a part's FMU in the archive: its file name, or the part's name if two files have the same name."""
     file = parts[name].fmu
     rivals = {part.fmu for part in parts.values() if part.fmu.name == file.name}
     return file.name if len(rivals) == 1 else f"{name}.fmu"
 
 
 def _ports(wiring: Wiring, name: str) -> dict[str, list[str]]:
-    """Return the ports that are connected, by causality."""
+    """Return the connected ports of a part, by causality."""
     ends = {end.port for pair in wiring.connections.items() for end in pair if end.part == name}
     part = wiring.parts[name]
     return {kind: [port for port in part.named(kind) if port in ends] for kind in ("input", "output")}
@@ -103,7 +102,7 @@ def _base(name: str) -> dict[str, int]:
 
 
 def _component(part: Part, source: str, ports: Mapping[str, Iterable[str]]) -> Any:
-    """Return a part with its connectors and its start values."""
+    """Return the SSP component of a part, with its connectors and start values."""
     component = ssd.Component()
     component.name, component.component_type = part.name, "application/x-fmu-sharedlibrary"
     component.source, component.implementation = f"resources/{source}", "CoSimulation"
@@ -117,7 +116,7 @@ def _component(part: Part, source: str, ports: Mapping[str, Iterable[str]]) -> A
 
 
 def _complete(path: Path, wiring: Wiring) -> None:
-    """Add the places of connectors and parts, and bring the units before the experiment, where the schema has them."""
+    """Add the geometry of parts and connectors, and move the units before the experiment, as the schema requires."""
     tree = etree.parse(path)
     root, placed = tree.getroot(), boxes(wiring)
     found = {node.tag: node for node in root}
@@ -142,7 +141,7 @@ def _complete(path: Path, wiring: Wiring) -> None:
 
 
 def _values(path: Path, part: Part) -> Path:
-    """Write the start values of a part; those of an enumeration by the names of its items."""
+    """Write the start values of a part; values of an enumeration by the names of its items."""
     ports = [part.ports[name] for name in part.values]
     with lazy("pyssp_standard.ssv").SSV(path, mode="w") as values:
         for port in ports:
@@ -171,7 +170,7 @@ def _values(path: Path, part: Part) -> Path:
 
 
 def read_ssp(path: str | Path) -> Wiring:
-    """Read a system from an ``.ssp``: FMUs on one level, connections, start values of ``.ssv``, through ``.ssm``.
+    """Read a system from an ``.ssp``: FMUs on one level, connections, start values from ``.ssv``, renamed by ``.ssm``.
 
     Raises
     ------
@@ -180,7 +179,7 @@ def read_ssp(path: str | Path) -> Wiring:
     MissingLibraryError
         If pyssp-standard is not installed.
     WiringError, UnknownNameError
-        If it has what is not read, or a connection cannot be right.
+        If it has an element that is not supported, or a connection is wrong.
     """
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path} is no .ssp: it must be an archive with a SystemStructure.ssd")
@@ -228,7 +227,7 @@ def read_ssp(path: str | Path) -> Wiring:
 
 
 def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[str, str]:
-    """Return the texts of a part's start values, of its own bindings and of the system's, where its name stands before them."""
+    """Return a part's start values as text: from its own bindings, and from the system's, which begin with its name."""
     found: dict[str, str] = {}
     for number, binding in enumerate(bindings):
         inline, prefix = binding.ssv is not None, binding.prefix or ""
@@ -246,7 +245,7 @@ def _bound(folder: Path, bindings: Iterable[Any], name: str, own: int) -> dict[s
 
 
 def _mapping(folder: Path, binding: Any) -> dict[str, tuple[str, ...]]:
-    """Return the targets of each parameter in the binding's ``.ssm``; nothing where it has none."""
+    """Return the targets of each parameter in the binding's ``.ssm``; empty without one."""
     mapping = binding.parameter_mapping
     if mapping is None:
         return {}
@@ -260,7 +259,7 @@ def _mapping(folder: Path, binding: Any) -> dict[str, tuple[str, ...]]:
 
 
 def _as_number(text: str, port: Port | None, name: str) -> float:
-    """Return a start value as a number: of a Boolean 0 or 1, of an item of an enumeration its value."""
+    """Return a start value as a number: 0 or 1 for a Boolean, the value of the item for an enumeration."""
     names = {item: float(value) for value, item in port.items} if port is not None else {}
     names |= {"true": 1.0, "false": 0.0}
     if text in names:

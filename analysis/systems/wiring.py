@@ -1,4 +1,4 @@
-"""What a system consists of once its FMUs are there: parts with ports, connections, and whether these can be right."""
+"""Wire the FMUs of a system: parts with ports, connections between them, and the checks of these."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..run import read_description
 
 
 class WiringError(LinkworkError):
-    """A system is wired wrongly: the sentence says which connection, and what would be right."""
+    """A system is wired wrongly; the message names the connection and says what would be right."""
 
 
 #: The types of real variables, in FMI 2.0 and 3.0.
@@ -22,10 +22,10 @@ REAL = ("Real", "Float64")
 
 
 class Port(NamedTuple):
-    """A variable of an FMU: its type, its unit, and the variable that it is the time derivative of, if any.
+    """A variable of an FMU: its type, its unit, and the variable whose time derivative it is, if any.
 
-    ``held`` says that it changes at instants only; ``enumeration`` names its type where it is an enumeration, and ``items`` are
-    the names of that by value.
+    ``held`` says that it changes only at discrete instants. For an enumeration, ``enumeration`` is the name of its type and
+    ``items`` has the names of its values.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Port(NamedTuple):
 
 
 class End(NamedTuple):
-    """A port of a part, by both names."""
+    """A port of a part, given by the names of both."""
 
     part: str
     port: str
@@ -57,13 +57,13 @@ class Part:
     ----------
     name : str
     fmu : path
-        For co-simulation, of FMI 2.0 or 3.0.
+        An FMU for co-simulation, FMI 2.0 or 3.0.
     ports : mapping of str to Port
         All its variables.
     values : mapping of str to float
-        Start values by variable; all others start as the FMU has them.
+        Start values by variable; all other variables have the FMU's own.
     feeds : mapping of str to tuple of str
-        Inputs on which an output depends directly, by its name.
+        Inputs on which an output depends directly, by the name of the output.
     description : object
         FMPy's reading of the model description.
     """
@@ -120,7 +120,7 @@ class Part:
         return cls(name=name, fmu=Path(fmu), ports=ports, values=values, feeds=feeds, description=description)
 
     def named(self, causality: str) -> tuple[str, ...]:
-        """Return the names of all real variables of a causality."""
+        """Return the names of all real variables with a causality."""
         return tuple(p.name for p in self.ports.values() if p.causality == causality and p.type in REAL)
 
 
@@ -130,7 +130,7 @@ def _items(variable: Any) -> tuple[tuple[int, str], ...]:
 
 
 class Bond(NamedTuple):
-    """Two connections in opposite directions whose product is a power: an effort to ``load``, a flow back to ``source``."""
+    """Power bond: two connections in opposite directions whose product is a power, an effort and a flow."""
 
     effort: End
     effort_to: End
@@ -139,7 +139,7 @@ class Bond(NamedTuple):
 
 
 def _table(name: str) -> str:
-    """Return what an input belongs to, such as drive of drive.speed; the name itself where it has no dot."""
+    """Return the table of an input, such as "drive" for "drive.speed"; the name itself if it has no dot."""
     return name.rpartition(".")[0] or name
 
 
@@ -149,7 +149,7 @@ _POWERS = (("N.m", "rad/s"), ("N", "m/s"))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wiring:
-    """Parts and what connects them.
+    """The parts of a system and their connections.
 
     Attributes
     ----------
@@ -158,12 +158,12 @@ class Wiring:
     connections : mapping of End to End
         The output that each input is connected to.
     stop_time, step : float
-        Of a run, and the usual communication step (s).
+        End of a run, and default communication step (s).
 
     Raises
     ------
     WiringError, UnknownNameError
-        If a connection cannot be right.
+        If a connection is wrong.
     """
 
     title: str
@@ -195,7 +195,7 @@ class Wiring:
         return self.parts[end.part].ports[end.port]
 
     def rate_input(self, end: End) -> End | None:
-        """Return the input that is the rate of change of an input: of the same table, and of its unit by the second."""
+        """Return the input that is the time derivative of an input: in the same table, with the unit divided by seconds."""
         unit = {"rad/s": "rad/s2", "m/s": "m/s2"}.get(self.port(end).unit)
         inputs = (
             End(end.part, name) for name in self.parts[end.part].named("input") if _table(name) == _table(end.port)
@@ -203,7 +203,7 @@ class Wiring:
         return next((other for other in inputs if self.port(other).unit == unit), None)
 
     def notes(self) -> list[str]:
-        """Return sentences on what is possible but perhaps not meant: unconnected inputs, algebraic loops."""
+        """Return hints at possible mistakes: unconnected inputs, algebraic loops."""
         found = []
         for name, part in self.parts.items():
             inputs = part.named("input")
@@ -218,7 +218,7 @@ class Wiring:
         return found
 
     def loops(self) -> Iterator[list[End]]:
-        """Yield the algebraic loops: outputs that depend on themselves within an instant, each once."""
+        """Yield each algebraic loop once: a chain of outputs that depend directly on one another."""
         after: dict[End, list[End]] = {}
         for target, source in self.connections.items():
             for output, inputs in self.parts[target.part].feeds.items():
@@ -241,7 +241,7 @@ class Wiring:
             yield from walk([source])
 
     def bonds(self) -> list[Bond]:
-        """Return the power bonds: an effort and a flow between the same two parts, in opposite directions, without rivals."""
+        """Return the power bonds: unique pairs of an effort and a flow in opposite directions between two parts."""
         found = [
             Bond(source, target, flow, flow_to)
             for target, source in self.connections.items()

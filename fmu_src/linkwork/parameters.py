@@ -129,3 +129,21 @@ def check_initial(initial: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
             raise ParameterError(f"initial.{field.name}", value, "be a finite number")
         object.__setattr__(initial, field.name, float(value))
+
+
+class CheckedParameters:
+    """Base of a mechanism's parameters, a frozen dataclass: its fields are checked against its ``RULES``."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+
+
+class CheckedState:
+    """Base of a mechanism's initial state, a frozen dataclass: its fields must be finite."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        check_initial(self)

@@ -140,14 +140,9 @@ class TestGrading:
 
     def test_violations_are_those_of_the_constraints(self) -> None:
         good = syn.Linkage(
-            pivot_x=0.3,
-            pivot_y=0.4,
-            ground_length=0.4,
-            crank_length=0.1,
-            coupler_length=0.35,
-            rocker_length=0.3,
-            ground_angle=0.5,
-        )
+            pivot_x=0.3, pivot_y=0.4, ground_length=0.4, crank_length=0.1, coupler_length=0.35,
+            rocker_length=0.3, ground_angle=0.5,
+        )  # fmt: skip
         for constraint, bad in (
             (syn.LeastTransmission(angle=radians(50)), replace(good, crank_length=0.25)),
             (syn.LeastTransmission(angle=radians(50)), replace(good, coupler_length=0.25, rocker_length=0.28)),

@@ -143,13 +143,9 @@ def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
 
 def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> None:
     linkage = syn.Linkage(
-        ground_length=0.35,
-        crank_length=0.25,
-        coupler_length=0.215,
-        rocker_length=0.215,
-        point_distance=0.1,
+        ground_length=0.35, crank_length=0.25, coupler_length=0.215, rocker_length=0.215, point_distance=0.1,
         crank_phase=0.2,
-    )
+    )  # fmt: skip
     at = np.linspace(0.4, -0.6, 11)
     task = syn.Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
     solution = syn.Solution.of(task, linkage)

@@ -26,15 +26,9 @@ RIG, SPEED = SETS["rig-2-spring-c"].parameters, SETS["rig-2-spring-c"].crank_spe
 MOTION = FourierSeries(np.array([0.002, 0.004, 0.001]), np.array([0.0, 0.003, -0.002]))
 #: P off both links, guide and ground inclined, all centres of mass off their links.
 GENERAL = replace(
-    TABLE_3_1,
-    coupler_point_distance=0.12,
-    coupler_point_angle=0.5,
-    slider_guide_angle=0.3,
-    ground_inclination=0.4,
-    coupler_cog_angle=0.2,
-    rocker_cog_angle=-0.3,
-    slider_spring_free_position=0.004,
-)
+    TABLE_3_1, coupler_point_distance=0.12, coupler_point_angle=0.5, slider_guide_angle=0.3,
+    ground_inclination=0.4, coupler_cog_angle=0.2, rocker_cog_angle=-0.3, slider_spring_free_position=0.004,
+)  # fmt: skip
 #: The slider's mass alone: F2 = m5 u''.
 MASS = replace(
     RIG, coupler_mass=0.0, rocker_mass=0.0, coupler_inertia=0.0, rocker_inertia=0.0, slider_stiffness=0.0,

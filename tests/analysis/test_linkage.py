@@ -296,15 +296,9 @@ class TestFiveBar:
         return float(m.sum()), centre, float((m * np.abs(z - centre) ** 2).sum())
 
     LINKAGE = Linkage(
-        ground_length=0.4,
-        crank_length=0.1,
-        coupler_length=0.35,
-        rocker_length=0.3,
-        point_distance=0.2,
-        point_angle=1.1,
-        ground_angle=0.6,
-        crank_phase=0.3,
-    )
+        ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, point_distance=0.2,
+        point_angle=1.1, ground_angle=0.6, crank_phase=0.3,
+    )  # fmt: skip
 
     def test_crank_and_rocker(self) -> None:
         p = self.bars(self.LINKAGE)

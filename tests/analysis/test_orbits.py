@@ -32,29 +32,15 @@ SPEED = SETS["table-3.1"].crank_speed
 RIG_1_B = SETS["rig-1-spring-b"].parameters
 MOTOR = InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=SPEED)
 GENERAL = replace(
-    TABLE_3_1,
-    crank_mass=0.3,
-    crank_cog_distance=0.01,
-    crank_cog_angle=0.4,
-    coupler_cog_angle=0.2,
-    rocker_cog_angle=-0.3,
-    slider_guide_angle=0.15,
-    slider_spring_free_position=0.004,
-    slider_coulomb_friction=0.4,
-    coupler_point_distance=0.06,
-    coupler_point_angle=0.5,
-    ground_inclination=0.3,
-)
+    TABLE_3_1, crank_mass=0.3, crank_cog_distance=0.01, crank_cog_angle=0.4, coupler_cog_angle=0.2,
+    rocker_cog_angle=-0.3, slider_guide_angle=0.15, slider_spring_free_position=0.004,
+    slider_coulomb_friction=0.4, coupler_point_distance=0.06, coupler_point_angle=0.5, ground_inclination=0.3,
+)  # fmt: skip
 #: Friction by contact forces in the place of that of a given level.
 ROUGH = replace(
-    GENERAL,
-    slider_coulomb_friction=0.0,
-    slider_friction_coefficient=0.1,
-    pin_A_friction_radius=3e-4,
-    pin_B_friction_radius=4e-4,
-    pin_C_friction_radius=5e-4,
-    pin_D_friction_radius=6e-4,
-)
+    GENERAL, slider_coulomb_friction=0.0, slider_friction_coefficient=0.1, pin_A_friction_radius=3e-4,
+    pin_B_friction_radius=4e-4, pin_C_friction_radius=5e-4, pin_D_friction_radius=6e-4,
+)  # fmt: skip
 
 
 def plain_period(orbit: PeriodicOrbit, start: np.ndarray) -> np.ndarray:

@@ -22,18 +22,9 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from tests.oracles import multipliers
 
 LINKAGE = syn.Linkage(
-    pivot_x=0.1,
-    pivot_y=-0.2,
-    ground_length=0.25,
-    crank_length=0.07,
-    coupler_length=0.2,
-    rocker_length=0.18,
-    point_distance=0.15,
-    point_angle=0.7,
-    ground_angle=2.1,
-    crank_phase=0.4,
-    branch=-1,
-)
+    pivot_x=0.1, pivot_y=-0.2, ground_length=0.25, crank_length=0.07, coupler_length=0.2, rocker_length=0.18,
+    point_distance=0.15, point_angle=0.7, ground_angle=2.1, crank_phase=0.4, branch=-1,
+)  # fmt: skip
 MAKE = syn.Make(
     speed="240 rpm", load=("3 N", "-15 N"), width="30 mm", thickness="8 mm", density=2700.0, rocker_mass=0.4
 )

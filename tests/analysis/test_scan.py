@@ -19,18 +19,9 @@ from analysis.synthesis.task.task import Normal
 FloatArray = NDArray[np.float64]
 
 KNOWN = syn.Linkage(
-    pivot_x=0.3,
-    pivot_y=-0.2,
-    ground_length=0.4,
-    crank_length=0.15,
-    coupler_length=0.38,
-    rocker_length=0.3,
-    point_distance=0.25,
-    ground_angle=0.5,
-    crank_phase=1.1,
-    point_angle=0.7,
-    branch=1,
-)
+    pivot_x=0.3, pivot_y=-0.2, ground_length=0.4, crank_length=0.15, coupler_length=0.38, rocker_length=0.3,
+    point_distance=0.25, ground_angle=0.5, crank_phase=1.1, point_angle=0.7, branch=1,
+)  # fmt: skip
 
 
 def stated(task: syn.Task, *constraints: syn.Constraint, **bounds: tuple[float, float]) -> tuple[Normal, Limits]:

@@ -32,19 +32,9 @@ CASES: dict[str, tuple[SliderCrankParameters, InitialState, float, float | None,
     # twisted guide, crank out of balance, both freedoms free
     "twist, free shift": (
         replace(
-            published.parameters(20.0, 310.0),
-            crank_cog_y=0.03,
-            crank_cog_z=-0.05,
-            crank_product_xz=-0.08,
-            crank_product_yz=-0.02,
-            shift_stiffness=2e3,
-            shift_damping=30.0,
-            slider_stiffness=150.0,
-            slider_spring_free_position=1.1,
-            slider_damping=8.0,
-            gravity_x=2.0,
-            gravity_y=-9.0,
-            gravity_z=1.5,
+            published.parameters(20.0, 310.0), crank_cog_y=0.03, crank_cog_z=-0.05, crank_product_xz=-0.08,
+            crank_product_yz=-0.02, shift_stiffness=2e3, shift_damping=30.0, slider_stiffness=150.0,
+            slider_spring_free_position=1.1, slider_damping=8.0, gravity_x=2.0, gravity_y=-9.0, gravity_z=1.5,
             slider_mass=12.0,
         ),
         replace(published.initial(2.0), shift_velocity=0.1),
@@ -52,7 +42,7 @@ CASES: dict[str, tuple[SliderCrankParameters, InitialState, float, float | None,
         6.0,
         3.0,
     ),
-}
+}  # fmt: skip
 
 
 def xml(p: SliderCrankParameters, initial: InitialState, *, held: bool) -> str:

@@ -36,22 +36,11 @@ from tests.strategies import seeded
 ANGLES, TURN = (np.linspace(0.0, 2.0 * pi, n, endpoint=False) for n in (24, 64))
 #: Chapter IV with everything that it leaves out.
 GENERAL = replace(
-    chapter_4(1.0, 2.0),
-    coupler_mass=0.2,
-    coupler_inertia=1e-3,
-    coupler_cog_distance=0.12,
-    coupler_cog_angle=0.3,
-    rocker_cog_distance=0.1,
-    rocker_cog_angle=-0.2,
-    slider_guide_angle=radians(12.0),
-    slider_spring_free_position=0.004,
-    coupler_point_distance=0.2,
-    coupler_point_angle=0.4,
-    gravity=9.81,
-    ground_inclination=0.5,
-    coupler_length=0.28,
-    rocker_length=0.33,
-)
+    chapter_4(1.0, 2.0), coupler_mass=0.2, coupler_inertia=1e-3, coupler_cog_distance=0.12,
+    coupler_cog_angle=0.3, rocker_cog_distance=0.1, rocker_cog_angle=-0.2, slider_guide_angle=radians(12.0),
+    slider_spring_free_position=0.004, coupler_point_distance=0.2, coupler_point_angle=0.4, gravity=9.81,
+    ground_inclination=0.5, coupler_length=0.28, rocker_length=0.33,
+)  # fmt: skip
 SERIES = ("mass", "stiffness", "force")
 
 

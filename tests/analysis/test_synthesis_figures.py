@@ -28,18 +28,10 @@ PHI = syn.turn(24)
 ELLIPSE = ellipse(24)
 #: A crank-rocker near the constrained optimum of the thesis's first ellipse.
 LINKAGE = syn.Linkage(
-    pivot_x=0.2,
-    pivot_y=-0.06,
-    ground_length=0.3,
-    crank_length=0.05,
-    coupler_length=0.215,
-    rocker_length=0.215,
-    point_distance=0.21,
-    ground_angle=radians(-45.0),
-    crank_phase=radians(45.0),
-    point_angle=radians(-178.0),
-    branch=-1,
-)
+    pivot_x=0.2, pivot_y=-0.06, ground_length=0.3, crank_length=0.05, coupler_length=0.215,
+    rocker_length=0.215, point_distance=0.21, ground_angle=radians(-45.0), crank_phase=radians(45.0),
+    point_angle=radians(-178.0), branch=-1,
+)  # fmt: skip
 #: It cannot turn fully: the longest link and the shortest are more than the other two.
 SWINGING = replace(LINKAGE, crank_length=0.25, ground_length=0.35)
 SLIDING = replace(LINKAGE, pivot=syn.SliderMotion(FourierSeries([0.01, 0.02], [0.0, 0.01]), radians(20.0)))

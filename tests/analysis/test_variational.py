@@ -29,17 +29,10 @@ WEIGHTED_ROCKER = Linkage(
     crank_phase=np.radians(42.74),
 )
 PATH_B = Linkage(
-    pivot_x=-0.4913,
-    pivot_y=1.4498,
-    ground_length=1.42576,
-    crank_length=0.0818,
-    coupler_length=1.52743,
-    rocker_length=1.84443,
-    point_distance=1.4738,
-    ground_angle=np.radians(-3.062),
-    crank_phase=np.radians(-31.19),
-    point_angle=np.radians(-136.04),
-)
+    pivot_x=-0.4913, pivot_y=1.4498, ground_length=1.42576, crank_length=0.0818, coupler_length=1.52743,
+    rocker_length=1.84443, point_distance=1.4738, ground_angle=np.radians(-3.062),
+    crank_phase=np.radians(-31.19), point_angle=np.radians(-136.04),
+)  # fmt: skip
 TURN_24 = np.arange(24) * 2.0 * pi / 24
 TURN_72 = np.arange(72) * 2.0 * pi / 72
 ELLIPSE_B = np.column_stack([0.20 + 0.15 * np.cos(TURN_72), 0.15 + 0.05 * np.sin(TURN_72)])

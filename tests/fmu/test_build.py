@@ -89,37 +89,26 @@ def test_two_builds_are_the_same_archive(tmp_path: Path, model: Model, monkeypat
     assert first == second
 
 
-#: Changes of what is said or reckoned, and of the interface, which alone the GUID follows.
-SAME_GUID = {
-    "nothing": {},
-    "constant": {"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")},
-}
+def changes_of(folder: str, text: str, other: str) -> dict[str, tuple[Changes, bool]]:
+    """Return changes of a mechanism's sources by name, and whether each keeps the GUID, which follows the interface alone."""
+    variables, residual = f"linkwork/{folder}/variables.py", '"closure.residual", "m"'
+    return {
+        "nothing": ({}, True),
+        "constant": ({"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")}, True),
+        "docstring": (
+            {f"linkwork/{folder}/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')},
+            True,
+        ),
+        "description": ({variables: (text, other)}, True),
+        "name": ({variables: (residual, '"closure.gap", "m"')}, False),
+        "unit": ({variables: (residual, '"closure.residual", "1"')}, False),
+    }
+
+
 CHANGES = {
-    "FiveBarSlider": {
-        **{name: (changes, True) for name, changes in SAME_GUID.items()},
-        "docstring": (
-            {"linkwork/five_bar/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')},
-            True,
-        ),
-        "description": (
-            {"linkwork/five_bar/variables.py": ('"Crank, A to B; greater than zero"', '"The crank, from A to B"')},
-            True,
-        ),
-        "name": ({"linkwork/five_bar/variables.py": ('"closure.residual", "m"', '"closure.gap", "m"')}, False),
-        "unit": ({"linkwork/five_bar/variables.py": ('"closure.residual", "m"', '"closure.residual", "1"')}, False),
-    },
-    "SliderCrank": {
-        **{name: (changes, True) for name, changes in SAME_GUID.items()},
-        "docstring": (
-            {"linkwork/slider_crank/dynamics.py": ('"""Compute the inertia', '"""Return the inertia')},
-            True,
-        ),
-        "description": (
-            {"linkwork/slider_crank/variables.py": ('"Rod, crank pin to slider pin', '"The rod, from pin to pin')},
-            True,
-        ),
-        "name": ({"linkwork/slider_crank/variables.py": ('"closure.residual", "m"', '"closure.gap", "m"')}, False),
-        "unit": ({"linkwork/slider_crank/variables.py": ('"closure.residual", "m"', '"closure.residual", "1"')}, False),
+    "FiveBarSlider": changes_of("five_bar", '"Crank, A to B; greater than zero"', '"The crank, from A to B"'),
+    "SliderCrank": changes_of("slider_crank", '"Rod, crank pin to slider pin', '"The rod, from pin to pin')
+    | {
         "start": ({"linkwork/slider_crank/published.py": ("initial(3.5)", "initial(3.0)")}, False),
         # a mode more, or a wider bound, is another interface as well
         "bound": ({"linkwork/slider_crank/variables.py": ("        2,\n    ),", "        3,\n    ),")}, False),

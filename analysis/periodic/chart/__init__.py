@@ -1,4 +1,4 @@
-"""Motions over two parameters: grids of multipliers, boundaries of instability, coexisting motions, stability charts.
+"""Chart periodic motions over two parameters: grids of multipliers, stability boundaries, coexisting motions, basins.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

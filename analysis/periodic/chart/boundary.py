@@ -1,13 +1,13 @@
-"""Boundaries of instability over two parameters: curves, test functions, and the damping that removes a region.
+"""Trace boundaries of instability over two parameters, and find the damping that removes a region of instability.
 
-A fold, a period doubling or a torus point of a branch moves along a curve when one more parameter is set free: the boundary of
-the speeds at which a machine jumps, say, over the damping. `follow_crossing` follows it by arclength in orbit and both
-parameters together, so that it continues through the cusp where two folds meet and vanish; `line_branches` finds the
-branches on a line of a chart, isolas among them, from which such curves begin.
+A fold, a period doubling or a torus point of a branch becomes a curve when a second parameter varies: for example the speed at
+which a machine jumps, over the damping. `follow_crossing` follows it by arclength in orbit and both parameters together, so
+that it continues through the cusp where two folds meet and vanish. `line_branches` finds the branches on a line of a chart,
+including isolas, from which such curves begin.
 
 A test function of a point of a plane is negative in a region of instability and zero on its boundary, where a Floquet
-multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces where it is zero,
-`removing_damping` finds where a region ends.
+multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `numerics.boundaries` traces its zeros, and
+`removing_damping` finds the damping at which a region ends.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def follow_crossing(
     widest: float = 4e-2,
     most_points: int = 300,
 ) -> CrossingCurve:
-    """Follow a crossing of the unit circle through a plane, to both sides, up to the edges of a box.
+    """Follow a curve of folds, period doublings or torus points through a plane, to both sides, up to the edges of a box.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def line_branches(
     found : Coexistence
         The motions from which they were followed.
     lost : list of str
-        Why one could not be followed, a sentence each.
+        One sentence for each motion that could not be followed.
     """
     xs = np.linspace(*x, POINTS)
     found = coexistence(operation, xs, [y], start=start)
@@ -312,7 +312,7 @@ def removing_damping(
     RemovalError
         If the region does not exist at the lower end, or still exists at the upper one.
     LinkworkError
-        As the test function.
+        If the test function raises it.
     """
 
     def least(d: float) -> float:

@@ -1,4 +1,4 @@
-"""Stability charts: the stability of a mechanism over two parameters.
+"""Compute stability charts: the stability of a mechanism over two parameters.
 
 `stability_chart` combines the grid of Floquet multipliers, traced boundaries, removing damping and long runs, for one
 mechanism and two parameters by their FMI names, the crank speed among them.
@@ -72,7 +72,7 @@ _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORU
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """An axis of a chart as it is printed and drawn: speeds in rpm, all else in SI.
+    """An axis of a chart as it is printed and drawn: speeds in rpm, all other quantities in SI.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class StabilityChart(Shown):
     beside : Coexistence or None
         All motions at every point, if they were asked for.
     problems : tuple of str
-        What could not be computed, a sentence each; empty if all was.
+        One sentence for each part that could not be computed; empty if there is none.
     """
 
     axes: tuple[Axis, Axis]
@@ -258,7 +258,7 @@ def stability_chart(
     Returns
     -------
     StabilityChart
-        ``problems`` has what could not be computed.
+        ``problems`` names the parts that could not be computed.
 
     Raises
     ------
@@ -306,7 +306,7 @@ def _steps(coexisting: bool) -> Iterator[str]:
 
 @dataclass(slots=True)
 class _Survey:
-    """A chart while it is computed."""
+    """A chart that is being computed."""
 
     operation: Plane
     axes: tuple[Axis, Axis]
@@ -517,7 +517,7 @@ class _Survey:
 
 
 def unmet_lines(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
-    """Return lines y = const through the regions of equal number of stable motions that no line or boundary has met.
+    """Return lines y = const through the regions of one number of stable motions that no line or boundary has met.
 
     Parameters
     ----------

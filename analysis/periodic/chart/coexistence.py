@@ -1,4 +1,4 @@
-"""Coexisting motions: how many are stable at each point of a plane, and on which of them a start settles."""
+"""Find coexisting motions: the stable ones at each point of a plane, and the basins of attraction of each motion."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from ...files import write_csv
 from ...mechanisms import Parameters
 from ...run import takes_published
 from ..motion.discretisation import OperatingPoint
-from ..motion.drive import Drive, coordinate_ranges, starts_of
+from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, PLAIN, VARIATIONAL
-from ..motion.orbit import PeriodicOrbit, first_guess, require_turns
+from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, orbits_of
 from ..motion.variables import Plane
 from . import kernels
@@ -52,7 +52,7 @@ class Coexistence:
     starts : ndarray, shape (ny, nx, k, n)
         y at crank angle 0; NaN after the last.
     swing : (str, str)
-        Coordinate that the amplitude is of, and its unit.
+        Coordinate whose amplitude is given, and its unit.
     computed : int
         Rows that were not in the cache.
     """
@@ -121,7 +121,7 @@ def coexistence(
     """Find all periodic motions of one turn at every point of a grid.
 
     The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones
-    divided out. One that exists in a short part of a row only may be missed: `find_orbits` looks at one point more closely.
+    divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches one point closely.
     The rows are distributed over workers and kept as in `grid`.
 
     Parameters
@@ -141,16 +141,13 @@ def coexistence(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys, rows = grid_points(operation, x, y)
-    first = rows[0][0]
-    guess = first_guess(first.flow, first.drive, start)
-    guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
+    xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_all)
     data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
         [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
-        (len(xs), MOST_ORBITS, first.flow.size + 2),
+        (len(xs), MOST_ORBITS, guesses.shape[1] + 2),
     )
     return Coexistence(
         x=xs,
@@ -158,7 +155,7 @@ def coexistence(
         largest=np.ma.masked_invalid(data[..., 0]),
         amplitude=np.ma.masked_invalid(data[..., 1]),
         starts=data[..., 2:],
-        swing=first.flow.components[0],
+        swing=rows[0][0].flow.components[0],
         computed=computed,
     )
 
@@ -197,8 +194,8 @@ class Basins(Shown):
     position, rate : ndarray, shapes (nx,) and (ny,)
         Starts of the first free coordinate, of a slider (m), and of its rate (m/s); the rest of y is that of the first motion.
     ends : ndarray of int, shape (ny, nx)
-        Number of the stable motion among ``motions``; -1 if the links come to the limit of assembly, -2 if none of them is
-        met within the turns that are followed.
+        Number of the stable motion in ``motions``; -1 if the links reach the limit of assembly, -2 if the run reaches no
+        motion within the turns that are followed.
     found : Orbits
         All motions that were found; the unstable ones lie on the boundaries of the basins.
     computed : int
@@ -262,7 +259,7 @@ def basins(
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Basins:
-    """Compute on which stable periodic motion each start of a plane settles; its rows are kept as those of `grid`.
+    """Compute basins of attraction: the stable periodic motion on which each start of a plane settles.
 
     Parameters
     ----------

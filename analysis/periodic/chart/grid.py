@@ -1,4 +1,4 @@
-"""Grids of the largest Floquet multiplier, each point on its own periodic orbit: over cores, kept on disk, resumed."""
+"""Compute grids of the largest Floquet multiplier, a periodic orbit per point: on all cores, kept on disk, resumable."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def largest_multipliers(
     turns: int = 1,
     tolerance: float = INTEGRATOR_TOLERANCE,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-    """Compute the largest Floquet multiplier of each of a row of mechanisms, each on its own periodic orbit.
+    """Compute the largest Floquet multiplier of each mechanism of a row, on its periodic orbit.
 
     Each orbit is sought from the start of its neighbour, then from the guesses: the mechanisms should be ordered along a line.
 
@@ -125,7 +125,7 @@ class GridInterrupted(Interrupted):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Grid:
-    """The largest Floquet multiplier over a grid, each point on its own periodic orbit.
+    """The largest Floquet multiplier at each point of a grid, of the periodic orbit at that point.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Grid:
     starts : ndarray, shape (ny, nx, n)
         Starts of the orbits, see `PeriodicOrbit`; NaN if ``largest`` is masked.
     status : ndarray of int, shape (ny, nx)
-        `kernels.Status`: 0, or why there is no orbit.
+        `kernels.Status`: 0, or the reason why there is no orbit.
     computed : int
         Rows that were not in the cache.
     """
@@ -148,7 +148,7 @@ class Grid:
     computed: int
 
     def reason(self, row: int, column: int) -> str:
-        """Return why a point has no orbit; empty if it has one."""
+        """Return the reason why a point has no orbit; empty if it has one."""
         return REASONS.get(Status(self.status[row, column]), "")
 
     def around(self, x: float, y: float) -> FloatArray:
@@ -218,16 +218,13 @@ def grid(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys, rows = grid_points(operation, x, y)
-    first = rows[0][0]
-    guess = first_guess(first.flow, first.drive, start)
-    guesses = np.vstack([guess, starts_of(first.parameters, first.drive, guess, STARTS)])
+    xs, ys, rows, guesses = grid_points(operation, x, y, start, STARTS)
     code = row_code(kernels.solve_row, multipliers)
     data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_row).rows(
         partial(_compute_row, guesses, tolerance),
         rows,
         [row_name(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
-        (len(xs), len(guess) + 2),
+        (len(xs), guesses.shape[1] + 2),
     )
     status = data[..., -1].astype(np.int64)
     return Grid(
@@ -250,9 +247,9 @@ def _compute_row(guesses: FloatArray, tolerance: float, row: Sequence[OperatingP
 
 
 def grid_points(
-    operation: Plane, x: ArrayLike, y: ArrayLike
-) -> tuple[FloatArray, FloatArray, list[list[OperatingPoint]]]:
-    """Return the values of the axes of a grid and its operating points by rows.
+    operation: Plane, x: ArrayLike, y: ArrayLike, start: ArrayLike | None, count: int
+) -> tuple[FloatArray, FloatArray, list[list[OperatingPoint]], FloatArray]:
+    """Return the values of the axes of a grid, its operating points by rows, and the guesses for each row, shape (k, n).
 
     Raises InputError if an axis is empty or not finite.
     """
@@ -260,7 +257,10 @@ def grid_points(
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    return xs, ys, [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
+    rows = [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
+    first = rows[0][0]
+    guess = first_guess(first.flow, first.drive, start)
+    return xs, ys, rows, np.vstack([guess, starts_of(first.parameters, first.drive, guess, count)])
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:
@@ -300,7 +300,7 @@ def row_name(
 
 @dataclass(frozen=True, slots=True)
 class Keeping:
-    """Computation of rows over workers, and their storage on disk.
+    """Computation of rows on several workers, and their storage on disk.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""Compiled kernels for rows of mechanisms: one or all periodic motions of each, and basins of attraction.
+"""Compute rows of a chart: one or all periodic motions of each mechanism, and basins of attraction; compiled kernels.
 
-Along a row the orbits change evenly: the polynomial through the last ones predicts the next at every node, and collocation
-corrects it. If that fails (friction, a torque, the limit of assembly, a fold on the way) shooting finds the orbit, from its
-neighbour to the left, from that to the right, or from other starts.
+Along a row the orbits change smoothly: a polynomial through the last ones predicts the next at every node, and collocation
+corrects it. If that fails (friction, a torque, the limit of assembly, a fold in between), shooting finds the orbit from its
+neighbour on the left, from the one on the right, or from other starts.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ MOST_ORBITS = 8
 
 
 class Points(NamedTuple):
-    """The mechanisms of a row, shapes (m, constants), (m, drive) and (m, n): as `Section` has them."""
+    """Numbers of the mechanisms of a row, shapes (m, constants), (m, drive) and (m, n), in the form of `Section`."""
 
     constants: NDArray[np.float64]
     drives: NDArray[np.float64]
@@ -92,7 +92,7 @@ def point_section(section, points, row, tolerance):
 
 @part
 def divide(section, search, level, start, angles, path, desk, room):
-    """Find an orbit by collocation with the fewest elements that suffice, from a level of `COUNTS` on.
+    """Find an orbit by collocation with the fewest elements that suffice, starting at a level of `COUNTS`.
 
     Returns the level, -1 if there is none.
     """
@@ -130,7 +130,7 @@ def shift(size, path):
 
 @part
 def solve_from_left(section, points, search, guess, found):
-    """Find the orbits of a row from left to right: by collocation as far as it goes, else by shooting."""
+    """Find the orbits of a row from left to right: by collocation if it converges, otherwise by shooting."""
     starts, monodromies, status = found
     n = guess.shape[0]
     z = np.empty(n * (1 + n))

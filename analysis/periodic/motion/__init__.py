@@ -1,4 +1,4 @@
-"""Periodic motions: the mechanism as a flow, what drives it, one motion or all, and the Floquet multipliers of each.
+"""Find periodic motions of a driven mechanism, one or all of them, with their Floquet multipliers.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

@@ -1,4 +1,4 @@
-"""Compiled kernels of Gauss collocation: solve a period from a neighbouring motion.
+"""Solve a period by Gauss collocation from a neighbouring motion: compiled kernels.
 
 At prescribed speed the coordinates follow from the rates, and the rates from their slopes over the crank angle. The unknowns
 are therefore the slopes w at the Gauss nodes of each element of a period, and y at its beginning. Newton's method corrects all
@@ -312,7 +312,7 @@ class Desk(NamedTuple):
 
 @part
 def make_desk(n, most):
-    """Make work space for y of n components and at most so many elements."""
+    """Make work space for y of n components and at most ``most`` elements."""
     return Desk(
         make_bench(n, False),
         np.zeros((most, n)),
@@ -385,7 +385,7 @@ def solve_element(section, angle, h, unit, y, w, bench, into):
 
 
 class Neighbour(NamedTuple):
-    """A neighbouring motion by elements."""
+    """A neighbouring motion: its parameter, y and slopes at the nodes of each element."""
 
     y: NDArray[np.float64]  # beginnings, shape (m, n)
     w: NDArray[np.float64]  # slopes, (m, NODES, f)
@@ -425,7 +425,7 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
     starts : ndarray, shape (k, n)
         y at the beginning of each piece.
     change : float
-        Of lambda from the neighbour.
+        Change of lambda from the neighbour.
     known : bool
         Whether there is a neighbour; if not, the integrator gives the first guess.
     neighbour : Neighbour

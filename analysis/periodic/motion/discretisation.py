@@ -1,15 +1,15 @@
-"""Discretised periods: one interface for shooting and collocation, and the rule that chooses between them.
+"""Discretise a period: one interface for shooting and collocation, and the rule that chooses between them.
 
 A period is divided into pieces. The unknowns of a periodic motion are y at the beginnings of the pieces; the residual is y at
-the end of each piece less y at the beginning of the next; its exact Jacobian has the derivatives of each end by its beginning,
-whose product is the monodromy matrix with the Floquet multipliers. Either method gives the `Ends` of the pieces, and
-`orbit.OrbitEquations` makes of them what Newton's method and the continuation solve.
+the end of each piece minus y at the beginning of the next. Its exact Jacobian contains the derivatives of each end with respect
+to its beginning; their product is the monodromy matrix, whose eigenvalues are the Floquet multipliers. Either method gives the
+`Ends` of the pieces; from these `orbit.OrbitEquations` builds the equations for Newton's method and for continuation.
 
 - **Shooting** integrates each piece with steps of order 8. With one piece it is single shooting, with several multiple
-  shooting. It serves always.
+  shooting. It works for every drive.
 - **Collocation** corrects the polynomials of a neighbouring motion, element by element, with a sixth of the right-hand sides.
-  It serves if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as long as the links stay clear
-  of the limit of assembly and not too many elements are needed; else shooting takes over for a while.
+  It works if the crank's speed is prescribed and the rates are smooth (`collocation_serves`), as long as the links stay clear
+  of the limit of assembly and not too many elements are needed; otherwise shooting replaces it for a while.
 
 One piece is followed as long as a deviation grows less than `GROWTH` times over the period; then the period is divided so that
 deviations grow about `AIM` times over each piece (`choose_pieces`).
@@ -55,7 +55,7 @@ class OrbitError(LinkworkError):
     Attributes
     ----------
     reason : str
-        One sentence on why.
+        Reason, in one sentence.
     start : tuple of float
         y at crank angle 0 of the last iterate: see `PeriodicOrbit`.
     residual : float
@@ -75,7 +75,7 @@ class OrbitError(LinkworkError):
 
 
 class OrbitAssemblyError(OrbitError, AssemblyError):
-    """The motion comes to the limit of assembly on the way."""
+    """The motion reaches the limit of assembly."""
 
 
 def orbit_error(
@@ -113,7 +113,7 @@ class OperatingPoint:
     drive : Drive
     mechanism : Mechanism
     flow : Flow
-        The mechanism driven in this way.
+        The mechanism with this drive, as a flow.
     vector, constants : ndarray
         Numbers of the drive and constants of the equations.
     """
@@ -154,7 +154,8 @@ class OperatingPoint:
         along : float
             Magnitude of lambda.
         beside : sequence of parameters
-            Parameters whose constants will replace these: an equation that one of them switches on is computed for all.
+            Parameters whose constants will be used with the same section: an equation that one of them switches on is
+            computed for all.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
         # a change of lambda may set the switch
@@ -244,10 +245,10 @@ def period_from(
 
 
 def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]) -> bool:
-    """Return whether collocation serves for motions under these drives: at prescribed speed and with smooth rates.
+    """Return whether collocation can be used under these drives: it needs prescribed speeds and smooth rates.
 
-    It assumes that the slope of a coordinate is its rate over the speed, which does not hold for a crank that turns freely
-    with a ratio.
+    It assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed, which does not hold
+    for a second crank that turns freely.
     """
     mechanisms = list(dict.fromkeys(mechanisms))
 
@@ -285,7 +286,7 @@ def growths(matrices: FloatArray, scale: FloatArray) -> FloatArray:
 
 
 def choose_pieces(point: OperatingPoint, places: FloatArray, turns: int) -> tuple[FloatArray, FloatArray]:
-    """Divide a period into pieces over which deviations grow alike.
+    """Divide a period into pieces over which deviations grow by equal factors.
 
     Parameters
     ----------
@@ -339,7 +340,7 @@ class Discretisation:
         return point.shoot(self.angles, starts, direction, along)
 
     def _collocate(self, section: Section, flow: Flow, starts: FloatArray, value: float) -> Ends | None:
-        """Compute the ends by collocation on as many elements as are needed; None if it does not serve here."""
+        """Compute the ends by collocation on as many elements as are needed; None if it fails here."""
         k, n = starts.shape
         self._calls += 1
         if self._calls % _RENEWED == 1:

@@ -1,4 +1,4 @@
-"""The drive of a mechanism in periodic motion, scales of its state, and starts of the search for motions."""
+"""Define the drive of a mechanism in periodic motion, the scales of its state, and starts of the search for motions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Torque = float | InductionMotor | Sequence[float | InductionMotor]
 
 
 class VaryingInputError(InputError):
-    """An input varies in time, and so there is no periodic motion under it; ``channel`` is its name."""
+    """An input varies in time, so that no periodic motion exists under it; ``channel`` is its name."""
 
     def __init__(self, channel: str, value: object) -> None:
         self.channel = channel
@@ -37,7 +37,7 @@ class VaryingInputError(InputError):
 
 
 class NothingFreeError(InputError):
-    """Every freedom is commanded; ``force`` is the input that would leave one free, if there is one."""
+    """Every freedom is commanded, so that nothing is free to oscillate; ``force`` is the input that would free one, if any."""
 
     def __init__(self, mechanism: str, force: str) -> None:
         self.force = force
@@ -66,11 +66,11 @@ class Drive:
         Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N), and torques on other
         cranks (N.m).
     held : mapping of str to float
-        Coordinates of freedoms that are held, by their FMI names, such as ``shift.position``, and of other commanded cranks
-        where the angle of the crank is 0; 0 where they are left out.
+        Coordinates of held freedoms by their FMI names, such as ``shift.position``, and angles of other commanded cranks at
+        the crank angle 0; 0 if they are left out.
     modes : mapping of str to int
-        Modes of other freedoms than the crank, by name, such as ``axial.mode``. Without it a freedom with a mode is free where
-        its force is among ``forces``, be it 0, commanded where it is a crank with a ratio, and else in its default mode.
+        Modes of other freedoms than the crank, by name, such as ``axial.mode``. A freedom whose mode is left out is free if its
+        force is among ``forces`` (0 included), commanded if it is a crank with a ratio, and otherwise in its default mode.
     crank : str
         FMI name of the crank of ``speed``, ``torque`` and ``motor``: its coordinate, commanded speed or torque; follows from
         ``speeds``, and may be left out where there is one crank.
@@ -296,13 +296,13 @@ def _arguments(
 
 @cache
 def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
-    """Return the inputs of a mechanism that are forces, but for the torque on its crank if it has one, by FMI name."""
+    """Return the force inputs of a mechanism, without the torque on its crank if it has only one crank, by FMI name."""
     crank = mechanism.cyclic[0] if len(mechanism.cyclic) == 1 else -1
     return {c.name: c for c in mechanism.channels if c.kind == "force" and (c.freedom != crank or crank < 0)}
 
 
 def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
-    """Raise InputError if a channel has no effect under a drive, because its freedom is driven otherwise."""
+    """Raise InputError if a channel has no effect because its freedom is driven in another way."""
     mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
     chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
     if mode is not None and chosen != channel.argument:
@@ -314,7 +314,7 @@ def _value(mode: Mode, argument: str) -> str:
 
 
 def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
-    """Return the given drive, or else that of a published set, with held freedoms at their initial values."""
+    """Return the given drive; without one, that of a published set, with held freedoms at their initial values."""
     return drive or drive_of(known.parameters, driven(known, None), known.initial)
 
 
@@ -344,7 +344,7 @@ def drive_of(
     VaryingInputError
         If an input varies.
     InputError
-        If nothing drives the crank, or another freedom is commanded to go on.
+        If nothing drives the crank, or another freedom is commanded to move on and on.
     """
     mechanism = mechanism_of(parameters)
     inputs, initial = given(mechanism, inputs, initial)
@@ -451,7 +451,7 @@ def scale_in(
 def is_smooth(parameters: Parameters) -> bool:
     """Return whether the rates are smooth over a turn.
 
-    Friction changes fast where a motion reverses, which only an integrator that chooses its own steps is sure to resolve.
+    Friction changes fast when a motion reverses, which only an integrator with step size control resolves reliably.
     """
     mechanism = mechanism_of(parameters)
     rough = mechanism.names("friction")
@@ -487,8 +487,8 @@ def starts_of(
 ) -> NDArray[np.float64]:
     """Return initial states of many amplitudes and phases within the coordinate ranges, from a scrambled Sobol sequence.
 
-    In the plane of a coordinate and its rate they fill the greatest ellipse about zero. Where a coordinate can go much further
-    to one side, as many again fill the ellipse about the middle of the whole range; shape (count or 2 count, n).
+    In the plane of a coordinate and its rate they fill the greatest ellipse about zero. If a coordinate can move much further
+    to one side, as many again fill the ellipse about the middle of its range; shape (count or 2 count, n).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Floquet multipliers and verdicts on stability.
+"""Compute Floquet multipliers and judge stability.
 
 The monodromy matrix maps a small deviation from a periodic motion to the deviation one period later; its eigenvalues are the
 Floquet multipliers. Orbits of a mechanism and linear equations with periodic coefficients are judged by the same rule.
@@ -28,7 +28,7 @@ class VerdictError(LinkworkError, TypeError):
 
 
 class Stability(Enum):
-    """The fate of a small deviation: it dies out, grows, or linear theory does not decide."""
+    """Stability by linear theory: a small deviation dies out, grows, or the theory does not decide."""
 
     STABLE = "stable"
     UNSTABLE = "unstable"
@@ -49,7 +49,7 @@ _SIGN = {Crossing.FOLD: 1, Crossing.PERIOD_DOUBLING: -1}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StabilityVerdict:
-    """A verdict on a periodic motion; it has no truth value: ask for ``stability``.
+    """A verdict on the stability of a periodic motion; it has no truth value: compare ``stability``.
 
     Attributes
     ----------
@@ -179,8 +179,8 @@ def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> N
     ----------
     monodromy : ndarray, shape (..., n, n)
     crossing : Crossing or int
-        +1 for a fold, -1 for a period doubling: det(I - multiplier Phi), positive where all multipliers are inside the unit
-        circle, negative where one real multiplier has passed it. For a torus the product, over all pairs of
+        +1 for a fold, -1 for a period doubling: det(I - multiplier Phi), positive if all multipliers are inside the unit
+        circle, negative if one real multiplier has passed it. For a torus the product, over all pairs of
         multipliers, of their product less one.
 
     Returns

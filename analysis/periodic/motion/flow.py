@@ -1,4 +1,4 @@
-"""A mechanism as a flow over the angle of its cyclic freedom, the crank, from the traced equations."""
+"""Write a mechanism as a flow, dy/dangle over the crank angle, from its traced equations."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
 class Flow:
     """A mechanism as a flow over its crank's angle, driven in one way.
 
-    Other cranks turn with a ratio to it: a commanded one exactly, one under a torque on average. For a crank under a torque, y
-    has its angle less the ratio times the angle of the crank, so that y repeats itself.
+    Other cranks turn at a ratio to it: a commanded one exactly, one under a torque on average. For a crank under a torque, y
+    contains its angle minus the ratio times the crank angle, which is periodic.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Flow:
     modes : tuple of int
         Values of its modes.
     crank : int
-        Number of the freedom that turns whose angle is the independent variable.
+        Number of the cyclic freedom whose angle is the independent variable.
     base : int
         Turns of the crank after which all cranks have made whole turns.
 
@@ -293,5 +293,5 @@ def label(variable: Variable) -> str:
 
 @cache
 def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1) -> Flow:
-    """Return the flow of a mechanism driven in one way, made when it is first asked for."""
+    """Return the flow of a mechanism driven in one way; it is built at the first call and then kept."""
     return Flow(mechanism, modes, crank, base)

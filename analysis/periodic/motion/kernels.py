@@ -1,4 +1,4 @@
-"""Compiled kernels of shooting: integrate a period with its variational equations, and solve for its start by Newton's method.
+"""Integrate a period with its variational equations, and solve for its start by Newton's method: compiled kernels of shooting.
 
 The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that the period is known beforehand
 whatever drives it. The state y has the coordinates of the other free freedoms, their rates, and under a torque the crank's
@@ -337,7 +337,7 @@ def solve(section, end, most, start, z, report):
 
 @part
 def deflated(section, end, most, reach, start, known, z, room, carry):
-    """Newton's method away from known orbits; see `search`."""
+    """Run Newton's method with the known orbits divided out; see `search`."""
     scale = section.scale
     n = scale.shape[0]
     trial = start.copy()

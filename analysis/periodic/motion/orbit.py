@@ -1,4 +1,4 @@
-"""Periodic motions of the full nonlinear mechanism with their Floquet multipliers.
+"""Find periodic motions of the full nonlinear mechanism with their Floquet multipliers.
 
 At prescribed speed a periodic motion repeats itself after one turn of the crank, or after several; under a torque the mean
 speed is part of the solution. `orbit_of` solves y(T) = y(0) by Newton's method with the exact monodromy matrix from the
@@ -64,7 +64,7 @@ _OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Turn:
-    """One period of an orbit at equal steps of the crank angle, its end left out.
+    """One period of an orbit, sampled at equal steps of the crank angle without its end.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Turn:
     period : float
         s.
     states, inputs : ndarray, shapes (n, states) and (n, channels)
-        States of a run, no work done, and the channels in force.
+        States of a run, with zero work, and the channels that are in effect.
     values : ndarray, shape (n, outputs)
         Outputs by `names`: those of the FMI interface except the energies that count from the start of a run.
     turns : int
@@ -84,7 +84,7 @@ class Turn:
         Values of the mechanism's modes.
     names : tuple of str
     swing : str
-        Output that the amplitude is of by default: the first free coordinate, such as ``slider.position``, or the
+        Output whose amplitude is returned by default: the first free coordinate, such as ``slider.position``, or the
         crank's speed if nothing else is free.
 
     Notes
@@ -142,7 +142,10 @@ class Turn:
 
 
 def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
-    """Return the time at equal steps of the crank angle over ``way``, and the period, from the Fourier series of 1 / speed."""
+    """Integrate 1 / speed over the crank angle by its Fourier series; return the time at equal steps, and the period.
+
+    ``way`` is the crank angle of a period (rad).
+    """
     n = len(speed)
     c = np.fft.rfft(1.0 / speed) / n
     angle = np.arange(n) * (way / n)
@@ -235,7 +238,7 @@ class PeriodicOrbit(Shown):
 
     @property
     def swing(self) -> tuple[str, str]:
-        """Short name and unit of the coordinate that the amplitude is of: ``("u", "m")`` of a five-bar."""
+        """Short name and unit of the coordinate whose amplitude is returned: ``("u", "m")`` for a five-bar."""
         return self.flow.labels[0], self.flow.components[0][1]
 
     @property
@@ -330,7 +333,7 @@ class PeriodicOrbit(Shown):
 
 
 def make_orbit(point: OperatingPoint, **rest: Any) -> PeriodicOrbit:
-    """Return an orbit at an operating point, which it keeps; the other arguments are those of `PeriodicOrbit`."""
+    """Return an orbit that keeps its operating point; the other arguments are those of `PeriodicOrbit`."""
     orbit = PeriodicOrbit(parameters=point.parameters, drive=point.drive, **rest)
     orbit._kept["point"] = point
     return orbit
@@ -396,7 +399,7 @@ def orbit_of(
 def settle_motion(
     point: OperatingPoint, start: FloatArray, *, tolerance: float, change: float, turns: int
 ) -> tuple[Status, FloatArray]:
-    """Follow the motion from ``start`` until a turn changes y by less than ``change``, or for so many turns."""
+    """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most."""
     settled = start.copy()
     section = point.section(start, PLAIN, tolerance=tolerance)
     status = kernels.settle(section, point.flow.period, change, turns, settled)
@@ -429,7 +432,7 @@ def approach(
 
 
 def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray:
-    """Return the guess from which Newton's method begins: ``start``, or zero, at a speed that a motor may have.
+    """Return the guess for Newton's method: ``start``, or else rest with the crank at a speed of the prescribed drive or motor.
 
     Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
     """
@@ -456,10 +459,10 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray
 
 
 def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:
-    """Raise InputError if a period cannot have so many turns.
+    """Raise InputError if a period cannot have this number of turns.
 
-    A mechanism with a freedom driven by a groove or the like may need several turns to come back to its configuration: this is
-    checked at an operating point, from a start.
+    A mechanism with a freedom driven by a groove, for example, may need several turns to return to its configuration. This is
+    checked if an operating point and a start are given.
     """
     if turns < 1 or turns != int(turns):
         raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
@@ -514,7 +517,7 @@ def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> Periodi
 
 
 def trial_orbit(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[PeriodicOrbit, FloatArray]:
-    """Follow one period from a start; return it as an orbit, though it may not close, and y(T) - y(0).
+    """Follow one period from a start; return it as an orbit, even if it does not close, and y(T) - y(0).
 
     Raises OrbitError if the period cannot be followed.
     """
@@ -527,10 +530,10 @@ def trial_orbit(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[P
 
 
 class OrbitEquations:
-    """The equations of a family's periodic motions over a range, as `numerics.continuation` follows them.
+    """Equations of a family's periodic motions over a range, in the form for `numerics.continuation`.
 
-    The unknowns are y at the beginnings of the pieces of a period; the residual is y at the end of each piece less y at the
-    beginning of the next; the data of an evaluation are the `PeriodicOrbit`.
+    The unknowns are y at the beginnings of the pieces of a period; the residual is y at the end of each piece minus y at the
+    beginning of the next; each evaluation also returns the `PeriodicOrbit`.
 
     Parameters
     ----------
@@ -558,7 +561,7 @@ class OrbitEquations:
         self._direction = family.direction(high, low, high) if mechanism is other else None
 
     def scale(self, start: FloatArray) -> FloatArray:
-        """Return the magnitudes of the unknowns: the greatest of both ends of the range."""
+        """Return the magnitudes of the unknowns: the greater ones of the two ends of the range."""
         scale = np.max([operating_point(*bound).scale(start) for bound in self._bounds], axis=0)
         # an arc has the length of the mean square over the pieces
         pieces = len(self.angles) - 1

@@ -1,12 +1,12 @@
-"""The search for periodic motions: all that exist at a point, the one a machine meets, and a sweep through the speeds.
+"""Search for periodic motions: all at one operating point, the one that a machine meets, or a sweep over speeds.
 
-Newton's method finds the motion whose basin a guess happens to lie in. `find_orbits` uses two methods that share only the map
-over a period: a set of starts that fills the region in which the mechanism can be assembled, and from fewer starts deflation,
-which divides out each motion that was found. If both find the same number, and the indices of the motions add up, it is
-unlikely that one was missed.
+Newton's method finds one motion, which depends on the guess. `find_orbits` uses two methods that share only the map over a
+period: many starts that fill the region in which the mechanism can be assembled; and, from fewer starts, deflation, which
+divides out each motion that was found. If both find the same motions, and the sum of their indices is 1, it is unlikely that
+one was missed.
 
-`find_orbit` returns the motion that a machine meets when it is run up slowly from rest; `sweep` goes through speeds as a
-machine does, with its jumps.
+`find_orbit` returns the motion that a machine reaches when it is run up slowly from rest; `sweep` steps through speeds as a
+machine does, including jumps between motions.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Sweep:
     orbits : tuple of (PeriodicOrbit or None)
         None if no steady motion with a period of 1 to 4 turns was met.
     flags : tuple of str
-        Why there is none; else empty.
+        Reason if there is none; otherwise empty.
     jumps : tuple of Jump
     """
 
@@ -110,11 +110,11 @@ def sweep(
     start: ArrayLike | None = None,
     watch: Callable[[float], None] | None = None,
 ) -> Sweep:
-    """Go through crank speeds as a machine would, each begun from the steady motion of the last.
+    """Step through crank speeds as a machine does: each steady motion starts from the last one.
 
-    Under an induction motor they are the synchronous speeds of its field, as of a frequency converter. If that motion is
-    lost or unstable at the new speed, the mechanism is followed for up to 5000 turns to the next steady motion: a jump.
-    Rising and falling speeds may meet different motions.
+    Under an induction motor they are the synchronous speeds of its field, set by a frequency converter. If the last motion is
+    lost or unstable at the new speed, the mechanism is integrated for up to 5000 turns to the next steady motion: a jump.
+    Rising and falling speeds may lead to different motions.
 
     Parameters
     ----------
@@ -175,14 +175,14 @@ def sweep(
 
 
 def _paced(drive: Drive, speed: float) -> Drive:
-    """Return the drive at a prescribed speed, or with a motor of this synchronous speed."""
+    """Return the drive with this prescribed speed, or with its motor at this synchronous speed."""
     if drive.speed is None and drive.motor is not None:
         return replace(drive, motor=replace(drive.motor, synchronous_speed=speed))
     return replace(drive, speed=speed, torque=0.0, motor=None)
 
 
 def _pace(drive: Drive) -> float | None:
-    """Return the prescribed speed, or the synchronous speed of the motor; None under a mere torque."""
+    """Return the prescribed speed, or the synchronous speed of the motor; None under a constant torque."""
     if drive.speed is None and drive.motor is not None:
         return float(drive.motor.synchronous_speed)
     return None if drive.speed is None else float(drive.speed)
@@ -193,7 +193,7 @@ def _continued(
 ) -> PeriodicOrbit | None:
     """Follow a stable motion to another speed; return None if it is lost on the way.
 
-    A neighbour that differs much may be another motion, which Newton's method met by chance: half steps are taken then.
+    A neighbour that differs much may be another motion, to which Newton's method jumped: the step is then halved.
     """
     before = _pace(last.drive)
     assert before is not None
@@ -268,7 +268,7 @@ class Orbits(Shown):
 
     @property
     def stable(self) -> tuple[PeriodicOrbit, ...]:
-        """The motions that a machine can stay in: all but the unstable ones."""
+        """The motions in which a machine can stay: all but the unstable ones."""
         return tuple(orbit for orbit in self.orbits if orbit.verdict().stability is not Stability.UNSTABLE)
 
 
@@ -285,7 +285,7 @@ def find_orbit(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """Find a periodic motion of the full nonlinear mechanism: of several, the one that a machine meets.
+    """Find a periodic motion of the full nonlinear mechanism; of several, the one that a machine reaches in run-up.
 
     Parameters
     ----------
@@ -494,7 +494,7 @@ class _Found:
         return all(other.knows(orbit.start) for orbit in self.orbits)
 
     def between(self) -> list[FloatArray]:
-        """Return places between each two motions, where a third often is, and around each."""
+        """Return starts between each two motions, where a third often lies, and around each motion."""
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]
@@ -503,7 +503,7 @@ class _Found:
 
 
 def _met(found: Orbits, first: PeriodicOrbit | None, start: ArrayLike | None) -> PeriodicOrbit:
-    """Return the motion that a machine meets; if none is stable, ``first``, or else the smallest."""
+    """Return the motion that a machine reaches; if none is stable, ``first``; without that, the smallest."""
     stable = found.stable
     if len(stable) == 1:
         return stable[0]

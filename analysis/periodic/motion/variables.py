@@ -1,4 +1,4 @@
-"""Parameters of a mechanism and its drive that can vary, by FMI name, and the derivatives of the equations by them."""
+"""Vary parameters of a mechanism and its drive by FMI name, and differentiate the equations with respect to them."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
 
 
 def _ratio_of(mechanism: Mechanism, drive: Drive, freedom: int) -> float:
-    """Return the turns of a commanded crank for each turn of the crank of the drive; 0 where it is held or not commanded."""
+    """Return the turns of a commanded crank per turn of the drive's crank; 0 if it is held or not commanded."""
     if freedom == drive.reference(mechanism).freedom:
         return 1.0
     commanded = freedom in drive.flow(mechanism).commanded
@@ -261,7 +261,7 @@ class Family:
         FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
         as ``slider.damping``; or a function from a number to (parameters, Drive). By default the speed of the crank.
     name, unit : str
-        Of the parameter, for tables and plots; they follow from an FMI name.
+        Name and unit of the parameter for tables and plots; by default those of the FMI variable.
 
     Raises
     ------
@@ -298,7 +298,7 @@ class Family:
         return format_value(self.name, value, self.unit)
 
     def direction(self, value: float, low: float, high: float) -> Direction:
-        """Compute the derivative of the operation by the parameter, by differences inside the parameter's range."""
+        """Differentiate mechanism and drive with respect to the parameter, by differences inside the parameter's range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
         mechanism = mechanism_of(self.parameters)
@@ -313,8 +313,8 @@ FloatArray = NDArray[np.float64]
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
     """Return the FMI names of all parameters by which motions are differentiated: of the drive and of the mechanism.
 
-    A parameter that would switch on equations that are off, as friction by contact forces, is left out; it can be named
-    explicitly.
+    A parameter at zero that would switch on further equations, such as friction by contact forces, is left out; it can be
+    named explicitly.
     """
     mechanism, acting = mechanism_of(parameters), []
     for name in variable_names(mechanism):
@@ -330,7 +330,7 @@ def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
 
 
 class Along(NamedTuple):
-    """Derivatives of the constants by parameters, and the derivatives of these by a further parameter; shape (P, m)."""
+    """First derivatives of the constants with respect to parameters, and second ones with respect to a further one; (P, m)."""
 
     p: FloatArray
     p_along: FloatArray

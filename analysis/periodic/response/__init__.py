@@ -1,4 +1,4 @@
-"""Motions over one parameter: branches, resonances, special points, and which values a machine should avoid.
+"""Follow periodic motions over one parameter: branches, resonances, special points, and values that a machine should avoid.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

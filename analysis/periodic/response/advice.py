@@ -1,7 +1,8 @@
-"""Advice from branches: values of the parameter to avoid, jumps at folds, and greatest amplitudes.
+"""Derive advice for a machine from branches: values of the parameter to avoid, jumps at folds, and greatest amplitudes.
 
-An arc is a part of a branch along which the parameter goes one way and stability stays the same. Where a stable arc ends at a
-fold the machine jumps to another one; where several overlap, its past decides; where there is none, it shakes.
+An arc is a part of a branch along which the parameter only rises or only falls and stability stays the same. At a fold where a
+stable arc ends, the machine jumps to another arc. If several stable arcs overlap, the machine's history decides which one it
+follows; if there is none, no motion on the branches is stable.
 """
 
 from __future__ import annotations
@@ -218,7 +219,7 @@ def _overlap(a: Arc, b: Arc) -> Interval:
 
 
 def _resonances(arc: Arc) -> list[Interval]:
-    """Return the half-power bands of the peaks of an arc, and of an end at which it is largest and loses its stability."""
+    """Return the half-power bands of the peaks of an arc, also of an end where it is largest and loses its stability."""
     a = arc.amplitude
     tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
     bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]

@@ -1,9 +1,9 @@
-"""Branches of periodic motions: how an orbit changes with a parameter, where it loses its stability, and what branches off.
+"""Follow branches of periodic motions over a parameter, and locate the points where they lose stability or branch off.
 
-The parameter is the speed, the torque, a force, any parameter of the FMI contract, or any number from which a function makes
-mechanism and drive. A branch is followed by arclength, past its folds. Between its points the special points are located, at
-which a Floquet multiplier crosses the unit circle: at +1 (fold), at -1 (period doubling), or as a complex pair (torus). From a
-period doubling one switches to the motion of twice the period.
+The parameter is the speed, the torque, a force, any parameter of the FMI contract, or any number from which a function
+computes mechanism and drive. A branch is followed by arclength, past its folds. Special points are located between its points:
+a Floquet multiplier crosses the unit circle at +1 (fold), at -1 (period doubling), or as a complex pair (torus). At a period
+doubling, `switch` changes to the motion of twice the period.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Branch(Shown):
-    """Orbits along a curve, in its order.
+    """A branch: periodic orbits along a curve, in order.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Branch(Shown):
         Whether the branch was followed to an end of the range, to its own beginning, or to a branch of half its period; and
         whether it came back to its own beginning.
     reason : str
-        Why it ended. If the branch was lost, its last point is the last good one.
+        Reason why the branch ended. If it was lost, its last point is the last good one.
     """
 
     family: Family
@@ -178,7 +178,7 @@ def follow(
     orbit : PeriodicOrbit
         At the value of the parameter.
     value : float
-        Where to begin, from ``low`` to ``high``.
+        Value of the parameter at the orbit, between ``low`` and ``high``.
     low, high : float
         Range of the parameter.
     direction : int

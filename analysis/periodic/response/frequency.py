@@ -1,8 +1,8 @@
-"""Frequency response: where the mechanism resonates, how strongly, and with which harmonics.
+"""Compute the frequency response: at which speeds the mechanism resonates, how strongly, and with which harmonics.
 
 `frequency_response` follows the periodic motions of the full nonlinear mechanism over a range of speeds, past folds, from both
-ends of the range, and switches to the motions of twice the period, and from those again. `with_isolas` adds the motions that
-no branch leads to: isolas, closed curves over the parameter, and branches that both ends of the range miss.
+ends of the range, and switches to the motions of twice the period, and from those again. `with_isolas` adds the motions to
+which no branch leads: isolas, which are closed curves over the parameter, and branches that reach neither end of the range.
 `natural_frequency` is the classical estimate, from the mean effective mass.
 """
 
@@ -144,7 +144,7 @@ def natural_frequency(parameters: Parameters) -> float:
 STRAYED = 4.0
 
 
-#: What ranges to avoid do not know if no motions were sought beside the branches.
+#: Warning about ranges to avoid if no motions off the branches were sought.
 UNSOUGHT = "motions that no branch leads to were not sought"
 
 
@@ -158,12 +158,12 @@ class Response(Shown):
         First the branch from the low end, then the branch from the high end if it is another one, then the branches of twice
         the period, of four times and so on, then the branches connected with none of these.
     low, high : float
-        The range asked for.
+        Range of the parameter.
     problems : tuple of str
-        What could not be followed, a sentence each with the last good parameter; empty if all was followed.
+        One sentence for each branch that could not be followed, with its last good parameter; empty if all were followed.
     sought : int
-        Values of the parameter at which all motions were sought. If it is 0 there may be stable motions that no branch leads
-        to, and `speeds_to_avoid` does not know them: see `with_isolas`.
+        Number of values of the parameter at which all motions were sought. If it is 0, there may be stable motions to which no
+        branch leads and which `speeds_to_avoid` does not take into account: see `with_isolas`.
     """
 
     branches: tuple[Branch, ...]
@@ -179,7 +179,7 @@ class Response(Shown):
 
     @property
     def caution(self) -> str:
-        """What `speeds_to_avoid` does not know, in words; empty if motions were sought beside the branches."""
+        """Warning that `speeds_to_avoid` may miss motions off the branches; empty if these were sought."""
         return "" if self.sought else UNSOUGHT
 
     @property
@@ -280,8 +280,8 @@ def frequency_response(
     Returns
     -------
     Response
-        ``problems`` has what could not be followed: there are no silent gaps. Motions that no branch leads to are not sought,
-        which would take one to ten times as long: see `with_isolas`.
+        ``problems`` names every branch that could not be followed. Motions to which no branch leads are not sought; that would
+        take one to ten times as long: see `with_isolas`.
 
     Raises
     ------
@@ -482,13 +482,13 @@ GREATEST_OF_SEVERAL = 100.0
 def with_isolas(
     response: Response, *, places: int = 5, turns: int = 1, greatest_step: float = 5e-3, progress: bool = False
 ) -> Response:
-    """Add to a response the motions that are connected with none of its branches.
+    """Add motions to a response that are not connected to any of its branches.
 
-    All motions are sought at some values of the parameter; one that lies on no branch begins another, which is followed to both
-    sides until it closes or ends. Motions with deviations that grow more than a thousandfold per turn are left out.
+    All motions are sought at some values of the parameter. From one that lies on no branch, a new branch is followed to both
+    sides until it closes or ends. Motions whose deviations grow more than a thousandfold per turn are left out.
 
-    Motions of several turns are stable in narrow ranges only, between a fold and a period doubling. Beyond the doubling they go
-    on, less and less stable, over a range some ten times as wide, in which the search can meet them. They are followed as long
+    Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling they
+    exist on, ever more unstable, over a range some ten times as wide, where the search can find them. They are followed as long
     as deviations grow less than `GREATEST_OF_SEVERAL` times per period.
 
     Parameters

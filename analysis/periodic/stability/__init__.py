@@ -1,4 +1,4 @@
-"""How a motion changes with every parameter, and what happens beyond a loss of stability: gradients, normal forms, long runs.
+"""Compute gradients of motions with respect to all parameters, normal forms at a loss of stability, and long runs beyond it.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

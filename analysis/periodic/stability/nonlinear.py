@@ -1,4 +1,4 @@
-"""Normal forms at a loss of stability, and long runs: the mechanism beyond its linearisation.
+"""Compute the normal form at a loss of stability, and check it by long runs of the nonlinear mechanism.
 
 On the centre manifold of a special point the map over a period is one of three normal forms (Y. A. Kuznetsov, Elements of
 Applied Bifurcation Theory, 3rd ed., Springer 2004, sections 5.4 and 8.7). The sign of one coefficient decides: beyond a
@@ -74,13 +74,13 @@ class NormalForm:
     ----------
     kind : Crossing
     coefficient : float
-        In the scale of y: of a fold half the second derivative along the eigenvector; of a period doubling the cubic
-        coefficient, positive if supercritical; of a torus the first Lyapunov coefficient, negative if supercritical.
+        In the scale of y: for a fold half the second derivative along the eigenvector; for a period doubling the cubic
+        coefficient, positive if supercritical; for a torus the first Lyapunov coefficient, negative if supercritical.
     uncertainty : float
         Change of the coefficient when the step of the differences is halved; infinite if the point is not located.
     words : str
         "supercritical", "subcritical", or "not settled" if the coefficient is uncertain or the multiplier crosses the circle
-        too fast for the point to be located; of a fold, on which side of it the two motions exist.
+        too fast for the point to be located; for a fold, the side on which the two motions exist.
     """
 
     kind: Crossing
@@ -90,7 +90,7 @@ class NormalForm:
 
 
 class Forms(NamedTuple):
-    """The multilinear forms of a map about its fixed point at zero, by differences.
+    """Second and third derivatives of a map at its fixed point zero as multilinear forms, by differences.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ def _complex_form(form: Callable[..., FloatArray], count: int) -> Form:
 
 
 def _eigenvectors(matrix: FloatArray, value: complex) -> tuple[NDArray[np.complex128], NDArray[np.complex128], complex]:
-    """Return right and left eigenvectors of the multiplier nearest to ``value``, with product 1, and this multiplier."""
+    """Return right and left eigenvectors, with product 1, of the multiplier nearest to ``value``, and this multiplier."""
     values, right = np.linalg.eig(matrix.astype(complex))
     n = int(np.abs(values - value).argmin())
     adjoint, left = np.linalg.eig(matrix.T.astype(complex))
@@ -189,7 +189,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
 
 
 def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
-    """Extrapolate a coefficient to the step zero from halved steps; return the most certain value with its uncertainty."""
+    """Extrapolate a coefficient from halved steps to step zero; return the value with the least uncertainty, and that."""
     found: list[tuple[float, float]] = []
     values: list[float] = []
     change = 0.0
@@ -220,7 +220,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
     of : Forms
     kind : Crossing
     multiplier : complex
-        Of a torus, one of the pair on the unit circle.
+        For a torus, one of the pair on the unit circle.
     h : float
         Step of the differences.
     """
@@ -249,7 +249,7 @@ def form_coefficient(of: Forms, kind: Crossing, multiplier: complex, h: float) -
 
 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
-    """Return the derivative of the map by the parameter along the left eigenvector of a fold."""
+    """Return the component, along the left eigenvector of a fold, of the map's derivative with respect to the parameter."""
     _, p, _ = _eigenvectors(of.matrix, 1.0)
     point, start = operating_point(*family.at(special.parameter)), special.orbit.start
     reach = 1e-3 * max(abs(special.parameter), 1e-9)
@@ -260,7 +260,7 @@ def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormRun:
-    """A run next to a period doubling or a torus point, on the side where the old motion is unstable.
+    """A run near a period doubling or a torus point, on the side where the old motion is unstable.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ class FormRun:
     distance : float
         Greatest distance from the old motion over the last turns, in the scale of y; infinite if the run ended early.
     expected : float
-        Distance by the normal form of a supercritical point.
+        Distance that the normal form predicts for a supercritical point.
     """
 
     parameter: float
@@ -277,21 +277,21 @@ class FormRun:
     expected: float
 
     def agrees(self, form: NormalForm) -> bool:
-        """Return whether the run stays at the distance of the normal form, to a factor of two, or leaves if it should."""
+        """Return whether the run follows the form: at its distance, within a factor of two, or away if it is subcritical."""
         if form.words == "supercritical":
             return 0.5 * self.expected < self.distance < 2.0 * self.expected
         return form.words == "subcritical" and self.distance > 3.0 * self.expected
 
 
 def confirm_form(family: Family, special: SpecialPoint, form: NormalForm) -> FormRun:
-    """Run the mechanism next to a special point, from a small deviation, on the side where the old motion is unstable.
+    """Run the mechanism near a special point, from a small deviation, on the side where the old motion is unstable.
 
     Raises
     ------
     InputError
         If the point is a fold: beyond it there is no old motion.
     LinkworkError
-        If the old motion becomes unstable on neither side.
+        If the old motion is unstable on neither side.
     """
     if special.kind is Crossing.FOLD:
         raise InputError("beyond a fold there is no old motion to deviate from")
@@ -340,18 +340,18 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Confirmation:
-    """A verdict and a long run of the nonlinear mechanism from near its periodic orbit.
+    """A verdict, and a long run of the nonlinear mechanism that starts near the periodic orbit.
 
     Attributes
     ----------
     verdict : StabilityVerdict
-        By the multipliers of the orbit.
+        Verdict from the multipliers of the orbit.
     outcome : Outcome
     growth : float
-        Factor per turn of the deviation along the leading multiplier's direction, by regression over the turns before it is
-        lost in noise or exceeds a hundredth of the crank; a bound of it where that is within a turn.
+        Growth factor of the deviation per turn, along the direction of the leading multiplier, by regression over the turns
+        before it vanishes in rounding errors or exceeds a hundredth of the crank; a bound if that happens within a turn.
     deviations : ndarray, shape (n,)
-        Distance from the orbit at crank angle 0 of each turn, relative to the first; as far as the run went.
+        Distance from the orbit at crank angle 0 of each turn, relative to the first one, to the end of the run.
     message : str
         Why the run ended early; empty if it did not.
     """
@@ -364,7 +364,7 @@ class Confirmation:
 
     @property
     def agrees(self) -> bool:
-        """Whether the run does what the verdict says; the deviation of a marginal motion must neither decay nor grow.
+        """Whether the run confirms the verdict; the deviation of a marginal motion must neither decay nor grow.
 
         If the margin is too small for the number of turns, the measured growth must be that of the multiplier.
         """
@@ -381,7 +381,7 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
-#: Deviation below which there is none.
+#: Deviation below which it counts as zero.
 TINY = 1e-300
 #: Turns of a run at least, and at most.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
@@ -484,8 +484,8 @@ def _passages(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[Flo
 def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the direction of greatest growth, of unit length, and the vector that measures it, both scaled.
 
-    The vector is the left eigenvector of the largest multiplier: the product with it grows by the same factor each turn, though
-    of a complex pair the distance itself oscillates.
+    The vector is the left eigenvector of the largest multiplier: the product with it grows by the same factor each turn, while
+    for a complex pair the distance itself oscillates.
     """
     scaled = orbit.monodromy * scale / scale[:, None]
     values, left, right = scipy.linalg.eig(scaled, left=True)
@@ -495,5 +495,5 @@ def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[
 
 
 def _growth(size: NDArray[np.float64]) -> float:
-    """Return the factor per turn, by regression of the logarithms."""
+    """Return the growth factor per turn, by regression of the logarithms."""
     return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

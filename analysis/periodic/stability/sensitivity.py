@@ -1,9 +1,9 @@
-"""Sensitivity of periodic motions, resonances and losses of stability to every parameter.
+"""Differentiate periodic motions, resonances and losses of stability with respect to every parameter.
 
-By the implicit function theorem on the variational equations (`variations`): a motion stays periodic; at a fold, a period
-doubling or a torus point the multiplier stays on the unit circle; at a resonance the amplitude stays stationary. For the
-conditions see Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, chapter 10. All derivatives are
-exact, up to the resolution of the collocation; none is a difference.
+The derivatives follow from the variational equations (`variations`) by the implicit function theorem. The conditions are: a
+motion stays periodic; at a fold, a period doubling or a torus point the multiplier stays on the unit circle; at a resonance
+the amplitude stays stationary (Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, chapter 10).
+All derivatives are exact, up to the resolution of the collocation; none is a difference.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DOUBLE = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Gradient:
-    """A quantity with its derivatives by parameters.
+    """A quantity with its derivatives with respect to parameters.
 
     Attributes
     ----------
@@ -89,9 +89,9 @@ class PointGradient:
     along : str
         FMI name of the branch's parameter, such as ``drive.speed``.
     place : Gradient
-        Its value at the point, by the other parameters.
+        Gradient of that parameter's value at the point, with respect to the other parameters.
     amplitude : Gradient
-        Of the motion at the point.
+        Gradient of the amplitude of the motion at the point.
     orbit : PeriodicOrbit
         The motion.
     """
@@ -103,7 +103,7 @@ class PointGradient:
 
 
 class MotionGradient:
-    """Derivatives of a periodic motion by parameters; see `motion_gradient`. Each is computed on first use.
+    """Derivatives of a periodic motion with respect to parameters, computed on first use; see `motion_gradient`.
 
     Attributes
     ----------
@@ -302,7 +302,7 @@ class MotionGradient:
 
 
 def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
-    """Compute how a periodic motion changes with parameters.
+    """Compute the derivatives of a periodic motion with respect to parameters.
 
     Parameters
     ----------
@@ -419,8 +419,8 @@ def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]
     Returns
     -------
     Gradient
-        Of a function that is zero on the boundary: of a period doubling or torus point `MotionGradient.test`; of a fold the
-        shift of the map over a period along the left eigenvector.
+        Gradient of a function that is zero on the boundary: for a period doubling or torus point `MotionGradient.test`; for a
+        fold the shift of the map over a period along the left eigenvector.
     """
     motion = MotionGradient(orbit, names)
     return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
@@ -530,8 +530,8 @@ def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
 def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     """Return the derivatives of the motion at a fold that moves by ``shift`` along the last parameter; shape (k, s, n, m).
 
-    The equations of first order leave a multiple of the eigenvector open; those of second order settle it: the multiplier stays
-    +1. The last column is zero.
+    The first-order equations determine it up to a multiple of the eigenvector. The second-order equations determine the
+    multiple, since the multiplier stays +1. The last column is zero.
     """
     v, n, m = motion.variations, len(motion.variations.scale), len(shift)
     left, right = _null_vectors(v)

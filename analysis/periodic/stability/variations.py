@@ -1,4 +1,4 @@
-"""The variational equations of a periodic motion, with parameters and to second order, by Gauss collocation.
+"""Solve the variational equations of a periodic motion, to second order and with parameters, by Gauss collocation.
 
 The turn is divided into panels on which the motion is a polynomial to within rounding. On a panel the linear equations
 d' = A d + r are solved at Gauss's points for any number of right-hand sides at once, by the implicit Runge-Kutta method of
@@ -47,7 +47,7 @@ _GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
 
 
 class Place(NamedTuple):
-    """A place of the turn: its panel, the position on it from -1 to 1, and the weights of the panel's nodes in its value."""
+    """A point of the period: its panel, its position there from -1 to 1, and the weights by which the nodes interpolate."""
 
     panel: int
     position: float
@@ -61,9 +61,10 @@ class Variations:
     ----------
     orbit : PeriodicOrbit
     switched : bool
-        Whether the mechanism's switch counts as on, because it is or because a derivative by it is wanted.
+        Whether the equations of the mechanism's switch are included: it is on, or a derivative with respect to it is wanted.
     along : ndarray, shape (c, m)
-        Derivatives of the numbers of the drive, followed by the constants, by parameters, which the panels must resolve too.
+        Derivatives of the drive's numbers and then of the constants with respect to parameters; the panels must resolve
+        the forcing by these, too.
 
     Attributes
     ----------
@@ -295,7 +296,8 @@ class Variations:
 def _solve_cyclic(steps: FloatArray, gains: FloatArray) -> FloatArray:
     """Solve for d at the beginning of each panel, shape (k, n, m), so that each panel ends where the next one begins.
 
-    Two panels at a time become one: rotations eliminate d between them, so that neither growth nor decay accumulates.
+    Pairs of panels are merged step by step: orthogonal rotations eliminate d between them, so that neither growth nor decay
+    accumulates.
     """
     count, n, _ = gains.shape
     # empty panels make their number a power of two

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...periodic import Crossing, PeriodicOrbit, SpecialPoint, Sweep, sweep
+from ...periodic import PeriodicOrbit, SpecialPoint, Sweep, sweep
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT_DEG, ALIKE, SLIGHTLY
 from ..statements import Statement, at_least, at_most, near, text
@@ -54,11 +54,6 @@ def swept(spring: str, rising: bool) -> Sweep:
 def special_points() -> list[SpecialPoint]:
     """Return the folds and period doublings of the branches about resonance with spring B."""
     return [special for branch in resonant_b().branches for special in branch.special]
-
-
-def speeds_of(kind: Crossing) -> list[float]:
-    """Return the speeds of special points (rpm)."""
-    return [special.parameter / RAD_S_PER_RPM for special in special_points() if special.kind is kind]
 
 
 def upper_orbit(speed: float) -> PeriodicOrbit:

@@ -1,4 +1,4 @@
-"""Case files of a synthesis: their tables, and the task, constraints and search in them.
+"""Read the case files of a synthesis: their task, constraints and search.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

@@ -1,4 +1,4 @@
-"""A synthesis from the tables of a TOML or JSON file, every quantity with its unit; see `docs/synthesis-cases.md`."""
+"""Read a synthesis from the tables of a TOML or JSON file, every quantity with its unit; see `docs/synthesis-cases.md`."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class SearchTable:
     jobs: int = entry(_cores, 1)
 
     def search(self, **changes: Any) -> Search:
-        """Return the `Search` of the table, with some of its values changed."""
+        """Return the `Search` that the table describes, with some values replaced."""
         own = {name: value for name, value in asdict(self).items() if name not in ("kinds", "gears")}
         return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
 
@@ -97,7 +97,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 
 def _error(value: Any, name: str) -> Any:
-    """Check the greatest error allowed for the least pin force: a length, or an angle of a rocker function."""
+    """Read the bound of the greatest error for the least pin force: a length, or for a rocker function an angle."""
     try:
         quantity(value, "m", name)
     except ParameterError:
@@ -108,26 +108,26 @@ def _error(value: Any, name: str) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """The table ``[constraints]``; a least transmission angle of None asks nothing.
+    """The table ``[constraints]``; a least transmission angle of None is no constraint.
 
     Attributes
     ----------
     time_ratio : (float, float)
-        Of a crank-rocker's slow swing to its quick one.
+        Bounds of the time ratio: duration of a crank-rocker's slow swing divided by that of its quick one.
     least_mechanical_advantage, greatest_mechanical_advantage : float
-        Torque of the rocker for one of the crank.
+        Bounds of the mechanical advantage: torque on the rocker divided by torque on the crank.
     mechanical_advantage_at : list
-        Crank rotations where that is asked; by default all the way.
+        Crank rotations at which these bounds hold; by default everywhere.
     dead_centre_stretched, dead_centre_folded : (float, float)
         Crank rotation, or range of it, at which crank and coupler are in line.
     toggle_stretched, toggle_folded : (float, float)
-        The same of coupler and rocker.
+        The same for coupler and rocker.
     no_toggle : (float, float)
-        Crank rotations between which there is none.
+        Crank rotations between which there is no toggle.
     max_pin_force : float
-        No pin carries more, at the speed and under the load of make.
+        Greatest force on any pin, at the speed and under the load of ``make``.
     pins : str
-        Those that this is about.
+        Letters of the pins whose forces count.
     """
 
     least_transmission_angle: float | None = entry(_transmission, LeastTransmission().angle)
@@ -154,7 +154,7 @@ class Constraints:
     require: tuple[Constraint, ...] = entry(Many(requirement), ())
 
     def constraints(self) -> tuple[Constraint | Stroke, ...]:
-        """Return the constraints; the transmission angle of a crank that cannot turn fully holds over the task alone."""
+        """Return the constraints; if the crank cannot turn fully, the transmission angle is bounded only over the task."""
         swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
         over: Any = self.over or ("task" if swings else "turn")
         made: tuple[tuple[Any, Callable[[Any], Constraint | Stroke]], ...] = (
@@ -179,7 +179,7 @@ class Constraints:
         return (*(make(value) for value, make in made if value is not None), *self.require)
 
     def _advantage(self) -> dict[str, Any] | None:
-        """Return the arguments of `MechanicalAdvantage`; None if it is not asked for."""
+        """Return the arguments of `MechanicalAdvantage`; None without bounds."""
         ends = {"least": self.least_mechanical_advantage, "greatest": self.greatest_mechanical_advantage}
         given = {name: end for name, end in ends.items() if end is not None}
         if self.mechanical_advantage_at is not None and not given:
@@ -249,18 +249,18 @@ class SynthesisCase:
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
     def violated(self, solution: Solution) -> str:
-        """Return the constraint that a linkage violates most, and by how much; empty if it keeps all, or is in closed form."""
+        """Say which constraint a linkage violates most, and by how much; empty if it meets all, or is in closed form."""
         closed = isinstance(self.task, QuickReturn | QuickSwing)
         return "" if closed else violated(solution, self.bounds, self.constraints)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
-        """Run the plant for the pin forces of solutions; None where no constraint is about them."""
+        """Run the plant for the pin forces of solutions; None if no constraint involves pin forces."""
         if not any(isinstance(c, FORCES) for c in self.constraints):
             return None
         return [pin_forces(s.linkage, self.make, s.way) for s in solutions]
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
-        """Compute the trade-off that is asked for; None if there is none. See `trade_off`."""
+        """Compute the trade-off that the file describes; None if there is none. See `trade_off`."""
         wanted = self.trade_off
         if wanted is None:
             return None
@@ -291,7 +291,7 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
     Raises
     ------
     InputError, ParameterError
-        If the file cannot be read, or what it says is not usable.
+        If the file cannot be read, or an entry is not usable.
     InfeasibleError
         If bounds and constraints contradict one another.
     """
@@ -302,6 +302,6 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
 def synthesis_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SynthesisCase:
-    """Read a synthesis from the tables of a case file; ``folder`` is where its files are looked for."""
+    """Read a synthesis from the tables of a case file; names of further files are relative to ``folder``."""
     tables = {"title": title} | overridden(data, overrides or {})
     return read(SynthesisCase, tables, "", readers={"task": partial(read_task, folder=folder)})

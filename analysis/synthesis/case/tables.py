@@ -1,4 +1,4 @@
-"""The table of the task in a synthesis case, with its points, files and formulas."""
+"""Read the task of a synthesis case from its table: points, files and formulas."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import cos, sin, tau
+from math import tau
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,7 +19,7 @@ from ...files import Choice, Kinds, Many, Quantity, Table, Whole, entry, flag, r
 from ...units import quantity
 from ..exact.quick_return import QuickReturn, QuickSwing
 from ..task.formula import function_from_formula, path_from_formula
-from ..task.target import TargetPath
+from ..task.target import TargetPath, transform_points
 from ..task.task import (
     Motion,
     Objective,
@@ -45,7 +45,7 @@ def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatAr
 
 
 def _unit(value: Any, name: str, kind: str, si: str, example: str) -> str:
-    """Read the unit of numbers that have none."""
+    """Read the unit for numbers without a unit."""
     try:
         quantity(f"1 {value}", si, name)
     except ParameterError:
@@ -78,7 +78,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """A window of targets with a weight: from one crank rotation, or number of a point, to another."""
+    """A weight for a range of targets: from one crank rotation, or point number, to another."""
 
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
@@ -87,7 +87,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Smoothing:
-    """How a path is smoothed; see `TargetPath.smoothed`."""
+    """Settings for smoothing a path; see `TargetPath.smoothed`."""
 
     points: int = entry(Whole(8), 180)
     deviation: float | None = entry(Quantity("m"), None)
@@ -125,7 +125,7 @@ def _rotation(value: Any, n: int) -> FloatArray | None:
 
 
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
-    """Read weights, as a list or as windows of crank rotation; of an untimed task windows count points, both ends included."""
+    """Read weights, as a list or as windows of crank rotation; for an untimed task as windows of point numbers, inclusive."""
     if value is None:
         return None
     name = "task.weights"
@@ -148,7 +148,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
 
 
 def _source(table: Any, sources: tuple[str, ...]) -> str:
-    """Return which of the ways of giving a target is used."""
+    """Return the entry that gives the target, of several alternatives."""
     there = [name for name in sources if getattr(table, name) is not None]
     if len(there) != 1:
         ways = " or ".join(f"task.{name}" for name in sources)
@@ -165,7 +165,7 @@ def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Formula:
-    """The objective, and the range of a formula's parameter with its number of points."""
+    """Objective of a task, and the range and number of points of a formula's parameter."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -181,7 +181,7 @@ class _Formula:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Curve(_Formula):
-    """Points of a target as a list, from a file, or by formulas; then scaled, turned and shifted."""
+    """Points of a target as a list, from a file, or by formulas; they can be scaled, rotated and shifted."""
 
     points: Any = entry(unchanged, None)
     file: str | None = entry(text, None)
@@ -212,9 +212,7 @@ class _Curve(_Formula):
             found, closed = path.points, path.closed
         shift = np.zeros(2) if self.shift is None else read_plane_points([self.shift], "task.shift", self.unit)[0]
         if not (self.scale is None and self.turn is None and self.shift is None):
-            scale, turned = 1.0 if self.scale is None else self.scale, self.turn or 0.0
-            c, s = scale * cos(turned), scale * sin(turned)
-            found = found @ np.array([[c, s], [-s, c]]) + shift
+            found = transform_points(found, 1.0 if self.scale is None else self.scale, self.turn or 0.0, shift)
         return found, closed if self.closed is None else self.closed
 
 
@@ -271,7 +269,7 @@ class PrecisionPointsTable(_Curve):
     length: float | None = entry(Quantity("m"), None)
 
     def _body(self, folder: Path) -> dict[str, Any]:
-        """Return the points and directions of a body, turned with its points."""
+        """Return the points and directions of a body, rotated and shifted together."""
         points, _ = self._placed(folder)
         rotation = _rotation(self.rotation, len(points))
         angle = None
@@ -384,6 +382,6 @@ KINDS: Mapping[str, type] = {
 
 
 def read_task(value: Any, name: str, *, folder: Path) -> Task:
-    """Read the task of a table ``[task]``; ``folder`` is where its files are looked for."""
+    """Read the task from the table ``[task]``; names of further files are relative to ``folder``."""
     task: Task = Kinds({kind: Table(table) for kind, table in KINDS.items()})(value, name).task(folder)
     return task

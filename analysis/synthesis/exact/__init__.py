@@ -1,4 +1,4 @@
-"""Linkages in closed form: rigid-body guidance, functions, coupler curves of cognates, quick returns.
+"""Find linkages in closed form: rigid-body guidance, function generation, cognates, quick returns.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

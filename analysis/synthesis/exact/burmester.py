@@ -1,15 +1,15 @@
-"""Rigid-body guidance in closed form: every four-bar that carries a body exactly through four or five poses.
+"""Rigid-body guidance in closed form: find every four-bar that carries a body exactly through four or five poses.
 
-A dyad is a fixed pivot m and a point of the body that stays at one distance from it. With the body's reference point at p_j and
-the body turned by e_j = exp(i theta_j) since the first pose, its point z from there keeps its distance where
+A dyad is a fixed pivot m and a point of the body whose distance from m is the same in all poses. Let the body's reference point
+be at p_j and the body be rotated by e_j = exp(i theta_j) from the first pose. The distance of its point z is constant if
 
     |p_j|^2 / 2 + Re(conj(p_j) e_j z) - Re(conj(p_j) m) - Re((e_j - 1) w) = 0,   w = conj(m) z,   j = 2 ... n,
 
-which is linear in (1, z, m, w). Five poses leave a plane of solutions, in which w = conj(m) z is two conics: they meet in
-four points, so that there are four dyads, real or complex (L. Burmester, Lehrbuch der Kinematik, 1888; J. M. McCarthy and
-G. S. Soh, Geometric Design of Linkages, 2nd ed., 2011, chapter 5). Two real dyads make a four-bar: at most six, each driven
-from either side. All of them are judged, so that "none is sound" is proved for these poses. Four poses leave a cubic curve of
-points z, each with its pivot m.
+which is linear in (1, z, m, w). Five poses leave a plane of solutions, in which w = conj(m) z represents two conics. These meet
+in four points, so that there are four dyads, real or complex (L. Burmester, Lehrbuch der Kinematik, 1888; J. M. McCarthy and
+G. S. Soh, Geometric Design of Linkages, 2nd ed., 2011, chapter 5). Two real dyads make a four-bar: there are at most six, each
+driven from either side. All are checked for defects, so that the answer "none is sound" is a proof for these poses. Four poses
+leave a cubic curve of points z, each with its pivot m.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from ..task.task import Motion, PrecisionPoints, Task, normal_form
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Poses = PrecisionPoints | Motion
-#: Below this share of the largest singular value the conditions of the poses are not independent.
+#: Singular value, relative to the largest, below which the conditions of the poses are not independent.
 INDEPENDENT = 1e-10
 #: Imaginary part, in units of the poses' size, up to which a dyad is real.
 REAL = 1e-7
-#: Points of the curve of four poses, on each of the two branches that a line through its pole meets.
+#: Points of the curve of four poses on each of its two branches, which a line through its pole meets.
 CURVE_POINTS = 180
-#: Links longer than this many times the poses' size are left out of the map of four poses, as in a search without bounds.
+#: Greatest length of links, in sizes of the poses, in the map of four poses, as in a search without bounds.
 LONGEST = 5.0
 
 
@@ -58,12 +58,12 @@ class Dyad:
 
     @property
     def length(self) -> float:
-        """Return its length (m)."""
+        """Return the length of the link (m)."""
         return abs(self.point - self.pivot)
 
 
 class Exact(Shown):
-    """Linkages in closed form, sound or not."""
+    """Linkages found in closed form, with and without defects."""
 
     __slots__ = ()
 
@@ -84,18 +84,18 @@ class Exact(Shown):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Guidance(Exact):
-    """Every four-bar that carries a body exactly through five poses, sound or not.
+    """All four-bars that carry a body exactly through five poses, with and without defects.
 
     Attributes
     ----------
     task : PrecisionPoints or Motion
     dyads : tuple of Dyad
-        The real ones; of five poses there are four, two or none.
+        The real dyads; five poses have four, two or none.
     complex_dyads : int
-        How many are complex, and so cannot be built.
+        Number of complex dyads, which cannot be built.
     nearest_complex : float
-        Imaginary part of the complex ones, the least, as a share of the poses' size: next to zero a small change of the
-        poses makes them real. Infinite where there are none.
+        Least imaginary part of the complex dyads, as a fraction of the poses' size: if it is close to zero, a small change of
+        the poses makes a pair real. Infinite if all are real.
     solutions : tuple of Solution
         Each pair of dyads, driven from either side; sound ones first, then by transmission angle.
     """
@@ -120,21 +120,21 @@ class Guidance(Exact):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GuidanceMap(Shown):
-    """The four-bars that carry a body exactly through four poses: two points of a curve of dyads.
+    """Four-bars that carry a body exactly through four poses: each consists of two dyads of a curve.
 
     Attributes
     ----------
     task : PrecisionPoints or Motion
     pivots, points : ndarray of complex, shape (n,)
-        The centre-point and the circle-point curve, place by place a dyad (m); sampled by the lines through a pole, which meet
-        the curve twice more.
+        Samples of the centre-point and the circle-point curve, a dyad at each index (m). Lines through a pole of two poses give
+        the samples: each meets the curve in two further points.
     sound : ndarray of bool, shape (n, n)
         Whether the linkage with the crank of a row and the rocker of a column is free of defects.
     transmission : ndarray, shape (n, n)
-        Least distance of its transmission angle from 0 and pi on the way from the first pose to the last (rad); 0 where it is
-        not sound.
+        Least deviation of its transmission angle from 0 and pi between the first pose and the last (rad); 0 if the linkage
+        has a defect.
     solutions : tuple of Solution
-        The best by that angle, different ones.
+        The best different linkages by that angle.
     """
 
     task: Poses
@@ -162,20 +162,20 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
     Parameters
     ----------
     task : PrecisionPoints or Motion
-        Poses: points with angles, no crank rotations.
+        The poses: points with angles, without crank rotations.
     count : int
-        Of four poses, solutions that are returned.
+        Number of solutions that are returned for four poses.
 
     Returns
     -------
     Guidance or GuidanceMap
-        Of five poses, of four.
+        `Guidance` for five poses, `GuidanceMap` for four.
 
     Raises
     ------
     InputError
-        If there are not four or five poses, the crank rotations are given, or the poses leave more freedom: two are the same,
-        or the body does not turn.
+        If there are not four or five poses, crank rotations are given, or the poses are degenerate: two are the same, or the
+        body does not rotate.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
 
 
 def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
-    """Return the places and angles, four or five of each; raises InputError as `guidance`."""
+    """Return the positions and angles of the four or five poses; raises InputError as `guidance` does."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
         raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
     if task.rotation is not None:
@@ -207,19 +207,19 @@ def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
 
 
 def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the four dyads of five poses, complex ones too.
+    """Compute the four dyads of five poses, including complex ones.
 
     Parameters
     ----------
     p : ndarray of complex, shape (5,)
-        Places of the body's reference point, from the first, in units of the poses' size.
+        Positions of the body's reference point relative to the first one, in units of the poses' size.
     angle : ndarray, shape (5,)
         rad.
 
     Returns
     -------
     z, m : ndarray of complex, shape (4, 2)
-        Cartesian parts of the point from the first place, and of the pivot: real numbers of a dyad that can be built.
+        Cartesian coordinates of point and pivot relative to the first position; real for a dyad that can be built.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
 
 
 def _forms() -> tuple[FloatArray, FloatArray]:
-    """Return the quadratic forms by which w = conj(m) z, of (1, zx, zy, mx, my, wx, wy)."""
+    """Return the quadratic forms in (1, zx, zy, mx, my, wx, wy) that are zero if w = conj(m) z."""
     real, imaginary = np.zeros((7, 7)), np.zeros((7, 7))
     real[0, 5], real[3, 1], real[4, 2] = -1.0, 1.0, 1.0
     imaginary[0, 6], imaginary[3, 2], imaginary[4, 1] = -1.0, 1.0, -1.0
@@ -272,7 +272,7 @@ def _kernel(rows: FloatArray, size: int) -> FloatArray:
 
 
 def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
-    """Intersect two conics: (x, y, 1) in rows, shape (4, 3), from the resultant of their quadratics in x."""
+    """Intersect two conics by the resultant of their quadratics in x; return points (x, y, 1) in rows, shape (4, 3)."""
 
     def quadratics(y: complex) -> list[tuple[complex, complex, complex]]:
         return [
@@ -298,7 +298,7 @@ def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
 
 
 def _polished(rows: FloatArray, v: ComplexArray) -> ComplexArray:
-    """Polish a solution (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
+    """Refine a solution (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
     for _ in range(8):
         zx, zy, mx, my = v
         full = np.array([1.0, zx, zy, mx, my, mx * zx + my * zy, mx * zy - my * zx])
@@ -341,7 +341,7 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
 
 
 def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
-    """Make the four-bar of two dyads, and judge it from the first pose to the last."""
+    """Build the four-bar from two dyads, and check it for defects from the first pose to the last."""
     points, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
     turned = np.exp(1j * (angle - angle[0]))
     b, c = (points + turned * (dyad.point - points[0]) for dyad in (crank, rocker))
@@ -366,10 +366,10 @@ def four_bar(task: Poses, crank: Dyad, rocker: Dyad) -> Solution:
 
 
 def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: FloatArray) -> Solution:
-    """Judge a linkage that meets all targets; ``sides`` is the assembly at each, +1 with C to the left of B -> D.
+    """Check a linkage that meets all targets for defects; ``sides`` is its assembly at each, +1 with C to the left of B -> D.
 
-    Where the targets lie on both assemblies there is a branch defect; and a circuit defect if, by Grashof's criterion, one
-    cannot be reached from the other.
+    If the targets need both assemblies there is a branch defect; there is also a circuit defect if, by Grashof's criterion, the
+    linkage cannot pass from one assembly to the other.
     """
     verdicts = judge(linkage, rotation, closed=False)
     if (sides != sides[0]).any():
@@ -379,7 +379,7 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
 
 
 def in_order(turned: FloatArray) -> FloatArray:
-    """Return angles, known to within whole turns, as rotations from the first that go one way if they can."""
+    """Return angles, known up to whole turns, as rotations from the first one, monotonic if that is possible."""
     forward = turned % (2.0 * pi)
     # the first is 0, also where rounding made it a whole turn
     forward[0] = 0.0
@@ -390,10 +390,10 @@ def in_order(turned: FloatArray) -> FloatArray:
 
 
 def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the circle-point curve of four poses, from the first place, and the pivots, where both are finite.
+    """Compute points of the circle-point curve of four poses, relative to the first position, and their pivots.
 
-    The condition that three lines in m meet is a cubic in z that vanishes at the pole of two poses: a line through it meets the
-    curve twice more.
+    Each pose gives a line for the pivot m. The condition that the three lines meet is a cubic in z, which is zero at the pole
+    of two poses: a line through the pole meets the curve in two further points. Points with an infinite pivot are left out.
 
     Raises InputError if the poses are not independent.
     """
@@ -426,7 +426,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _lines(row: FloatArray, z: complex) -> FloatArray:
-    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot of a point z; all are linear in z."""
+    """Return the coefficients of a pose's condition a mx + b my + c = 0 on the pivot of a point z; each is linear in z."""
     turned = complex(-row[5], row[6]) * z
     constant = row[0] + row[1] * z.real + row[2] * z.imag
     return np.array([row[3] - turned.real, row[4] - turned.imag, constant])
@@ -457,7 +457,7 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
 
 
 def _pairs(p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Judge every pair of crank (row) and rocker (column): soundness and transmission angle of `GuidanceMap`."""
+    """Check every pair of crank (row) and rocker (column): ``sound`` and ``transmission`` of `GuidanceMap`."""
     places = p[:, None] + e[:, None] * z
     arms = places - m
     turned = np.array([in_order(np.angle(column / column[0])) for column in arms.T])

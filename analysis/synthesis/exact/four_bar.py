@@ -1,14 +1,14 @@
-"""Function generation in closed form: every four-bar whose rocker is at three to five angles exactly.
+"""Function generation in closed form: find every four-bar whose rocker passes exactly through three to five angles.
 
 Loop closure without the coupler's angle is Freudenstein's equation (F. Freudenstein, Approximate synthesis of four-bar
 linkages, Trans. ASME 77, 1955), with th2 = phi + th20 and th4 = psi - the output's mounting angle,
 
     R1 cos th4 - R2 cos th2 + R3 = cos(th2 - th4),   R1 = l1/l2,  R2 = l1/l4,  R3 = (l1^2 + l2^2 - l3^2 + l4^2)/(2 l2 l4).
 
-Three points give R1, R2, R3 where both angles of mounting are known. A fourth leaves one of them free: the determinant of
-the four equations is a trigonometric polynomial of second degree in it. A fifth leaves both free: seen from the crank, the
-rocker is a body at five poses, and C stays at one distance from B, which is `burmester`'s problem. One of its four dyads is
-always C on D with B on A, so that there are at most three linkages.
+Three points determine R1, R2, R3 if crank phase and mounting angle are known. With a fourth point one of the two is unknown:
+the determinant of the four equations is a trigonometric polynomial of second degree in it. With a fifth point both are
+unknown: relative to the crank the rocker is a body in five poses, and C has a constant distance from B, which is the problem
+of `burmester`. One of its four dyads is always C on D with B on A, so that there are at most three linkages.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .burmester import INDEPENDENT, REAL, Exact, dyads_of_five, exact_solution
 FloatArray = NDArray[np.float64]
 #: Crank, coupler and rocker in units of the ground link; the crank's phase and the output's mounting (rad).
 Links = tuple[float, float, float, float, float]
-#: The ground link of a function generator where none is asked for (m), as in a search.
+#: Default ground link of a function generator (m), as in a search.
 GROUND = 0.1
 #: Distance from the unit circle up to which a root of the determinant is an angle.
 ON_CIRCLE = 1e-6
@@ -40,7 +40,7 @@ ON_CIRCLE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Generators(Exact):
-    """Every four-bar that does a function exactly at its points.
+    """All four-bars that generate a function exactly at its points.
 
     Attributes
     ----------
@@ -67,17 +67,17 @@ class Generators(Exact):
 def function_generators(
     task: RockerFunction, *, crank_phase: Amount | None = None, ground_length: Amount = GROUND
 ) -> Generators:
-    """Find all four-bars whose rocker is exactly at the given angles.
+    """Find all four-bars whose rocker passes exactly through the given angles.
 
     Parameters
     ----------
     task : RockerFunction
-        As many points as unknowns: three of the lengths' ratios, one of the crank's phase unless it is given, and one where the
-        output may be mounted at any angle (``mounting``).
+        A function with as many points as unknowns: three ratios of lengths, the crank's phase unless it is given, and the
+        mounting angle if it is free (``mounting``).
     crank_phase : float, optional
-        th20 (rad), where it is given.
+        th20 (rad), if it is known.
     ground_length : float
-        m: a function leaves the size free.
+        Length of the ground link (m); the size does not affect the function.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def function_generators(
 
 
 def _count_message(n: int, free: int, mounting: bool, crank_phase: object) -> str:
-    """Return the message for a number of points other than that of the unknowns."""
+    """Return the message for a number of points that differs from the number of unknowns."""
     unknown = ["three ratios of lengths"]
     unknown += ["the crank's phase"] if crank_phase is None else []
     unknown += ["the output's mounting"] if mounting else []
@@ -132,9 +132,9 @@ def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
 
 
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:
-    """Compute the links, in units of the ground link, from points that agree in R1, R2, R3; None if no coupler is real.
+    """Compute the links, in units of the ground link, from points with common R1, R2, R3; None if the coupler is not real.
 
-    A link of negative length is one that points the other way.
+    A negative length means that the link points in the opposite direction.
 
     Raises InputError if the points leave infinitely many linkages.
     """
@@ -162,7 +162,7 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
 
 
 def _five_point_links(phi: FloatArray, psi: FloatArray) -> list[Links | None]:
-    """Compute the links of five points: dyads of the rocker's poses seen from the crank, B the pivot and C the point."""
+    """Compute the links for five points: dyads of the rocker's poses relative to the crank, with pivot B and point C."""
     places = np.exp(-1j * phi)
     parts = dyads_of_five(places, psi - phi)
     real = np.abs(np.hstack(parts).imag).max(axis=1) <= REAL
@@ -184,7 +184,7 @@ def _make_generator(
     crank_phase: float,
     mounting: float,
 ) -> Solution:
-    """Make the four-bar with these links, in units of the ground link, and judge it from the first point to the last."""
+    """Build the four-bar with these links, in units of the ground link, and check it from the first point to the last."""
     th2 = np.asarray(task.rotation) + crank_phase
     th4 = np.asarray(task.angle) - mounting
     b, c = crank * np.exp(1j * th2), 1.0 + rocker * np.exp(1j * th4)
@@ -201,7 +201,7 @@ def _make_generator(
     return exact_solution(task, linkage, np.asarray(task.rotation), sides)
 
 
-#: Rotations between two stations at which a link's angle is followed.
+#: Rotations between two stations at which a link's angle is tracked.
 BETWEEN = 90
 
 
@@ -211,14 +211,15 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
     Parameters
     ----------
     linkage : Linkage
-        With a fixed rocker pivot, its coupler point neither B nor C.
+        A four-bar with a fixed rocker pivot whose coupler point is neither B nor C.
     rotation : float
-        Crank rotation (rad) at which the cognates are where theirs is 0, but for the first, whose rotation is the original's.
+        Crank rotation of the original (rad) at which the rotation of the second and third cognate is 0; the first cognate
+        has the rotation of the original.
 
     Returns
     -------
     tuple of Linkage
-        That on G and D, driven at G; that on A and G, driven at A; the same, driven at G.
+        The cognate on G and D, driven at G; the one on A and G, driven at A; the same one, driven at G.
 
     Raises
     ------
@@ -254,7 +255,8 @@ def cognates(linkage: Linkage, rotation: ArrayLike = 0.0) -> tuple[Linkage, Link
 def alternatives(solution: Solution) -> tuple[Solution, ...]:
     """Return the cognates of a solution as solutions of its task: the same curve from other pivots.
 
-    A task with crank rotations keeps the one that turns with the crank; a closed path those that can turn fully.
+    For a task with crank rotations only the one that turns with the crank is returned; for a closed path those whose cranks
+    can turn fully.
 
     Returns
     -------
@@ -264,7 +266,7 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
     Raises
     ------
     InputError
-        If the task is not one of a path: the cognates' couplers turn otherwise.
+        If the task is not a path: the couplers of cognates have other angles.
     ParameterError
         As `cognates`.
     AssemblyError
@@ -289,7 +291,7 @@ def alternatives(solution: Solution) -> tuple[Solution, ...]:
 
 
 def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the assemblies along the way of the cognates on A and G, driven at A and at G: +1 with C to the left of B -> D."""
+    """Return the assemblies over the task of the cognates on A and G, driven at A and at G: +1 with C to the left of B -> D."""
     k = _place_on_coupler(linkage)
     g = linkage.directions(rotation)
     # from A, the ground link along the real axis
@@ -337,7 +339,7 @@ def _place_on_coupler(linkage: Linkage) -> complex:
 
 
 def _pinned_four_bar(a: complex, b: complex, c: complex, d: complex, p: complex) -> Linkage:
-    """Make the four-bar with these pins at a crank rotation of 0."""
+    """Build the four-bar with these pins at a crank rotation of 0."""
     ground, arm, coupler, to_point = d - a, b - a, c - b, p - b
     return Linkage(
         pivot_x=a.real,

@@ -1,14 +1,14 @@
-"""The best slider-crank of a stroke, or crank-rocker of a swing, with a given time ratio, in closed form.
+"""Find the best slider-crank for a stroke, or crank-rocker for a swing, with a given time ratio, in closed form.
 
-In the dead centres C is l3 + l2 and l3 - l2 away from A, the two directions advance = pi (Q - 1)/(Q + 1) apart, so that by the
-laws of cosines and sines
+In the dead centres C has the distances l3 + l2 and l3 - l2 from A, in two directions with the angle
+advance = pi (Q - 1)/(Q + 1) between them. The laws of cosines and sines give
 
     l2^2 (1 + cos advance) = H^2/2 - l3^2 (1 - cos advance),    l1 H = (l3^2 - l2^2) sin advance
 
-with the stroke H, the time ratio Q and the offset l1. That leaves l3, for which (l1 + l2)/l3, the cosine of the least
-transmission angle, is minimised. Of a crank-rocker C is in the same two places, their distance the chord
-H = 2 l4 sin(swing/2) of its swing about D, which lies on A's side of that chord where a crank that turns to the left is slow
-while the rocker turns to the left. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
+with the stroke H, the time ratio Q and the offset l1. One unknown remains, l3; it minimises (l1 + l2)/l3, the cosine of the
+least transmission angle. For a crank-rocker the same holds for the two positions of C, whose distance is the chord
+H = 2 l4 sin(swing/2) of its swing about D. D lies on A's side of that chord if a crank that turns counter-clockwise is slow
+while the rocker turns counter-clockwise. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 3 and 4.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ..task.limits import GROUND, LARGEST
 from ..task.task import RockerFunction, SliderFunction
 
 FloatArray = NDArray[np.float64]
-#: Couplers that are looked at before the best is found exactly.
+#: Number of couplers that are tried before the best one is found exactly.
 COUPLERS = 2001
 #: Dimensions of a slider-crank that bounds may be of.
 BOUNDED = ("ground_length", "crank_length", "coupler_length")
@@ -43,16 +43,16 @@ BOUNDED = ("ground_length", "crank_length", "coupler_length")
 @in_si(stroke="m")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class QuickReturn(SliderFunction):
-    """The slider goes a stroke along the x axis in the slow part of a turn, and back in the quick one.
+    """Task: the slider moves by a stroke along the x axis in the slow part of a turn, and back in the quick part.
 
     Attributes
     ----------
     stroke : float
         m.
     time_ratio : float
-        Time of the way out over that of the way back, the crank turning evenly: 1 at least.
+        Duration of the slow stroke divided by that of the quick one, at constant crank speed: 1 at least.
     position, rotation : ndarray, shape (3,)
-        Made of them: 0, the stroke, and 0 again.
+        Computed from these: 0, the stroke, and 0 again.
     """
 
     stroke: Amount
@@ -71,24 +71,24 @@ class QuickReturn(SliderFunction):
 
     @property
     def advance(self) -> float:
-        """Return the crank's rotation in the slow part beyond half a turn (rad)."""
+        """Return the crank rotation of the slow part minus half a turn (rad)."""
         return _advance(self.time_ratio)
 
 
 @in_si(swing="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class QuickSwing(RockerFunction):
-    """The rocker of a crank-rocker turns by an angle in the slow part of a turn, and back in the quick one.
+    """Task: the rocker of a crank-rocker turns by an angle in the slow part of a turn, and back in the quick part.
 
     Attributes
     ----------
     swing : float
-        To the left, the crank turning to the left (rad), short of half a turn; below zero both turn to the right, which is the
-        same seen from behind.
+        Swing of the rocker, counter-clockwise while the crank turns counter-clockwise (rad), less than half a turn. If it is
+        negative both turn clockwise, which is the same linkage seen from behind.
     time_ratio : float
-        As of `QuickReturn`.
+        See `QuickReturn`.
     angle, rotation : ndarray, shape (3,)
-        Made of them: 0, the swing, and 0 again, from any mounting angle.
+        Computed from these: 0, the swing, and 0 again, from any mounting angle.
     """
 
     swing: Amount
@@ -108,7 +108,7 @@ class QuickSwing(RockerFunction):
 
 
 def _advance(time_ratio: float) -> float:
-    """Return the crank's rotation in the slow part beyond half a turn (rad).
+    """Return the crank rotation of the slow part minus half a turn (rad).
 
     Raises ParameterError if the time ratio is not a finite number of 1 or more.
     """
@@ -120,10 +120,10 @@ def _advance(time_ratio: float) -> float:
 def quick_returns(
     task: QuickReturn | QuickSwing, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Any]
 ) -> tuple[Solution, ...]:
-    """Find the linkage with the greatest least transmission angle, in either assembly.
+    """Find the linkage whose least transmission angle is greatest, in either assembly.
 
-    Raises InputError if a bound or a constraint is none that this can keep; InfeasibleError if there is none; it says what
-    transmission angle can be had.
+    Raises InputError if a bound or a constraint is not supported here; InfeasibleError if there is no linkage, with the
+    greatest transmission angle that is possible.
     """
     for c in constraints:
         if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):
@@ -163,7 +163,7 @@ def _least_angle(constraints: Sequence[Any]) -> float:
 
 
 def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -> float:
-    """Find the coupler between two lengths that has the least cosine of the transmission angle."""
+    """Find the coupler length, between two bounds, that minimises the cosine of the transmission angle."""
     couplers = np.linspace(*ends, COUPLERS)
     cosines = np.array([cosine(float(l3)) for l3 in couplers])
     best = int(np.argmin(cosines))
@@ -173,7 +173,7 @@ def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -
 
 
 class _Swing:
-    """Crank-rockers of a swing and a time ratio, one for each ratio of coupler to rocker, sized by the bounds."""
+    """Crank-rockers with a given swing and time ratio: l3 is the ratio of coupler to rocker, the bounds determine the size."""
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
@@ -189,7 +189,7 @@ class _Swing:
         self.chord = chord
 
     def links(self, l3: float) -> tuple[float, float, float, float] | None:
-        """Return l1 ... l4 (m); None where the dead centres are not of one assembly, or a bound is not kept."""
+        """Return l1 ... l4 (m); None if the dead centres need both assemblies, or a bound is violated."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
         x, y = far - 0.5 * self.chord, sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
@@ -208,7 +208,7 @@ class _Swing:
         return made if kept else None  # type: ignore[return-value]
 
     def cosine(self, l3: float) -> float:
-        """Return the cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
+        """Return the cosine of the least transmission angle over a turn; 1 without a linkage, or if a bound is violated."""
         links = self.links(l3)
         if links is None:
             return 1.0
@@ -217,7 +217,7 @@ class _Swing:
         return min(1.0, max(both))
 
     def linkage(self, l3: float, branch: int) -> Linkage:
-        """Make the crank-rocker, starting from the dead centre at which the slow part begins."""
+        """Build the crank-rocker; its rotation is 0 in the dead centre at which the slow part begins."""
         links = self.links(l3)
         assert links is not None
         l1, l2, l3, l4 = links
@@ -265,7 +265,7 @@ def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
 
 
 def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]]) -> float:
-    """Return the cosine of the least transmission angle over a turn; 1 where that is none, or a bound is not kept."""
+    """Return the cosine of the least transmission angle over a turn; 1 without a linkage, or if a bound is violated."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     for name, value in (("ground_length", l1), ("crank_length", l2)):
         low, high = ends[name]
@@ -275,7 +275,7 @@ def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]
 
 
 def _linkage(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
-    """Make the slider-crank, its guide below the shaft: a crank that turns to the left goes slowly to the right."""
+    """Build the slider-crank with its guide below the shaft: a crank that turns counter-clockwise is slow to the right."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
     # crank angle where the slider is at 0: folded, or on the other side of the shaft in line

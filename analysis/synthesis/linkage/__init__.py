@@ -1,4 +1,4 @@
-"""Linkages in the plane: their dimensions and motion, the compiled curves of their coupler points, their masses and pin forces.
+"""Model planar linkages: dimensions, motion and coupler curves, compiled; masses and pin forces.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

@@ -1,14 +1,14 @@
-"""Compiled kernels: the path of the coupler point and its exact derivatives, for many crank angles or many linkages.
+"""Compute coupler curves and their exact derivatives for many crank angles or many linkages: compiled kernels.
 
 The loop is closed by `kinematics.joined`, the plant's own function; the derivatives are those of loop closure, projected on
 the rocker and on the coupler as in `kinematics.coefficients`, with respect to every dimension. The loops run over arrays
-without branches, so that the compiler takes several crank angles at a time; where the links cannot be joined the square root
-leaves a NaN, which the callers look for.
+without branches, so that the compiler can vectorise over crank angles; if the links cannot be joined the square root is NaN,
+which the callers check.
 
 A linkage is the vector ``q`` of `PLACES`: the thesis's ten parameters in its order. Crank directions come as cosines and
-sines of the crank's rotation, which a timed task knows beforehand; the rocker pivot D may be moved by (dx, dy) in the frame
-of the ground link, which is how a slider or a second crank enters. With a rocker of length zero there is none: C is on a
-guide at right angles to the ground link at its end, which is a rocker whose pivot lies at infinity.
+sines of the crank's rotation, which a timed task knows beforehand. The rocker pivot D may be displaced by (dx, dy) in the frame
+of the ground link: by a slider or a second crank. A rocker of length zero means a slider-crank: C runs on a guide at the end of
+the ground link, at right angles to it, which is a rocker whose pivot lies at infinity.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 
 
 def guided(c2, s2, dx, dy, l3, l4, branch):
-    """Close the loop with C on a guide at right angles to the ground link, a distance dx from B; see `joined`.
+    """Close the loop with C on a guide at right angles to the ground link, at the distance dx from B; see `joined`.
 
-    Of CasADi's symbols too. For branch +1 C lies to the left of the way from B to the guide.
+    The arguments may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from B to the guide.
     """
     c3 = dx / l3
     s3 = branch * (1.0 - c3 * c3) ** 0.5
@@ -39,7 +39,7 @@ joined, _guided = inner(kinematics.joined), inner(guided)
 
 @inner
 def closed(c2, s2, dx, dy, l3, l4, branch):
-    """Close the loop of a four-bar, or of a slider-crank where there is no rocker."""
+    """Close the loop of a four-bar, or of a slider-crank if the rocker has length zero."""
     if l4 > 0.0:
         return joined(c2, s2, dx, dy, l3, l4, branch)
     return _guided(c2, s2, dx, dy, l3, l4, branch)
@@ -209,12 +209,12 @@ def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
 
 @kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX), purpose="the curves of linkages")
 def match_windows(curves, target, starts, spans, best):
-    """Find the piece of each curve that is most like an open target, up to a similarity.
+    """Find the piece of each curve that fits an open target best, up to position, rotation and scale.
 
-    Each curve is given at even steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and goes over
-    one of ``spans`` steps. It is compared at even arc length with the target, given at even arc length about its mean, shape
-    (k,), run through forwards and backwards. ``best`` takes (misfit as a share of the target's sum of squares, start, span,
-    direction), shape (m, 4). Pieces with a point that is not finite are passed over.
+    Each curve is given at equal steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and has one
+    of ``spans`` steps. It is compared at equal steps of arc length with the target, relative to its mean, shape (k,), forwards
+    and backwards. ``best`` receives (misfit relative to the target's sum of squares, start, span, direction), shape (m, 4).
+    Pieces with a point that is not finite are skipped.
     """
     m, n = curves.shape
     k = target.shape[0]

@@ -1,4 +1,4 @@
-"""The kinds of linkages that a synthesis searches. This module imports nothing heavy: the studio's server starts with it."""
+"""Name the kinds of linkages that a synthesis searches. The studio's server loads this module first, so it imports little."""
 
 from typing import Literal
 

@@ -1,6 +1,6 @@
-"""Linkages in the plane: the four-bar of the thesis's chapter VI, the slider-crank, and the five-bar with two cranks.
+"""Define planar linkages: the four-bar of the thesis's chapter VI, the slider-crank, and the five-bar with two cranks.
 
-Each is a type that answers what the search, the report and the drawing ask of it.
+Each is a type with the methods that search, report and drawing need.
 
 The coupler point is, with the thesis's symbols (appendix 5),
 
@@ -34,13 +34,13 @@ from .kind import Kind
 from .pivot import SecondCrank, SliderMotion, format_ratio, geared
 
 FloatArray = NDArray[np.float64]
-#: Of a linkage: what must be greater than zero, what is a length of any sign, what is an angle.
+#: Dimensions of a linkage: those greater than zero, lengths of any sign, angles.
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
 #: Their units.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
-#: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
+#: Grashof types of a four-bar with a link that turns fully, by its shortest link, in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations at which a full turn is evaluated.
 TURN = 360
@@ -59,15 +59,15 @@ def bar(length: Any, line: float, width: float) -> tuple[Any, Any]:
 
 
 def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool) -> dict[str, Any]:
-    """Return the masses, moments of inertia and centres of mass, by their names in `FiveBarParameters`.
+    """Return masses, moments of inertia and centres of mass, by their names in `FiveBarParameters`.
 
-    Crank and rocker are bars between their pins. The coupler is one from B to C and a second from B to P; where P is on the
-    line of B and C, ``straight``, one over all of it.
+    Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
+    and C (``straight``), it is one bar over the whole length.
 
     Parameters
     ----------
     l2, l3, l4, r, a2 : float
-        Links, distance and direction of the coupler point (m, rad).
+        Lengths of crank, coupler and rocker; distance and direction of the coupler point (m, rad).
     line : float
         kg/m.
     width : float
@@ -126,7 +126,7 @@ class Linkage:
     crank_phase : float
         th20: crank angle from the ground link at the start of the motion.
     output_angle : float
-        Mounting angle of what is read on the rocker, or carried by the coupler, from the link's own direction.
+        Mounting angle of the output pointer on the rocker, or of the body on the coupler, relative to the link's direction.
     branch : int
         Assembly: +1 with C to the left of B -> D, -1 to the right.
     pivot : SliderMotion, optional
@@ -135,8 +135,7 @@ class Linkage:
     Raises
     ------
     ParameterError
-        If a value is not finite, a link not longer than zero, the branch neither +1 nor -1, or the pivot is moved by something
-        else.
+        If a value is not finite, a link not longer than zero, the branch neither +1 nor -1, or the pivot of another type.
     """
 
     kind: ClassVar[Kind] = "four-bar"
@@ -189,7 +188,7 @@ class Linkage:
 
     @property
     def turns(self) -> int:
-        """Return the turns of the crank for one of the shaft whose rotation is given, more than 1 with gears such as 1/2."""
+        """Return the turns of the crank per turn of the input shaft: more than 1 with gears such as 1/2."""
         return 1
 
     def crank_angle(self, rotation: ArrayLike) -> FloatArray:
@@ -199,7 +198,7 @@ class Linkage:
 
     @classmethod
     def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
-        """Make a linkage from the vector of `kernels.PLACES`, the output angle as an eleventh if it is there."""
+        """Build a linkage from the vector of `kernels.PLACES`; an eleventh component is the output angle."""
         values = dict(zip((*PLACES, "output_angle"), np.asarray(q, dtype=float).tolist()))
         own = {f.name for f in fields(cls) if f.init}
         return cls(**{name: value for name, value in values.items() if name in own}, branch=branch, **more)
@@ -234,9 +233,9 @@ class Linkage:
         return np.cos(turned), np.sin(turned), dx, dy, self.vector, float(self.branch)
 
     def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
-        """Return the coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined.
+        """Return the coupler point at crank rotations, shape (n, 2) in m; NaN if the links cannot be joined.
 
-        ``displacement`` of the rocker pivot takes the place of what its own motion is, as in `directions`.
+        ``displacement`` of the rocker pivot replaces the one by its own motion, as in `directions`.
         """
         out = np.empty((2, np.size(rotation)))
         coupler_path(*self._arguments(rotation, displacement), out)
@@ -277,7 +276,7 @@ class Linkage:
     def slider(self, rotation: ArrayLike) -> tuple[FloatArray, float] | None:
         """Return the position of the slider on its guide from E (m), and the guide's direction from the ground link (rad).
 
-        None of a linkage without a slider.
+        None for a linkage without a slider.
         """
         return (self.pivot.series(rotation), self.pivot.guide_angle) if isinstance(self.pivot, SliderMotion) else None
 
@@ -288,9 +287,9 @@ class Linkage:
         return angle
 
     def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
-        """Return the places of A, B, C, D, the end E of the ground link, and P in the plane (m) at one rotation of the crank.
+        """Return the positions of A, B, C, D, the end E of the ground link, and P in the plane (m) at one crank rotation.
 
-        D of a slider-crank is the slider, where C is.
+        For a slider-crank D is the slider, at C.
 
         Raises
         ------
@@ -316,22 +315,22 @@ class Linkage:
         return {name: (float(z.real), float(z.imag)) for name, z in places.items()}
 
     def with_pivot(self, pivot: SliderMotion | SecondCrank | None) -> Linkage:
-        """Return the linkage with another motion of its rocker pivot: a five-bar with a second crank, else a four-bar."""
+        """Return the linkage with another motion of its rocker pivot: with a second crank a five-bar, otherwise a four-bar."""
         made: Callable[..., Linkage] = FiveBar if isinstance(pivot, SecondCrank) else Linkage
         return made(**self.values(), pivot=pivot)
 
     def moved(self, x: float, y: float) -> Linkage:
-        """Return the same linkage elsewhere (m)."""
+        """Return the same linkage shifted by (x, y) in the plane (m)."""
         return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
 
     def scaled(self, factor: float) -> Linkage:
-        """Return the linkage with every length, and the place of A, multiplied by the factor."""
+        """Return the linkage with every length, and the position of A, multiplied by the factor."""
         lengths = {f.name: factor * getattr(self, f.name) for f in fields(self) if f.init and f.name in LENGTHS}
         return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scaled(factor))
 
     @property
     def grashof(self) -> str:
-        """Return the type of a four-bar by Grashof's criterion, the rocker pivot at the end of the ground link.
+        """Return the type of the four-bar by Grashof's criterion, with the rocker pivot at the end of the ground link.
 
         One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
         does not), triple-rocker, change-point.
@@ -346,11 +345,11 @@ class Linkage:
 
     @property
     def title(self) -> str:
-        """Return Grashof's type, or what moves the pivot: the four lengths then say nothing of who can turn."""
+        """Return Grashof's type, or the kind of a moving pivot, for which Grashof's criterion does not hold."""
         return self.grashof if self.pivot is None else "four-bar with a moved pivot"
 
     def reach(self, rotation: ArrayLike) -> FloatArray:
-        """Return the distance from B to D, of a slider-crank along the ground link from B to the guide (m)."""
+        """Return the distance from B to D; for a slider-crank that from B to the guide, along the ground link (m)."""
         dx, dy = self.displacement(rotation)
         th2 = self.crank_angle(rotation)
         along = self.ground_length + dx - self.crank_length * np.cos(th2)
@@ -364,38 +363,38 @@ class Linkage:
 
     @staticmethod
     def closure() -> Callable[..., Any]:
-        """Return the plant's closure of the loop for CasADi's symbols, see `kernels.guided`."""
+        """Return the plant's function that closes the loop, for CasADi symbols; see `kernels.guided`."""
         joined: Callable[..., Any] = traced(FIVE_BAR).joined
         return joined
 
     @staticmethod
     def square(along: Any, across: Any) -> Any:
-        """Return the square of `distance`, of symbols too."""
+        """Return the square of `distance`, also for symbols."""
         return along * along + across * across
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return the left sides of g <= 0 that keep the magnitude of cos mu at C below a cosine, without division.
+        """Return g of the constraints g <= 0 that bound the magnitude of cos mu at C by ``cosine``, written without division.
 
-        Of numbers, arrays and symbols; ``nearest`` and ``farthest`` are the squares of the least and the greatest `reach`.
+        It accepts numbers, arrays and symbols; ``nearest`` and ``farthest`` are the squares of the least and greatest `reach`.
         """
         joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
         return joint - nearest - product, farthest - joint - product
 
     @staticmethod
     def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
-        """Return the derivative of `transmission_excess` by the cosine."""
+        """Return the derivative of `transmission_excess` with respect to the cosine."""
         return 2.0 * l3 * l4
 
     @staticmethod
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
-        """Return how far an extreme of `square` may be off its value half a step away, a rotation of that cosine."""
+        """Return the greatest change of `square` from its extreme over a crank rotation with this cosine."""
         return 2.0 * l1 * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
         """Return the cosine of the angle between coupler and rocker, from `reach`.
 
-        It is beyond -1 and 1 where the links cannot be joined.
+        It is outside [-1, 1] if the links cannot be joined.
         """
         l3, l4 = self.coupler_length, self.rocker_length
         cosine: FloatArray = (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
@@ -404,8 +403,8 @@ class Linkage:
     def transmission_range(self) -> tuple[float, float]:
         """Return the least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
 
-        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is found over `TURN`
-        rotations. Where the crank cannot turn fully the extremes are 0 or pi.
+        With a fixed pivot the extremes are at the crank along the ground link; with a moving one they are found over `TURN`
+        rotations. If the crank cannot turn fully the extremes are 0 or pi.
         """
         if self.pivot is None:
             d = np.array([self.ground_length - self.crank_length, self.ground_length + self.crank_length])
@@ -423,7 +422,7 @@ class Linkage:
 
     @property
     def turns_fully(self) -> bool:
-        """Return whether the crank can turn fully, with the pivot's own motion."""
+        """Return whether the crank can turn fully, with the motion of the pivot."""
         return self.least_transmission > 0.0
 
     def to_five_bar(
@@ -439,22 +438,22 @@ class Linkage:
     ) -> FiveBarParameters:
         """Return the parameters of the plant and its FMU, with masses from density and section.
 
-        The links are bars, see `bodies`. The plant's x axis is the ground link: gravity comes at the linkage's own
-        inclination. A fixed rocker pivot becomes a slider held by a spring: give it one, or hold it by force.
+        The links are bars, see `bodies`. The plant's x axis is the ground link, so that gravity acts at the linkage's
+        inclination. A fixed rocker pivot becomes a slider: give it a spring, or hold it by a force.
 
         Parameters
         ----------
         density, section : float, (float, float)
-            kg/m3; steel by default. Width in the plane and thickness of every bar (m).
+            Density (kg/m3), steel by default; width in the plane and thickness of every bar (m).
         slider_mass : float, optional
-            kg; by default that of a block of four widths by two widths by four thicknesses.
+            Mass of the slider (kg); by default that of a block of four widths by two widths by four thicknesses.
         slider_stiffness, slider_damping, slider_coulomb_friction, gravity : float
             As in `FiveBarParameters`.
 
         Raises
         ------
         ParameterError
-            If density or section are not greater than zero, it is a slider-crank, or the pivot is on a second crank.
+            If density or section are not greater than zero, the linkage is a slider-crank, or the pivot is on a second crank.
         """
         width, thickness = section
         for name, value in (("density", density), ("section width", width), ("section thickness", thickness)):
@@ -515,7 +514,7 @@ class SliderCrank(Linkage):
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Return the names of the dimensions that it does not have: a rocker, and a coupler point if that is the pin."""
+        """Return the names of the dimensions that it does not have: those of a rocker, and of a coupler point at the pin."""
         return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
 
     def slider_position(self, rotation: ArrayLike) -> FloatArray:
@@ -549,7 +548,7 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return the left side of g <= 0 as of a four-bar; the angle is that between coupler and the normal of the guide."""
+        """Return g of the constraint g <= 0, as for a four-bar; the angle is between coupler and normal of the guide."""
         return (farthest - (l3 * cosine) ** 2,)
 
     @staticmethod
@@ -586,15 +585,15 @@ class FiveBar(Linkage):
 
     @property
     def title(self) -> str:
-        """Return its type with its gears."""
+        """Return the type with the gear ratio."""
         return "five-bar" if self.pivot.series.order else f"five-bar, gears {format_ratio(self.pivot.ratio)}"
 
     @property
     def turns(self) -> int:
-        """Return the turns of the first crank for one of the shaft whose rotation is given."""
+        """Return the turns of the first crank per turn of the input shaft."""
         return geared(self.pivot.ratio)[0]
 
     @property
     def largest_link(self) -> float:
-        """Return the length of the longest link, the second crank's too (m)."""
+        """Return the length of the longest link, including the second crank (m)."""
         return max(self.ground_length, self.crank_length, self.coupler_length, self.rocker_length, self.pivot.length)

@@ -1,4 +1,4 @@
-"""The linkage as a machine: material, speed and load, the plant's parameters, the forces on the pins."""
+"""Turn a linkage into a machine: material, speed and load give the plant's parameters and the pin forces."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from .linkage import Linkage, SliderCrank, on_line
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
-#: Distance of the rocker pivot that stands for one at infinity, in couplers.
+#: Distance of the rocker pivot that represents one at infinity, in coupler lengths.
 FAR = 1e7
-#: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
+#: Stiffness of the slider that represents a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
 
 
@@ -42,21 +42,22 @@ class Make:
     density : float
         kg/m3.
     width, thickness : float
-        Of every bar (m).
+        Width and thickness of every bar (m).
     pin : float, optional
         Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
     slider_mass, slider_stiffness, slider_damping : float, optional
-        Of the slider that carries D (kg, N/m, N.s/m); by default of a block, held so stiffly that it stands for a fixed pivot.
+        Properties of the slider that carries D (kg, N/m, N.s/m); by default of a block on such a stiff spring that D is nearly
+        a fixed pivot.
     slider_coulomb_friction : float
         N.
     gravity : float
         m/s2.
     speed : float
-        Of the crank (rad/s).
+        Crank speed (rad/s).
     crank_mass, coupler_mass, rocker_mass : float, optional
-        In the place of what density and section make of a link (kg); its moment of inertia in proportion.
+        Masses that replace those from density and section (kg); the moments of inertia change in proportion.
     load : (float, float)
-        Force at the coupler point P, in the plane's own directions (N).
+        Components of the force at the coupler point P along the axes of the plane (N).
     """
 
     density: float = entry(Quantity("kg/m**3", above=0.0), 7850.0)
@@ -97,14 +98,14 @@ class Make:
         )
 
     def masses_in_words(self) -> str:
-        """Say where the masses of a file come from, for its head."""
+        """Say where the masses come from, for the head of a file."""
         given = [f"{link}.mass" for link in (*WEIGHED, "slider") if getattr(self, f"{link}_mass") is not None]
         weighed = f"; as given: {', '.join(given)}" if given else ""
         bars = self.describe(forces=False).partition(",")[0]
         return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
 
     def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Replace the masses of `bodies` by those that are given; moments of inertia in proportion."""
+        """Replace the masses of `bodies` by the given ones; the moments of inertia change in proportion."""
         own: dict[str, Any] = {}
         for link in WEIGHED:
             mass, inertia, given = made[f"{link}_mass"], made[f"{link}_inertia"], getattr(self, f"{link}_mass")
@@ -113,19 +114,19 @@ class Make:
         return own
 
     def load_along(self, c: Any, s: Any) -> tuple[Any, Any]:
-        """Return the components of the load along and across the ground link, from cosine and sine of its direction (N)."""
+        """Return the components of the load along and across the ground link (N); c, s are cosine and sine of its direction."""
         x, y = self.load
         return c * x + s * y, c * y - s * x
 
     @property
     def block(self) -> float:
-        """Return the mass of the slider (kg): as given, or of a block of four widths by two widths by four thicknesses."""
+        """Return the mass of the slider (kg): as given, or that of a block of four widths by two widths by four thicknesses."""
         return 32.0 * self.density * self.width**2 * self.thickness if self.slider_mass is None else self.slider_mass
 
     def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:
-        """Return the parameters of the slider-crank's plant, its guide at right angles to the crank shaft.
+        """Return the parameters of the slider-crank's plant, with the guide at right angles to the crank shaft.
 
-        Its rod has its mass on the line of its joints: an arm to a coupler point off that line counts where it projects to.
+        The plant's rod has its mass on the line of its joints: the arm to a coupler point off that line is projected onto it.
         """
         made = self.moving(linkage)
         a1 = linkage.ground_angle
@@ -151,9 +152,9 @@ class Make:
         )
 
     def moving(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the plant for a linkage, its slider free to move.
+        """Return the parameters of the five-bar plant for a linkage, with the slider free to move.
 
-        A slider-crank is a four-bar whose rocker pivot is `FAR` away, its slider the mass at the rocker's end.
+        A slider-crank becomes a four-bar whose rocker pivot is `FAR` away; its slider is the mass at the rocker's end.
         """
         far, sliding, four_bar = FAR * linkage.coupler_length, isinstance(linkage, SliderCrank), linkage
         if sliding:
@@ -171,15 +172,15 @@ class Make:
         return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if sliding else {}))
 
     def sliding(self, far: Any) -> dict[str, Any]:
-        """Return the mass of the slider as that of a rocker whose pivot is so far away (m), see `moving`."""
+        """Return the mass of a rocker, whose pivot is at the distance ``far`` (m), that represents the slider; see `moving`."""
         return {"rocker_mass": self.block, "rocker_inertia": 0.0, "rocker_cog_distance": far}
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
-        """Return the parameters of the plant that a linkage runs as: the slider-crank, or the five-bar with its slider held."""
+        """Return the parameters of the plant that simulates a linkage: slider-crank, or five-bar with its slider held."""
         return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the plant for a linkage, its slider held."""
+        """Return the parameters of the five-bar plant for a linkage, with its slider held."""
         free = self.moving(linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
@@ -197,14 +198,14 @@ FloatArray = NDArray[np.float64]
 PINS = "ABCD"
 #: Samples of a turn that is run.
 SAMPLES = 720
-#: Mass of the slider that stands for a fixed pivot in such a run, in masses of the links.
+#: Mass of the slider that represents a fixed pivot in such a run, relative to the mass of the links.
 HEAVY = 1e8
 
 
 def pin_functions(
     d: Any, make: Make, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
 ) -> dict[str, tuple[Any, Any]]:
-    """Compute the force in each pin along and across the ground link (N), for CasADi's symbols and numbers.
+    """Compute the force on each pin along and across the ground link (N), for CasADi symbols and numbers.
 
     Parameters
     ----------
@@ -214,9 +215,9 @@ def pin_functions(
     crank_angle : column
         th2 (rad).
     straight : bool
-        Whether the coupler point is on the line of B and C, see `masses.bodies`.
+        Whether the coupler point is on the line of B and C, see `bodies`.
     linkage : type
-        Of a slider-crank D is the force of the guide on its slider.
+        Type of the linkage; for a slider-crank the force at D is that of the guide on the slider.
     """
     casadi = symbolic.library()
     kind, plant, law = _traced()
@@ -266,7 +267,7 @@ def pin_functions(
 
 @cache
 def _traced() -> tuple[Any, Any, Any]:
-    """Trace the plant's parameters and functions, and the law of the masses, for CasADi's symbols."""
+    """Trace the plant's parameters and functions, and the mass properties, with CasADi symbols."""
     casadi = symbolic.library()
     plant = of_parameters(FIVE_BAR)
     law = symbolic.traced((geometry,), min=casadi.fmin, max=casadi.fmax)
@@ -282,16 +283,16 @@ _DEFAULTS: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PinForces:
-    """The forces on the pins over a turn at constant speed, or over the way of a task.
+    """Forces on the pins at constant crank speed, over a turn or over the range of a task.
 
     Attributes
     ----------
     rotation : ndarray, shape (n,)
-        Of the crank, from the start of the task (rad).
+        Crank rotations from the start of the task (rad).
     force : ndarray, shape (n, 4)
-        On the pins A to D (N).
+        Forces on the pins A to D (N).
     moved : float
-        How far the slider that stands for the fixed pivot moved (m).
+        Displacement of the slider that represents the fixed pivot (m).
     """
 
     rotation: FloatArray
@@ -323,18 +324,18 @@ def pin_forces(
 ) -> PinForces:
     """Compute the forces on the pins of a linkage at constant speed.
 
-    They are of a run of the compiled plant, its slider so heavy that it stays where it is, its weight carried by the control
-    force; or of the plant's equations alone.
+    They come from a run of the compiled plant, whose slider is so heavy that it hardly moves, with its weight carried by the
+    control force; or from the plant's equations alone.
 
     Parameters
     ----------
     linkage : Linkage
-        With a fixed pivot, or a slider-crank: D is then the force of the guide on its slider.
+        A linkage with a fixed pivot, or a slider-crank, for which the force at D is that of the guide on the slider.
     make : Make
     rotation : (float, float), optional
-        From which rotation of the crank to which one (rad); a turn by default.
+        First and last crank rotation (rad); a turn by default.
     run : bool
-        Whether the plant is run.
+        Whether to run the plant.
 
     Raises
     ------
@@ -367,7 +368,7 @@ def pin_forces(
 
 
 def _held(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
-    """Compute the pin forces by the plant's equations, its slider held."""
+    """Compute the pin forces by the plant's equations, with its slider held."""
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
     th2 = casadi.DM(linkage.crank_angle(rotation))

@@ -1,4 +1,4 @@
-"""Motions of the rocker pivot, on a guide or on a second crank: known ones, and the unknowns of a search."""
+"""Define motions of the rocker pivot, on a guide or on a second crank: given ones, and unknown ones of a search."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...numerics.fourier import FourierSeries
 from ...units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
-#: Greatest number of turns of either crank until a geared five-bar is as it was.
+#: Greatest number of turns of either crank per period of a geared five-bar.
 TEETH = 6
 
 
@@ -54,14 +54,14 @@ class SliderMotion:
         return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
 
     def scaled(self, factor: float) -> SliderMotion:
-        """Return the motion of a linkage that is larger by the factor."""
+        """Return the motion for the same linkage with all lengths multiplied by the factor."""
         return replace(self, series=self.series * factor)
 
 
 def geared(ratio: float) -> tuple[int, int]:
-    """Return the turns k of the first crank and m of the second until both are where they were: the ratio is m/k.
+    """Return the turns k of the first crank and m of the second after which both are back at their angles: the ratio is m/k.
 
-    Raises ParameterError if it is not zero and no ratio of whole numbers up to six.
+    Raises ParameterError if the ratio is neither zero nor a quotient of whole numbers up to six.
     """
     if isfinite(ratio):
         near = Fraction(ratio).limit_denominator(TEETH)
@@ -80,14 +80,14 @@ class SecondCrank:
     """The rocker pivot D sits on a second crank, geared to the first or turned independently: a five-bar.
 
     D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio and
-    the first crank turns k times as fast as phi: phi is the rotation of the shaft that turns once until all is as it was.
+    the first crank turns k times as fast as phi: the input shaft with the rotation phi turns once per period of the linkage.
 
     Attributes
     ----------
     length : float
         l5 (m).
     ratio : float
-        Turns of the second crank for one of the first: a ratio of whole numbers up to six.
+        Turns of the second crank per turn of the first: a quotient of whole numbers up to six.
     phase : float
         psi at the start (rad).
     series : FourierSeries
@@ -96,7 +96,7 @@ class SecondCrank:
     Raises
     ------
     ParameterError
-        If the length is not greater than zero, the ratio none of small whole numbers, or the phase not finite.
+        If the length is not greater than zero, the ratio is not such a quotient, or the phase is not finite.
     """
 
     length: float
@@ -123,30 +123,29 @@ class SecondCrank:
         return self.length * np.cos(psi), self.length * np.sin(psi)
 
     def scaled(self, factor: float) -> SecondCrank:
-        """Return the motion of a linkage that is larger by the factor."""
+        """Return the motion for the same linkage with all lengths multiplied by the factor."""
         return replace(self, length=self.length * factor)
 
 
 @in_si(guide_angle="rad", position="m", stroke="m", speed="m", acceleration="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderUnknown:
-    """A slider whose motion is sought: a Fourier series with this many harmonics.
+    """A slider whose motion is unknown: a Fourier series with a given number of harmonics.
 
     Attributes
     ----------
     harmonics : int
-        0 is a slider set once.
+        Number of harmonics; 0 for a slider that is set once.
     guide_angle : (float, float)
         Bounds (rad); equal ones fix it.
     position : (float, float), optional
-        Least and greatest slider position (m); by default one ground link to either side of its end, beyond which it would be
-        another linkage.
+        Least and greatest slider position (m); by default one ground link to either side of that link's end.
     stroke : float
-        Greatest distance between the ends of its travel (m).
+        Greatest length of its travel (m).
     speed, acceleration : float
         Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
     smoothness : float
-        Weight of the mean of (d2u/dphi2)^2 (1/rad4) added to the quality: trades error for smoothness.
+        Weight of the mean of (d2u/dphi2)^2 in the quality (1/rad4), which trades error for smoothness.
     """
 
     harmonics: int
@@ -179,16 +178,16 @@ class SliderUnknown:
 @in_si(length="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrankUnknown:
-    """A second crank whose length, phase and, with ``harmonics``, independent rotation are sought.
+    """A second crank whose length, phase and, with ``harmonics``, independent rotation are unknown.
 
     Attributes
     ----------
     ratio : float
-        Turns for one of the first crank: see `SecondCrank`.
+        Turns per turn of the first crank: see `SecondCrank`.
     length : (float, float)
         Bounds (m).
     harmonics : int
-        Of the rotation added to the geared one; 0 of gears.
+        Harmonics of the rotation that is added to the geared one; 0 for gears alone.
     speed : float
         Greatest deviation of d psi/d phi from the ratio.
     """

@@ -1,4 +1,4 @@
-"""Solutions: how well a linkage does its task, the cost of errors in its dimensions, its report and its drawings.
+"""Evaluate solutions: errors and defects of a linkage in its task, cost of dimensional errors, reports and drawings.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

@@ -1,4 +1,4 @@
-"""Solutions that are one linkage for a machine builder: mirror images, and near copies."""
+"""Group solutions that are practically the same linkage: mirror images and near copies."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..linkage.pivot import SecondCrank, geared
 from ..task.task import RockerFunction
 from .solution import Solution
 
-#: Near copies differ by no more: place of a pin, as a share of the longest link; ratio of two lengths of one link.
+#: Greatest differences of near copies: position of a pin, relative to the longest link; ratio of two lengths of one link.
 SHARE, RATIO = 0.03, 1.25
 
 
 def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Return the first of all solutions that are alike, in their order, the others as its ``variants``.
+    """Return one solution of each group of similar ones, in their order; the others become its ``variants``.
 
-    Where the linkage stands, which way the crank turns and where it starts make no difference, nor does the size for the
-    function of a rocker. Linkages with a commanded pivot are all kept.
+    Position in the plane, sense of rotation and start of the crank do not count, nor does the size for a function of the
+    rocker. Linkages with a commanded pivot are all kept.
     """
     groups: list[list[Solution]] = []
     for solution in solutions:
@@ -35,7 +35,7 @@ def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
 
 
 def format_variants(solution: Solution) -> str:
-    """Format how many mirror images and near copies a solution stands for, such as "2 mirror images, 1 near copy"."""
+    """Format the number of mirror images and near copies that a solution represents, as in "2 mirror images, 1 near copy"."""
     mirrored = sum(_alike(solution, other) == -1 for other in solution.variants)
     counts = (("mirror image", mirrored), ("near copy", len(solution.variants) - mirrored))
     return ", ".join(format_count(count, name) for name, count in counts if count)
@@ -59,7 +59,7 @@ def _alike(one: Solution, other: Solution) -> int | None:
 
 
 def _gears(linkage: Linkage) -> float | None:
-    """Return the ratio of the gears of a second crank, 0 with a fixed rocker pivot; None where the pivot is commanded."""
+    """Return the gear ratio of a second crank, 0 for a fixed rocker pivot, None for a commanded pivot."""
     pivot = linkage.pivot
     if pivot is None:
         return 0.0
@@ -67,7 +67,7 @@ def _gears(linkage: Linkage) -> float | None:
 
 
 def _sides(linkage: Linkage) -> tuple[int, ...]:
-    """Return +1 if C lies to the left of B -> D, -1 to the right; with hardly an offset of a guide both, its own first."""
+    """Return +1 if C lies to the left of B -> D, -1 to the right; both, its own first, for a guide with almost no offset."""
     if not isinstance(linkage, SliderCrank):
         return (linkage.branch,)
     offset = linkage.ground_length
@@ -76,7 +76,7 @@ def _sides(linkage: Linkage) -> tuple[int, ...]:
 
 
 def _shape(linkage: Linkage, side: int) -> NDArray[np.float64]:
-    """Return links, coupler point and second crank as shares of the longest link, turned over so that C lies to the left."""
+    """Return links, coupler point and second crank relative to the longest link, mirrored so that C lies to the left."""
     point = linkage.point_distance * np.exp(1j * side * linkage.point_angle)
     second, pivot = 0j, linkage.pivot
     if isinstance(pivot, SecondCrank):

@@ -1,4 +1,4 @@
-"""A linkage that was found, written as a described linkage: it runs, becomes an FMU and moves in the studio."""
+"""Write a solution as a described linkage, which can be simulated, exported as an FMU and shown in the studio."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NAME = "found-linkage"
 def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
     """Return the table ``[linkage]`` with the description of a four-bar, a slider-crank or a five-bar.
 
-    A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` are the speeds of both.
+    A rocker pivot that moves on a guide, or on a crank without gears, is a second freedom: `drives` gives the speeds of both.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
     make : Make
         Bars, gravity and the speed of the crank.
     rotation : float
-        Rotation of the shaft at the start (rad).
+        Rotation of the input shaft at the start (rad).
     direction : float
         +1 or -1: sense in which the crank turns.
     """
@@ -85,7 +85,7 @@ def description(linkage: Linkage, make: Make, *, rotation: float = 0.0, directio
 def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: float = 1.0) -> dict[str, Any]:
     """Return the tables of the drives of a linkage whose rocker pivot is a freedom: the speeds of crank and pivot in time.
 
-    The arguments are those of `description`. Of any other linkage there are none: its crank has its speed from there.
+    The arguments are those of `description`. For other linkages the result is empty: the description has the crank speed.
     """
     pivot = linkage.pivot
     if pivot is None or not pivot.series.order:
@@ -106,12 +106,12 @@ def drives(linkage: Linkage, make: Make, *, rotation: float = 0.0, direction: fl
 
 
 def _place(z: complex) -> list[Any]:
-    """Return a point as a file has it; exact zeros stay zero."""
+    """Return a point in the form of a file; exact zeros stay the number 0."""
     return [0 if c == 0.0 else with_unit(c, "m") for c in (z.real, z.imag)]
 
 
 def _bar(ends: str, length: float, make: Make, mass: float | None) -> dict[str, Any]:
-    """Return a bar of the section of ``make``, weighed if its mass is given."""
+    """Return the table of a bar with the section of ``make``, and its mass if it is given."""
     section = {"kind": "bar", "width": with_unit(make.width, "m"), "thickness": with_unit(make.thickness, "m")}
     table = {"bar": list(ends), "length": with_unit(length, "m"), "section": section | {"material": make.density}}
     return table if mass is None else table | {"mass": with_unit(mass, "kg")}

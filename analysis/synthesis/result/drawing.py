@@ -1,4 +1,4 @@
-"""Drawings of a solution: the linkage in its positions with curve and target, and its links as plates."""
+"""Draw a solution: the linkage in several positions with curve and target, and its links as plates."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .solution import CURVE, Solution, angle_at_c, target_points, whole_turn
 
 FloatArray = NDArray[np.float64]
 
-#: Layers in the order in which they are drawn; their colours are seen on white and on black.
+#: Layers in the order in which they are drawn; their colours are visible on white and on black.
 LAYERS = {
     "poses": Layer(colour=0x808080, width=0.13e-3),
     "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
@@ -54,7 +54,7 @@ class LinkageScene:
         return self.solution.linkage
 
     def pins(self, rotation: float) -> Mapping[str, tuple[float, float]] | None:
-        """Return the places of A to E and, for target points, of P; None where the links cannot be joined."""
+        """Return the positions of A to E and, if the task has target points, of P; None if the links cannot be joined."""
         try:
             pins = self.linkage.pins(rotation)
         except AssemblyError:
@@ -69,13 +69,13 @@ class LinkageScene:
 
     @cached_property
     def turn(self) -> FloatArray:
-        """Return the crank rotations over a whole turn, from the least at which the task is done, shape (n,)."""
+        """Return crank rotations over a whole turn, from the least rotation of the task, shape (n,)."""
         begin = 0.0 if self._closed else float(self.solution.rotation.min())
         return begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
 
     @cached_property
     def way(self) -> FloatArray:
-        """Return crank rotations over which the task is done, densely spaced, shape (n,)."""
+        """Return densely spaced crank rotations over the range of the task, shape (n,)."""
         at = self.solution.rotation
         if self._closed or whole_turn(self.solution.task, at):
             return self.turn
@@ -83,12 +83,12 @@ class LinkageScene:
 
     @property
     def rotation(self) -> FloatArray:
-        """Return the crank rotations over which the task is done, in their order: its stations, or a turn."""
+        """Return the crank rotations of the task, in order: its stations, or a turn."""
         return self.turn if self.way is self.turn else self.solution.rotation
 
     @cached_property
     def target(self) -> FloatArray | None:
-        """Return the target points, shape (n, 2); None of a rocker function."""
+        """Return the target points, shape (n, 2); None for a rocker function."""
         return target_points(self.solution.task)
 
     @property
@@ -120,12 +120,12 @@ class LinkageScene:
 
     @cached_property
     def traced(self) -> FloatArray | None:
-        """Return the part of the coupler curve that does the task, shape (n, 2); None of a rocker function."""
+        """Return the part of the coupler curve that belongs to the task, shape (n, 2); None for a rocker function."""
         return None if self.target is None else self.linkage.path(self.way)
 
     @cached_property
     def function(self) -> FloatArray | None:
-        """Return crank rotation and rocker angle over the task of a rocker function, shape (2, n); None of another."""
+        """Return crank rotation and rocker angle of a rocker function, shape (2, n); None for another task."""
         return np.vstack([self.way, self.linkage.rocker_angle(self.way)]) if self.target is None else None
 
     @cached_property
@@ -157,10 +157,7 @@ class LinkageScene:
 
     @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """Return heading and values of the pivot's motion over a turn, also of a slider-crank's slider; None if it is fixed.
-
-        Of a slider-crank the slider's position.
-        """
+        """Return heading and values of the motion of a second crank or a slider over a turn; None without either."""
         if isinstance(self.linkage, FiveBar):
             return "second crank [rad]", self.linkage.pivot.angle(self.turn)
         slider = self.linkage.slider(self.turn)
@@ -168,7 +165,7 @@ class LinkageScene:
 
 
 Point = tuple[float, float]
-#: Radius of a pin and height of a letter, as shares of the drawing's extent.
+#: Radius of a pin and height of a letter, relative to the drawing's extent.
 PIN, LETTER = 0.008, 0.022
 
 
@@ -179,15 +176,15 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     ----------
     solution : Solution
     rotation : float, optional
-        Of the crank (rad); the first at which the links are joined by default.
+        Crank rotation (rad); by default the first one at which the links can be joined.
     poses : int
-        Further positions, at even steps over the task, thin.
+        Number of further positions, in thin lines, at equal steps over the task.
     title : str
 
     Raises
     ------
     AssemblyError
-        If the links cannot be joined there, or anywhere.
+        If the links cannot be joined at that rotation, or at any.
     """
     scene = LinkageScene(solution, title)
     tried = (*scene.rotation, *scene.transmission[0]) if rotation is None else (rotation,)
@@ -257,7 +254,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
 def _links(
     pins: Mapping[str, Point], linkage: Linkage, height: float, others: Sequence[LineString]
 ) -> Iterator[Dimension]:
-    """Yield the dimension of each link, beside it and clear of the other lines; of a slider-crank the offset of its guide."""
+    """Yield the dimension of each link, beside it and clear of other lines; for a slider-crank also the guide's offset."""
     named = [ends for _, ends in linkage.bars]
     names: list[str] = [name for name in ("AE", "AB", "BC", "ED", "DC") if name == "BC" or name in named]
     names += ["BP"] if "P" in pins and not linkage.point_is_pin else []
@@ -266,7 +263,7 @@ def _links(
     placed: list[Dimension] = []
 
     def covered(one: Dimension) -> tuple[int, int]:
-        """Count what a number covers of links and, thrice, of dimensions, with the numbers that its lines cross; of others."""
+        """Count the overlaps of a dimension with links, once each, and with other dimensions, thrice; and with other lines."""
         room, strokes = _room(one), _strokes(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_room, _strokes))
@@ -287,12 +284,12 @@ def _links(
 
 
 def _strokes(dimension: Dimension) -> Any:
-    """Return the lines of a dimension: beside the link, and from its ends."""
+    """Return the lines of a dimension: the dimension line and the two extension lines."""
     return LineString([dimension.start, *dimension.line, dimension.end])
 
 
 def _room(dimension: Dimension) -> Any:
-    """Return the box of a dimension's number, with the gaps about it, on either side of its line."""
+    """Return the box that a dimension's number takes, with the gaps around it, on either side of its line."""
     (x0, y0), (x1, y1) = dimension.line
     middle, way = np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / hypot(x1 - x0, y1 - y0)
     return LineString([middle - 2.2 * dimension.height * way, middle + 2.2 * dimension.height * way]).buffer(
@@ -303,13 +300,13 @@ def _room(dimension: Dimension) -> Any:
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
     """Draw the links as plates with round ends and holes for the pins, one above the other, with dimensions.
 
-    The ground link is among them where both its ends are pivots; a slider's guide is not. The coupler reaches to the coupler
-    point where the task has one.
+    The ground link is drawn if both its ends are pivots, but not the guide of a slider. The coupler includes the coupler point
+    if the task has one.
 
     Parameters
     ----------
     width, thickness : float
-        Of each plate about its holes (m).
+        Width and thickness of each plate (m).
     pin : float
         Diameter of the holes (m), below the width.
     title : str
@@ -375,7 +372,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
 
 
 def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
-    """Yield each pair of holes that are apart, with the offset of its dimension: outside the plate, none over another."""
+    """Yield each pair of distinct holes with the offset of its dimension: outside the plate, none over another."""
     for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
         way = places[k] - places[i]
         if abs(way) <= 1e-9:
@@ -388,7 +385,7 @@ def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Poin
 
 
 def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
-    """Return the outline of edges and arcs around two or three points: points, and bulges as of `files.Polyline`."""
+    """Return the outline of edges and arcs around two or three points: points, and bulges as in `files.Polyline`."""
     farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
     ends = places[list(farthest)]
     if len(places) == 3:
@@ -407,7 +404,7 @@ def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatAr
 
 
 def _curve(layer: str, points: FloatArray) -> Polyline:
-    """Make the polyline of a curve, closed where it ends at its first point."""
+    """Return the polyline of a curve, closed if it ends at its first point."""
     closed = len(points) > 3 and hypot(*(points[-1] - points[0])) <= 1e-9 * float(np.ptp(points, axis=0).max())
     return Polyline(layer=layer, points=points[:-1] if closed else points, closed=closed)
 

@@ -1,4 +1,4 @@
-"""The effect of each dimension on the error by exact derivatives, the cost of rounding, and the text report."""
+"""Compute the effect of each dimension on the error by exact derivatives and the cost of rounding; write the text report."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, pa
 FloatArray = NDArray[np.float64]
 #: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
 LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
-#: Angles of a moved pivot, besides the coefficients of its motion.
+#: Angles of a moving pivot, besides the coefficients of its motion.
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
-#: Share of the target above which an answer is called poor, and what may do better by the kind of linkage.
+#: Error relative to the target above which a solution is called poor, and the improvements to suggest by kind of linkage.
 POOR = 0.05
 _BETTER = {
     "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions for it",
     "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions for it",
     "geared-five-bar": "other ratios of its gears (search.gears), or a smoother or smaller target, may do better",
 }
-#: Step of the differences of exact derivatives, in rad or as a share of the longest link.
+#: Step of the differences of exact derivatives, in rad or relative to the longest link.
 DIFFERENCE = 1e-5
 
 
@@ -48,10 +48,10 @@ class Sensitivity:
     value : float
         m or rad.
     slope : float
-        Derivative with respect to it of the sum of weighted squared errors, which is the quality function, or of a path whose
-        quality is an area stands in for it: zero at an optimum of it that no bound holds.
+        Derivative of the sum of weighted squared errors with respect to the dimension; it is zero at an optimum of that sum
+        inside the bounds. The sum is the quality function, or replaces it for a path whose quality is an area.
     shift : float
-        Root mean square displacement of the traced point, or error of angle, per unit of it.
+        Root mean square displacement of the traced point, or change of angle, per unit of the dimension.
     """
 
     name: str
@@ -67,14 +67,14 @@ class Rounding:
     Attributes
     ----------
     linkage : Linkage
-        Rounded; a link to no less than one step, the coefficients of a slider's or a second crank's motion, which is commanded
-        and not made, not at all.
+        The rounded linkage: a link is at least one step long; the coefficients of a commanded motion, of a slider or a second
+        crank, are not rounded.
     error : float
-        Its quality function.
+        Quality function of the rounded linkage.
     expected : float
-        Mean quality function of dimensions that are off by random amounts, evenly within half a step: a sum of squares to
-        second order, by exact derivatives of the errors and their differences; an area by the spread of the distances, as of
-        normal variables. Infinite where there are no derivatives.
+        Mean quality function if the dimensions have random errors, uniform within half a step. A sum of squares is computed to
+        second order, by exact derivatives of the errors and their differences; an area by the standard deviation of the
+        distances, taken as normal variables. Infinite if there are no derivatives.
     """
 
     linkage: Linkage
@@ -89,9 +89,9 @@ def length_step(linkage: Linkage) -> float:
 
 
 def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-    """Compute names, derivatives (m, k) of the residuals by the dimensions, residuals (m,), and weights (m,).
+    """Return names of the dimensions, derivatives (m, k) of the residuals with respect to them, residuals (m,), weights (m,).
 
-    The residuals are those of the quality function; of an untimed path, the distances along the target's normals.
+    The residuals are those of the quality function; for an untimed path, the distances along the target's normals.
     """
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
@@ -106,7 +106,7 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
 
 
 def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute derivatives (m, k) and values (m,) of the residuals: of points, ``across`` the curve or x and y; of angles."""
+    """Compute derivatives (m, k) and values (m,) of the residuals: of points, ``across`` the curve or in x and y; of angles."""
     columns = [column for _, _, column in _pivot(linkage, at)]
     angular = normal.angle is not None
     parts, blocks = [], []
@@ -147,9 +147,9 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
 
 
 def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
-    """Compute by exact derivatives how each dimension changes the error.
+    """Compute the effect of each dimension on the error by exact derivatives.
 
-    Of an untimed path, the squared distances to the curve at its stations, the crank rotations following.
+    For an untimed path these are the squared distances to the curve at its stations, with the crank rotations adapted.
     """
     names, jacobian, residual, weights = derivatives(solution)
     slopes = 2.0 * jacobian.T @ (weights * residual)
@@ -198,7 +198,7 @@ def rounded(solution: Solution, length: float | None = None, angle: float = ANGL
 
 
 def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
-    """Return the mean quality function of dimensions that are off by random amounts, evenly within half a step."""
+    """Return the mean quality function if the dimensions have random errors, uniform within half a step."""
     task, linkage = solution.task, solution.linkage
     area = isinstance(task, UntimedPath) and task.measure == "area"
     if isinstance(task, UntimedPath) and area:
@@ -243,9 +243,9 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
-    """Compute how much the quality function grows if one dimension is off by a step, in the worse direction.
+    """Compute how much the quality function grows if one dimension has an error of one step, in the worse direction.
 
-    By evaluating the linkages, so that it holds of steps of any size; infinite where the links cannot be joined.
+    The changed linkages are evaluated, so that steps may have any size; infinite if the links cannot be joined.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
     Returns
     -------
     dict
-        By the name of the dimension, without those of a slider's motion.
+        Growth by the name of the dimension, without the coefficients of a slider's motion.
     """
     linkage, grown = solution.linkage, {}
     for name, value in _made(linkage).items():
@@ -287,7 +287,7 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 
 
 def _names(linkage: Linkage, normal: Normal) -> list[str]:
-    """Return the dimensions that there are derivatives with respect to, in their order."""
+    """Return the dimensions with respect to which derivatives are computed, in their order."""
     mounted = [] if normal.angle is None else ["output_angle"]
     return [*PLACES, *mounted, *(name for name, _, _ in _pivot(linkage, np.zeros(1)))]
 
@@ -318,7 +318,7 @@ def _values(linkage: Linkage) -> dict[str, float]:
 
 
 def _made(linkage: Linkage) -> dict[str, float]:
-    """Return the dimensions that are manufactured, and so have errors: a commanded motion is not among them."""
+    """Return the dimensions that are manufactured and therefore have errors, without those of a commanded motion."""
     values = _values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
     return {name: values[name] for name in made if name in values and name not in linkage.absent}
@@ -337,12 +337,12 @@ def _with(linkage: Linkage, name: str, value: float) -> Linkage:
 
 
 def quality_unit(task: Task) -> tuple[float, str]:
-    """Return the factor from SI, and the unit, in which a task's quality function is written."""
+    """Return the factor from SI, and the unit in which a task's quality function is written."""
     return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
 
 
 def error_unit(task: Task) -> tuple[float, str]:
-    """Return the factor from SI, and the unit, in which a task's errors are written."""
+    """Return the factor from SI, and the unit in which a task's errors are written."""
     return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
 
 
@@ -381,9 +381,9 @@ def headline(solution: Solution) -> str:
 
 
 def format_poor(solution: Solution) -> str:
-    """Return a sentence on a poor answer: the share of the target that is wrong, and what may do better; else nothing.
+    """Return a note on a poor solution: the error relative to the target, and possible improvements; empty for a good one.
 
-    See `Solution.share`; an answer is poor if more than `POOR` of the target is wrong.
+    A solution is poor if `Solution.share` is greater than `POOR`.
     """
     task, share = solution.task, solution.share
     if not POOR < share < inf:
@@ -404,7 +404,7 @@ def format_poor(solution: Solution) -> str:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Format rows in columns, the first to the left, the others to the right."""
+    """Format rows as a table: the first column aligned left, the others right."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = [
         "  ".join(cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths)))
@@ -421,9 +421,9 @@ class Assessment:
     ----------
     solution : Solution
     dimensions : list of tuple
-        Headings, then a row for each dimension: name, value, error, and what that does to output and quality function.
+        Headings, then a row for each dimension: name, value, error, and its effect on output and quality function.
     rounding : str
-        The cost of rounding the dimensions, in a line.
+        The cost of rounding the dimensions, in one line.
     poor : str
         `format_poor` of the solution.
     """
@@ -435,7 +435,7 @@ class Assessment:
 
     @property
     def report(self) -> str:
-        """Return verdicts, dimensions with what an error in each costs, rounding, errors target by target."""
+        """Return the report: verdicts, dimensions with the cost of an error in each, rounding, errors target by target."""
         solution, linkage = self.solution, self.solution.linkage
         task, pivot = solution.task, linkage.pivot
         error, rms, worst = quality_cells(solution, digits=6)
@@ -464,9 +464,9 @@ class Assessment:
 
 
 def assess(solution: Solution, violated: Callable[[Solution], str] | None = None) -> Assessment:
-    """Compute what errors in the dimensions of a solution cost.
+    """Compute the cost of errors in the dimensions of a solution.
 
-    ``violated`` returns the constraint that a linkage violates, which rounding may bring about; empty if it keeps all.
+    ``violated`` returns the constraint that the rounded linkage violates; empty if it meets all.
     """
     factor, unit = quality_unit(solution.task)
     step = length_step(solution.linkage)
@@ -495,14 +495,14 @@ def quality_headings(task: Task) -> tuple[str, str, str]:
 
 
 def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
-    """Return quality function, rms error and greatest error of a solution as they are written."""
+    """Return quality function, rms error and greatest error of a solution as text."""
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
     return f"{factor * solution.error:.{digits}g}", f"{scale * found.rms:.4g}", f"{scale * found.worst:.4g}"
 
 
 def _slider_line(linkage: Linkage) -> str:
-    """Return a line with the offset and the stroke of a slider-crank; of another linkage none."""
+    """Return a line with the offset and the stroke of a slider-crank; empty for another linkage."""
     if not isinstance(linkage, SliderCrank):
         return ""
     line = f"\nslider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
@@ -528,7 +528,7 @@ def _places(what: str, places: Sequence[float]) -> str:
 
 
 def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str, str, str]]:
-    """Return the rows of `Assessment.dimensions`: what happens if a dimension is off by a step, or by 0.1 degrees."""
+    """Return the rows of `Assessment.dimensions`: the effect of an error of one step, or of 0.1 degrees, in each dimension."""
     factor, unit = quality_unit(solution.task)
     scale, length = error_unit(solution.task)
     dear = costs(solution, step, ANGLE_STEP)
@@ -555,7 +555,7 @@ def format_transmission(verdicts: Verdicts) -> str:
 
 
 def _stations(solution: Solution) -> list[list[str]]:
-    """Return the errors target by target, in mm and degrees."""
+    """Return the table of errors target by target, in mm and degrees."""
     columns = solution.columns()
     heads = [name.replace("[m]", "[mm]").replace("[rad]", "[deg]") for name in columns]
     factors = [1e3 if name.endswith("[m]") else 180.0 / pi for name in columns]

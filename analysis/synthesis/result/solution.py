@@ -1,4 +1,4 @@
-"""Solutions: a linkage for a task, its errors and its verdicts."""
+"""Evaluate a linkage in a task: its errors, and verdicts on its defects."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from ..task.task import PrecisionPoints, RockerFunction, Task, TimedPath, Untime
 from .described import description, drives
 
 FloatArray = NDArray[np.float64]
-#: Share of the target's size squared below which an error is rounding.
+#: Fraction of the target's size squared below which an error is due to rounding.
 EXACT = 1e-14
-#: Points of a coupler curve by which an untimed path is judged: the thesis's 360.
+#: Points of a coupler curve with which an untimed path is evaluated: the thesis's 360.
 CURVE = 360
 
 
@@ -39,18 +39,18 @@ class Evaluation:
     Attributes
     ----------
     error : float
-        The task's quality function: m2, of a rocker function rad2.
+        The task's quality function: m2, for a rocker function rad2.
     value : float
-        The value of the task's objective: the quality function, or the greatest error (m, of a rocker function rad).
+        The value of the task's objective: the quality function, or the greatest error (m, for a rocker function rad).
     errors : ndarray, shape (n,)
-        At each target: distance (m), of an untimed path from the target's point to the curve; of a rocker function, angle
-        (rad).
+        Error at each target: a distance (m), for an untimed path from the target's point to the curve; for a rocker function
+        an angle (rad).
     angle_errors : ndarray, shape (n,), or None
-        Of a motion (rad).
+        Angular errors of a motion (rad).
     rotation : ndarray, shape (n,), or None
-        Crank rotations at which the targets are compared; None where the linkage was given without.
+        Crank rotations at which the targets are compared; None if they were not given with the linkage.
     length : float
-        Of a motion, the length at which an error of angle counts as an error of place (m); see `Motion`.
+        For a motion, the length by which an angular error is multiplied to count as an error of position (m); see `Motion`.
     """
 
     error: float
@@ -62,7 +62,7 @@ class Evaluation:
 
     @property
     def combined(self) -> FloatArray:
-        """Return the errors of place and angle together, as they count in the quality function (m or rad), shape (n,)."""
+        """Return the errors of position and angle combined, as they count in the quality function (m or rad), shape (n,)."""
         if self.angle_errors is None:
             return np.abs(self.errors)
         both: FloatArray = np.hypot(self.errors, self.length * self.angle_errors)
@@ -80,16 +80,16 @@ class Evaluation:
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
-    """Compare a linkage with its task, by the task's own measure.
+    """Compare a linkage with its task by the task's measure.
 
-    Nothing of a search is used: an untimed path is compared as a polygon of `CURVE` points with the target's.
+    The comparison is independent of any search: an untimed path is compared as a polygon of `CURVE` points with the target.
 
     Parameters
     ----------
     task : Task
     linkage : Linkage
     rotation : ndarray, optional
-        Crank rotations of an untimed task's stations; needed but for closed paths.
+        Crank rotations of an untimed task's stations; needed except for closed paths.
 
     Raises
     ------
@@ -160,22 +160,22 @@ def _evaluate_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | N
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """The defects of a linkage in its task, and its transmission angle.
+    """Verdicts on a linkage in its task: type, defects and transmission angle.
 
     Attributes
     ----------
     grashof : str
-        Type of the four-bar, or slider-crank, see `Linkage.grashof`; where the rocker pivot moves, what moves it.
+        Type of the four-bar or slider-crank, see `Linkage.grashof`; for a moving rocker pivot the kind of its motion.
     full_turn : bool
-        The crank can turn fully.
+        Whether the crank can turn fully.
     circuit : bool
-        The links stay joined all the way through the task: every target is on one circuit.
+        Whether the links stay joined throughout the task, so that all targets are on one circuit.
     branch : bool
-        Coupler and rocker never come to be collinear on the way.
+        Whether coupler and rocker are never collinear during the task.
     order : bool
-        The targets come in their order, the crank turning one way.
+        Whether the targets are reached in order while the crank turns in one direction.
     least_transmission, greatest_transmission : float
-        Range of the angle between coupler and rocker over the way of the task (rad), over a turn where it is closed.
+        Range of the angle between coupler and rocker during the task (rad), or over a turn if it is closed.
     """
 
     grashof: str
@@ -203,7 +203,7 @@ class Verdicts:
 
 
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
-    """Judge a linkage over the crank rotations from the first to the last of ``rotation``, or over a turn.
+    """Check a linkage for defects over the crank rotations from the first to the last of ``rotation``, or over a turn.
 
     The distance from crank pin to rocker pivot, on which everything depends, is evaluated densely and, with a fixed pivot,
     where the crank lies along the ground link.
@@ -233,12 +233,12 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """The straight part of a path as the linkage traces it, evaluated densely.
+    """Straight part of a path as the linkage traces it, sampled densely.
 
     Attributes
     ----------
     travel, flatness : float
-        Along the line from its first point to its last, and extent across it (m).
+        Length along the line from its first point to its last, and extent across that line (m).
     begin, end : float
         Crank rotations at its ends (rad).
     """
@@ -260,7 +260,7 @@ class StraightPart:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution(Shown):
-    """A linkage for a task.
+    """A linkage for a task, with its errors and verdicts.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ class Solution(Shown):
     evaluation : Evaluation
     verdicts : Verdicts
     variants : tuple of Solution
-        Mirror images and near copies that it stands for in a ranking, the best first.
+        Mirror images and near copies that it represents in a ranking, the best first.
     """
 
     task: Task
@@ -301,12 +301,12 @@ class Solution(Shown):
 
     @property
     def error(self) -> float:
-        """Return the quality function (m2; of a rocker function, rad2)."""
+        """Return the quality function (m2; for a rocker function rad2)."""
         return self.evaluation.error
 
     @property
     def value(self) -> float:
-        """Return the objective of the task: `error`, or the greatest error (m; of a rocker function, rad)."""
+        """Return the objective of the task: `error`, or the greatest error (m; for a rocker function rad)."""
         return self.evaluation.value
 
     @property
@@ -319,10 +319,10 @@ class Solution(Shown):
 
     @property
     def share(self) -> float:
-        """Return the error as a share of the target.
+        """Return the error relative to the target.
 
-        Where `by_area`, the area between the curves by the area that the target encloses. Else the rms error by the target's
-        size, which is the diagonal of the box round it, or by the swing of a rocker function.
+        If `by_area`, it is the area between the curves divided by the area that the target encloses. Otherwise it is the rms
+        error divided by the target's size, the diagonal of its bounding box, or by the swing of a rocker function.
         """
         task = self.task
         if self.by_area:
@@ -340,11 +340,11 @@ class Solution(Shown):
 
     @property
     def way(self) -> tuple[float, float] | None:
-        """Return the crank rotations between which the task is done; None where the crank turns fully."""
+        """Return the first and last crank rotation of the task; None if the crank turns fully."""
         return None if self.verdicts.full_turn else (float(self.rotation.min()), float(self.rotation.max()))
 
     def straight(self) -> StraightPart | None:
-        """Return the straight part of the task as it is traced; None where none is asked."""
+        """Return the straight part of the task as it is traced; None if the task has none."""
         asked = normal_form(self.task).straight
         rotation = self.evaluation.rotation
         if asked is None or rotation is None or not isinstance(self.task, UntimedPath):
@@ -371,7 +371,7 @@ class Solution(Shown):
 
     @property
     def largest_link(self) -> float:
-        """Return the greatest length that `LargestLink` bounds: of the links and, with target points, from B to P (m)."""
+        """Return the length that `LargestLink` bounds: that of the longest link or, with target points, of B to P (m)."""
         point = 0.0 if target_points(self.task) is None else self.linkage.point_distance
         return max(self.linkage.largest_link, point)
 
@@ -407,7 +407,7 @@ class Solution(Shown):
         }
 
     def described_case(self, make: Make, title: str) -> dict[str, Any]:
-        """Return the tables of a case file that describes the linkage itself, and runs it; see `docs/linkages.md`."""
+        """Return the tables of a case file that describes the linkage and simulates it; see `docs/linkages.md`."""
         at = self.evaluation.rotation
         start = 0.0 if at is None else float(at[0])
         tables = description(self.linkage, make, rotation=start, direction=self.direction)
@@ -423,7 +423,7 @@ class Solution(Shown):
     def columns(self) -> dict[str, FloatArray]:
         """Return crank rotation, target, traced point or angle, error and transmission angle at each target; SI.
 
-        Of an untimed path the point of it that is nearest to each of the target's points.
+        For an untimed path the traced point is the one nearest to each of the target's points.
         """
         task = self.task
         at = self.evaluation.rotation
@@ -462,7 +462,7 @@ class Solution(Shown):
 def whole_turn(task: Task, rotation: FloatArray) -> bool:
     """Return whether the stations of a task cover a whole turn.
 
-    Untimed precision points never do: a wide step between two of them says nothing about the way from the last to the first.
+    Untimed precision points never do: the widest step between two of them says nothing about the step from last to first.
     """
     if isinstance(task, PrecisionPoints) and task.rotation is None:
         return False
@@ -470,21 +470,21 @@ def whole_turn(task: Task, rotation: FloatArray) -> bool:
 
 
 def target_points(task: Task) -> FloatArray | None:
-    """Return the points that a task asks for (m), shape (n, 2); None of a rocker function."""
+    """Return the target points of a task (m), shape (n, 2); None for a rocker function."""
     if isinstance(task, RockerFunction):
         return None
     return np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
 
 
 def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
-    """Return the angle between coupler and rocker at C (rad), from 0 to pi, NaN where the links cannot be joined."""
+    """Return the angle between coupler and rocker at C (rad), from 0 to pi; NaN if the links cannot be joined."""
     g = linkage.directions(rotation)
     angle: FloatArray = np.arctan2(np.abs(g[5]), g[4])
     return angle
 
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return dP/dphi, by the crank's phase and by the pivot's own motion."""
+    """Return dP/dphi from the crank's rotation and the pivot's motion."""
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
     vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
@@ -497,7 +497,7 @@ def nearest_rotations(
 ) -> FloatArray:
     """Find the crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
 
-    Looked for from ``begin`` to ``end``: the whole turn by default.
+    The search covers the rotations from ``begin`` to ``end``, by default a whole turn.
     """
     whole = end - begin >= 2.0 * pi - 1e-9
     phi = np.linspace(begin, end, 4 * CURVE, endpoint=not whole)
@@ -519,7 +519,7 @@ def nearest_rotations(
 def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
     """Rank solutions: sound ones first, then by the task's objective.
 
-    Those that are exact but for rounding come in the order of their transmission angles.
+    Solutions that are exact to rounding are ranked by their transmission angles.
     """
 
     def place(solution: Solution) -> tuple[bool, float, float]:

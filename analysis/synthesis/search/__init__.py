@@ -1,4 +1,4 @@
-"""The search for linkages: a scan in closed form, then least squares and nonlinear programs; trade-offs.
+"""Search for linkages: a scan in closed form gives starts for least squares and nonlinear programs; trade-offs.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

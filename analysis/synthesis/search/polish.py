@@ -1,7 +1,7 @@
-"""Polishing of starts to optima: SciPy's least squares where there are only bounds, IPOPT where there are inequalities.
+"""Optimise from the starts of a scan: SciPy's least squares if there are only bounds, IPOPT if there are constraints.
 
-Both have exact Jacobians. What is not a sum of squares is fitted by least squares first: an area, or the greatest distance of a
-path, then goes on in `analysis.synthesis.refine`, the greatest error at given stations as the least bound of all by IPOPT.
+Both use exact Jacobians. Other objectives than a sum of squares are fitted by least squares first. Then `refine` minimises the
+area or the greatest distance of a path, and IPOPT the greatest error at given stations, as the least bound of all errors.
 """
 
 from __future__ import annotations
@@ -35,39 +35,39 @@ from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, 
 from .statement import PARTS, Objective
 
 FloatArray = NDArray[np.float64]
-#: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
+#: Number of untimed stations up to which least squares is as fast as IPOPT, whose Jacobian is sparse.
 FEW = 20
-#: How many of the fits go on to the greatest error.
+#: Number of fits after which the greatest error is minimised.
 ONWARDS = 6
-#: How many paths go on to the measure between the curves, and by how many iterations: many by a few, the best of them further.
-#: Of an open path, whose ends are free too, the first laps tell less.
+#: Numbers of paths whose measure between the curves is minimised, with their iterations: many paths by a few iterations, the
+#: best of them by more. For an open path, whose ends are free, too, the first laps say less.
 RACE = {
     "area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)),
     "open area": ((40, 12), (12, 40), (3, 100), (1, 100), (1, 200)),
     "worst": ((ONWARDS, ITERATIONS),),
 }
-#: Fits of squares that a path's race begins with besides the starts themselves: most end at the same few optima.
+#: Least-squares fits from which paths are refined, besides the starts themselves: most end at the same few optima.
 FITTED = 8
-#: How many of the best are followed to the end, by so many iterations more, where they were cut off.
+#: Number of the best answers that are continued if they reached the limit of iterations, and further iterations for each.
 FINISHED, LONG = 4, 1500
-#: How many triangles of a region that is not convex are tried at a time.
+#: Number of triangles of a region that are tried at a time.
 PIECES = 3
-#: Starts of one part of the work of several cores, at most: what is lost where it is interrupted.
+#: Greatest number of starts per piece of work on several cores, which is lost on an interruption.
 MOST = 32
-#: Linkages that differ by less than this, in shares of the longest link and in rad, count as one.
+#: Linkages that differ by less than this, relative to the longest link and in rad, count as one.
 DIFFERENT = 1e-3
-#: The same for paths that race: less than this would end at the same optimum.
+#: The same for paths during refinement: closer ones end at the same optimum.
 RACED = 0.02
-#: Rotations on the way of a task at which a start is judged, more than a search can afford.
+#: Rotations during a task at which a start is checked, more than a search can afford.
 JUDGED = 400
-#: Share of the quality below which points count as met exactly (units squared).
+#: Quality below which points count as passed exactly (units squared).
 EXACT = 1e-14
 
 
 class _OneThread(ContextDecorator):
     """A context in which linear algebra runs on one thread, as long as any of our threads is in it.
 
-    The last digits of a sum depend on how many threads share it, and where a slope is flat a search ends by these.
+    The last digits of a sum depend on the number of threads, and on a flat slope they decide where a search ends.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ ONE_THREAD = _OneThread()
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """The answers of all starts: those that keep every constraint, best first, and the others; the feasible starts."""
+    """Answers of all starts: the feasible ones, best first, and the others; and the starts that are feasible themselves."""
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]
@@ -103,7 +103,7 @@ class Polished:
     def of(
         cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
     ) -> Polished:
-        """Make the record from all answers, those that keep every constraint, and the starts that keep them as they are."""
+        """Build the record from all answers and the feasible starts."""
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
@@ -119,7 +119,7 @@ class Polished:
 
 
 def infeasible(done: Polished) -> InfeasibleError:
-    """Return the error for a search that found nothing that keeps the constraints."""
+    """Return the error for a search without a feasible answer."""
     if not done.others:
         return InfeasibleError("no linkage keeps all bounds and constraints")
     nearest: Answer = min(done.others, key=lambda a: a.violation)
@@ -139,7 +139,7 @@ def polish(
     pivot: PivotUnknown | None = None,
     search: Search = USUAL_SEARCH,
 ) -> Polished:
-    """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted."""
+    """Optimise from every start. On Ctrl-C the answers so far are returned, marked as interrupted."""
     worker = Polisher(normal, limits, pivot)
 
     def spread(name: str, items: Sequence[Any], what: str) -> tuple[list[Answer], bool]:
@@ -191,7 +191,7 @@ def _raced(
     given: Sequence[Answer],
     laps: Sequence[tuple[int, int]],
 ) -> tuple[list[Answer], bool]:
-    """Refine many answers by few iterations each, then the best of them by more; return whether that was interrupted."""
+    """Refine many answers by few iterations each, then the best of them by more; also return whether that was interrupted."""
     for lap, (count, iterations) in enumerate(laps):
         # guesses run in the first lap whatever they are worth; what does not run in it is left behind
         best = distinct([*given, *kept], count + len(given), distance=RACED)
@@ -208,20 +208,20 @@ def _raced(
 
 
 def kept_answers(answers: Sequence[Answer]) -> list[Answer]:
-    """Return the answers that keep every constraint, best first."""
+    """Return the feasible answers, best first."""
     return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
 
 
 @ONE_THREAD
 def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
-    """Call a method of a new `Polisher` by its name, in another process or thread."""
+    """Call a method of a new `Polisher` by its name; for use in another process or thread."""
     return getattr(Polisher(normal, limits, pivot), name)(item)
 
 
 def distinct(
     answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
 ) -> list[Answer]:
-    """Return the first answers that are different linkages, by links as shares of the longest, coupler point and pivot."""
+    """Return the first answers that differ in links relative to the longest, coupler point or pivot."""
 
     def mark(answer: Answer) -> FloatArray:
         q, v = answer.start.q, answer.start.pivot
@@ -252,7 +252,7 @@ def distinct(
 
 
 class Polisher:
-    """Fits starts to one task; its programs are built when they are first needed."""
+    """Optimiser for one task; its programs are built when they are first needed."""
 
     def __init__(self, normal: Normal, limits: Limits, pivot: PivotUnknown | None) -> None:
         self.normal, self.limits, self.pivot = normal, limits, pivot
@@ -262,19 +262,19 @@ class Polisher:
         self._programs: dict[tuple[str, bool, int], Program] = {}
 
     def program(self, objective: Objective, *, exact: bool = False, parts: int = PARTS) -> Program:
-        """Return the program with this objective; with a fixed pivot all are exact."""
+        """Return the program with this objective; with a fixed pivot every program is exact."""
         key = objective, exact and self.pivot is not None, parts
         if key not in self._programs:
             self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1], parts=parts)
         return self._programs[key]
 
     def fit(self, start: Start) -> Answer:
-        """Fit the squared errors from a start; where points are met exactly, maximise the transmission angle."""
+        """Fit the squared errors from a start; if the points are met exactly, maximise the transmission angle."""
         fitted = self.by_least_squares
         return self.best_exact(fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start))
 
     def best_exact(self, answer: Answer) -> Answer:
-        """Return the linkage with the greatest transmission angle beside an answer that meets its points exactly."""
+        """Maximise the transmission angle, starting at an answer that meets its points exactly."""
         if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
             met = self.program("transmission").solve(answer.start)
             if met.feasible:
@@ -286,7 +286,7 @@ class Polisher:
         return [self.fit(start) for start in starts]
 
     def _solved(self, start: Start) -> Answer:
-        """Solve by IPOPT; where a region is not convex in several of its triangles, and on across the edges that hold it up."""
+        """Solve by IPOPT; a region of several triangles in the nearest ones, again from the best answer while it improves."""
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
             return program.solve(start)
@@ -308,7 +308,7 @@ class Polisher:
         return best
 
     def finish(self, answer: Answer) -> Answer:
-        """Go on where a search was cut off on a flat slope: else what is found there would depend on the last digits."""
+        """Continue a search that reached its limit of iterations: on a flat slope its result depends on the last digits."""
         if self.by_least_squares:
             return answer
         program = self.program("squares")
@@ -322,7 +322,7 @@ class Polisher:
         return last.exact(answer, lambda start, places: last.solve(start, places=places))
 
     def least(self, answers: Sequence[Answer]) -> list[Answer]:
-        """Minimise the objective that takes the place of the error, from answers with small errors."""
+        """Minimise the objective that replaces the error, from answers with small errors."""
         return [self._least(answer) for answer in answers]
 
     def _least(self, answer: Answer) -> Answer:
@@ -350,7 +350,7 @@ class Polisher:
         return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
 
     def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
-        """Minimise the area or the greatest error from least squares, each by so many iterations at most."""
+        """Minimise the area or the greatest error, from least-squares answers with their limits of iterations."""
         return [self._onwards(*item) for item in items]
 
     def _onwards(self, answer: Answer, iterations: int) -> Answer:
@@ -376,13 +376,13 @@ class Polisher:
 
     @property
     def refinement(self) -> Refinement:
-        """Return the refinement of an untimed path; made when it is first needed."""
+        """Return the refinement of an untimed path; it is built when it is first needed."""
         if self._refinement is None:
             self._refinement = Refinement(self.program("curve", exact=True))
         return self._refinement
 
     def kept(self, start: Start) -> Answer:
-        """Judge a start as it is: whether it keeps every constraint and bound."""
+        """Check, without optimising, whether a start meets every constraint and bound."""
         if self.by_least_squares:
             within = outside(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
             quality = sum_of_squares(self.normal, start)
@@ -399,7 +399,7 @@ class Polisher:
 def violated(
     solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint | Stroke]
 ) -> str:
-    """Return the constraint that a linkage violates most, and by how much; empty if it keeps all bounds and constraints."""
+    """Say which constraint a linkage violates most, and by how much; empty if it meets all bounds and constraints."""
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
     ratios = [linkage.pivot.ratio] if isinstance(linkage, FiveBar) else []
@@ -428,11 +428,11 @@ def residuals(
     Returns
     -------
     residual : ndarray, shape (m,)
-        x, then y, then angle, as far as the task has them, n of each.
+        n residuals each of x, y and angle, in this order, if the task has them.
     jacobian : ndarray, shape (m, 11)
-        With respect to `constraints.UNKNOWNS`.
+        Derivatives with respect to `UNKNOWNS`.
     rate : ndarray, shape (m,)
-        With respect to the crank rotation at the residual's own station.
+        Derivatives with respect to the crank rotation at the residual's station.
     """
     n = normal.n
     c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
@@ -462,7 +462,7 @@ def residuals(
 
 
 def sum_of_squares(normal: Normal, start: Start) -> float:
-    """Return the sum of weighted squared errors of a start with a fixed pivot; infinite where the links cannot be joined."""
+    """Return the sum of weighted squared errors of a start with a fixed pivot; infinite if the links cannot be joined."""
     rotation = normal.rotation if start.rotation is None else start.rotation
     assert rotation is not None
     residual = residuals(normal, start.branch, start.q, rotation)[0]
@@ -471,7 +471,7 @@ def sum_of_squares(normal: Normal, start: Start) -> float:
 
 
 def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
-    """Fit by SciPy's trust region reflective method within bounds, with the exact Jacobian of the compiled kernels."""
+    """Fit within bounds by SciPy's trust region reflective method, with the exact Jacobian of the compiled kernels."""
     free = np.nonzero(limits.high > limits.low)[0]
     timed, n = normal.timed, normal.n
     base = inside(start.q, limits.low, limits.high)

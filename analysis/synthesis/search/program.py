@@ -1,7 +1,7 @@
-"""The nonlinear program of a synthesis: evaluated with exact derivatives by CasADi, solved by IPOPT.
+"""Solve the nonlinear program of a synthesis by IPOPT, with exact derivatives from CasADi.
 
-`statement` says what is asked; here are its functions, the way from a start to unknowns and parameters, solving, and judging
-what came of it: whether the constraints are kept, of a moved pivot at the extremes of its motion.
+`statement` states the program. This module evaluates it, converts a start into unknowns and parameters and back, solves it, and
+checks the answer: whether it meets the constraints, for a moving pivot at the extremes of its motion.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .start import Answer, Start, inside, outside, pivot_size
 from .statement import FURTHER, GRID, SOUGHT, Statement
 
 FloatArray = NDArray[np.float64]
-#: How IPOPT follows its barrier: freely from a start that is only near, with care from one that a first solution gave.
+#: Barrier strategy of IPOPT: adaptive from a rough start, monotone with small steps from a first solution.
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},
@@ -36,23 +36,23 @@ FOLLOWING: dict[str, dict[str, Any]] = {
 }
 #: Iterations of IPOPT: most optima are reached in a hundred, or in many.
 ITERATIONS = 250
-#: How far a constraint may be exceeded and yet be kept: units, rad, or a share of the bound.
+#: Tolerance of a constraint: units, rad, or a fraction of the bound.
 KEPT = 1e-7
-#: Share of the bounds of the pivot's motion that is left free at its extremes, and how often these are looked for again.
+#: Margin of the bounds of the pivot's motion at its extremes, and the greatest number of times that these are found anew.
 HELD, ROUNDS = 2e-7, 6
 
 
 class Program(Statement):
-    """A synthesis as a nonlinear program that can be solved; its arguments are those of `Statement`."""
+    """A synthesis as a nonlinear program with its solver; the arguments are those of `Statement`."""
 
     @cached_property
     def _value(self) -> Any:
-        """Return objective and constraints as a function; it shows whether a start can be evaluated at all."""
+        """Return objective and constraints as a function, which also shows whether a start can be evaluated."""
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
     @cached_property
     def _begin(self) -> Any:
-        """Return the starting values of the unknowns that stand for a greatest value or a middle."""
+        """Return the starting values of the auxiliary unknowns: a greatest value, or the middle of a range."""
         casadi = self._casadi
         return casadi.Function(
             "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
@@ -60,19 +60,19 @@ class Program(Statement):
 
     @cached_property
     def _curvature(self) -> Any:
-        """Return the first two derivatives, by the crank's rotation, of the pivot's bounded motions at the places held."""
+        """Return the first two derivatives of the pivot's bounded motions, over the crank rotation, at the given extremes."""
         function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._bent)
         return lambda z, parameters: function.call([z, parameters])
 
     @cached_property
     def _slopes(self) -> Any:
-        """Return the gradient of the objective and Jacobian of the constraints, dense, as a function."""
+        """Return the gradient of the objective and the Jacobian of the constraints, dense, as a function."""
         casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
         both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
         return casadi.Function("slopes", [x, p], both)
 
     def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Return the objective at unknowns and parameters of `at`, and the constraints, kept between `g_low` and `g_high`."""
+        """Return objective and constraints, whose bounds are `g_low` and `g_high`, at the unknowns and parameters of `at`."""
         objective, constraints = self._value(z, parameters)
         return float(objective), np.asarray(constraints).ravel()
 
@@ -92,7 +92,7 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """Return the coupler point, shape (2, 1), at a share of the way of a path, and its derivatives, as a function."""
+        """Return, as a function, the coupler point at a fraction of a path's crank rotation, (2, 1), and its derivatives."""
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends
@@ -100,7 +100,7 @@ class Program(Statement):
         return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
 
     def _solver(self, iterations: int, near: bool) -> Any:
-        """Return IPOPT with this many iterations at most, for a start that is near or not."""
+        """Return an IPOPT solver with a limit of iterations; ``near`` if the start is close to an optimum."""
         if (iterations, near) in self._solvers:
             return self._solvers[iterations, near]
         self._solvers[iterations, near] = symbolic.ipopt(
@@ -117,7 +117,7 @@ class Program(Statement):
         return self._solvers[iterations, near]
 
     def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
-        """Order the triangles of each region by how far the pivot is outside of them."""
+        """Order the triangles of each region by the distance of the pivot from them."""
         order = []
         for name, triangles in self.limits.regions:
             x, y = float(q[0]), float(q[1])
@@ -128,17 +128,17 @@ class Program(Statement):
         return order
 
     def value(self, start: Start) -> float:
-        """Return the objective of a start; infinite where the links cannot be joined."""
+        """Return the objective of a start; infinite if the links cannot be joined."""
         f = self.stated(*self.at(start))[0]
         return f if isfinite(f) else inf
 
     @property
     def own(self) -> int:
-        """Place of the unknown that stands for the greatest value of the function that is minimised instead of an error."""
+        """Index of the unknown that represents the greatest value of the function that is minimised instead of an error."""
         return len(self.low) - len(self._initial)
 
     def greatest(self, start: Start) -> float:
-        """Return the greatest value of the minimised function at a start, where it takes the place of an error."""
+        """Return, at a start, the greatest value of the function that is minimised instead of an error."""
         return float(np.asarray(self._begin(*self.at(start))).ravel()[0])
 
     def at(
@@ -206,14 +206,14 @@ class Program(Statement):
         ----------
         start : Start
         size : float
-            Magnitude of the greatest error (units), where that is minimised.
+            Magnitude of the greatest error (units), if that is minimised.
         iterations : int
-            At most.
+            Limit of iterations.
         pieces : sequence of int, optional
-            Which triangle of each region; the nearest by default.
+            Number of the triangle of each region; by default the nearest.
         places : sequence of ndarray, optional
-            Where the extremes of the bounded motions of the pivot are, of `extremes`; without, the bounds are held with what
-            makes sure of them everywhere.
+            Rotations of `extremes` at which the bounds of the pivot's motion are imposed. Without them the bounds are imposed
+            on a grid, with a margin that guarantees them everywhere.
         """
         z0, parameters = self.at(start, size=size, pieces=pieces, places=places)
         if not all(np.isfinite(value).all() for value in self.stated(z0, parameters)):
@@ -230,7 +230,7 @@ class Program(Statement):
         )
 
     def judged(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
-        """Evaluate unknowns as an answer: anew, since CasADi returns zeros where IPOPT ends at no number."""
+        """Evaluate unknowns as an answer. The values of CasADi are not used: it returns zeros if IPOPT ends at NaN."""
         f, g = self.stated(z, parameters)
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
@@ -248,7 +248,7 @@ class Program(Statement):
         )
 
     def start_at(self, z: FloatArray, start: Start, quality: float) -> Start:
-        """Return unknowns as a start; rotations of stations that are not unknown stay as they were."""
+        """Convert unknowns to a start; rotations of stations that are not unknown are those of ``start``."""
         end = len(UNKNOWNS) + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation
         if not self.normal.timed and len(self.knots) == self.normal.n:
@@ -263,7 +263,7 @@ class Program(Statement):
         )
 
     def kept(self, start: Start) -> Answer:
-        """Judge a start as it is: whether it keeps every constraint and bound, and how far it is from that."""
+        """Check, without optimising, whether a start meets every constraint and bound, and find its worst violation."""
         places = self.extremes(start)
         ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
         best: Answer | None = None
@@ -278,7 +278,10 @@ class Program(Statement):
         return replace(best, feasible=best.feasible and within)
 
     def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
-        """Solve again and again with the bounds of the pivot's motion held at its extremes, until these stay where they are."""
+        """Solve repeatedly, with the bounds imposed at the extremes of the last solution, until the solution no longer moves.
+
+        These are the extremes of the pivot's motion, and of functions that are bounded along the crank's rotation.
+        """
         if not (self._peaks or self._along):
             return answer
         first = self.kept(answer.start) if self._along else answer
@@ -299,9 +302,9 @@ class Program(Statement):
         return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
-        """Find the extremes of the pivot's motion or of its derivatives: the angles of the roots of the next derivative.
+        """Find the crank rotations at which the bounded motions of the pivot, and the functions `Along`, are extreme.
 
-        Then where what holds along the crank's rotation has its greatest values.
+        Extremes of a motion or of one of its derivatives are roots of the next derivative, a trigonometric polynomial.
         """
         if not self._peaks:
             return self._greatest(start)
@@ -317,16 +320,16 @@ class Program(Statement):
         return found + self._greatest(start)
 
     def _greatest(self, start: Start) -> list[FloatArray]:
-        """Find the rotations at which each function along the rotation has its greatest values; see `find_peaks`."""
+        """Find the rotations at which each function `Along` has its greatest values; see `find_peaks`."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
         p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
         return [find_peaks(along, p, FURTHER) for along, _ in self._along]
 
 
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
-    """Return rows r with r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4); zero rows ask nothing.
+    """Return rows r with r . (l1, l2, l3, l4) <= 0 for a four-bar of this type, shape (6, 4); unused rows are zero.
 
-    Of a triple-rocker, whose links are not convex in their lengths, the shortest and the longest stay what they are.
+    Triple-rockers do not form a convex set of lengths: the shortest and the longest link of ``links`` must remain so.
     """
     rows = np.zeros((6, 4))
     if type_ is None:

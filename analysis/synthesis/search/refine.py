@@ -1,10 +1,10 @@
-"""Refinement of untimed paths: the measure between the whole curves is minimised.
+"""Refine untimed paths: minimise the measure between the whole curve and its target.
 
-Stations that are fitted in their order cannot cut a corner, and their squares are no area. Here the curve is the polygon by
-which it is judged, and the measure that of `areas`: the area of the symmetric difference, the strip along an open path, or the
-Hausdorff distance. The first two have a continuous gradient, which follows from the polygons and the exact derivatives of the
-coupler point; the last is the least bound of many distances. SciPy's SLSQP goes down from an optimum of the squares, in
-coordinates of which each moves the curve by as much.
+A least-squares fit at ordered stations cannot cut a corner, and its sum of squares is not an area. Here the curve is the
+polygon by which a solution is evaluated, and the measure is that of `task.target`: the area of the symmetric difference, the
+area of the strip along an open path, or the Hausdorff distance. The areas have a continuous gradient, which follows from the
+polygons and the exact derivatives of the coupler point; the Hausdorff distance is minimised as the least bound of many
+distances. SciPy's SLSQP starts from an optimum of the squares, in coordinates each of which moves the curve by the same amount.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ from .start import Answer, Start
 
 FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
-#: Iterations of SLSQP, and the change of the measure, as a share of what it was at first, at which it ends.
+#: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
 ITERATIONS, CHANGE = 100, 1e-7
-#: Share of the greatest mean square displacement of the curve by a unit of a direction; stiffer ones are not stretched further.
+#: Least mean square displacement of the curve by a direction, relative to the greatest, down to which directions are scaled.
 STIFF = 1e-6
-#: Pieces of the target, at least, along which distances are taken.
+#: Least number of pieces of the target at which distances are computed.
 PIECES = 360
-#: Of the greatest distance: every so many of all are held first, then those that are at least this share of it.
+#: For the greatest distance: every so many of all distances are bounded first, then those of at least this fraction of it.
 STRIDE, GREAT = 3, 0.5
-#: Way of the first station from where it was, and rotation by which successive stations are kept apart (rad).
+#: Greatest rotation of the first station from its former place, and least rotation between successive stations (rad).
 WINDOW, APART = 0.6, 1e-10
-#: Share of the bound of the greatest distance by which it may be exceeded: its places on the curve change from step to step.
+#: Fraction by which the bound of the greatest distance may be exceeded: its points on the curve change from step to step.
 WITHIN = 1e-5
-#: Where the crank begins to turn says nothing of a closed curve.
+#: The crank rotation at the start does not affect a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
 
 
 class Near(NamedTuple):
-    """Distances between points of curve and target, and their derivatives by the curve's points.
+    """Distances between points of curve and target, with their derivatives with respect to the curve's points.
 
     Attributes
     ----------
     distance : ndarray, shape (k,)
     before, after : ndarray of int, shape (k,)
-        Of the curve's points that it depends on.
+        Indices of the two points of the curve on which each distance depends.
     early, late : ndarray, shape (2, k)
-        Its derivatives with respect to their coordinates.
+        Derivatives of each distance with respect to the coordinates of these two points.
     """
 
     distance: FloatArray
@@ -142,13 +142,13 @@ class Refinement:
     # The way down
 
     def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
-        """Return the objective: the measure, or within its bound the program's own objective."""
+        """Return the objective: the measure, or, if the measure is only bounded, the program's own objective."""
         if self.limit is None:
             return self.measure(curve)
         return self.program.stated(z, parameters)[0] if self.over(curve) <= WITHIN * self.limit else inf
 
     def over(self, curve: FloatArray) -> float:
-        """Return how far the greatest distance, by which a path is judged, exceeds its bound (units)."""
+        """Return the excess of the greatest distance over its bound (units)."""
         if self.limit is None or not np.isfinite(curve).all():
             return inf
         return hausdorff(curve.T, self._target, closed=self.normal.closed) - self.limit
@@ -161,7 +161,7 @@ class Refinement:
         places: Sequence[FloatArray] | None = None,
         size: float = 1.0,
     ) -> Answer:
-        """Minimise the measure near an answer; return the answer itself where nothing better keeps the constraints."""
+        """Minimise the measure near an answer; return the answer itself if no better one meets the constraints."""
         program = self.program
         z0, parameters = program.at(answer.start, places=places, size=size)
         curve, slopes = self.traced(z0, parameters)
@@ -200,7 +200,7 @@ class Refinement:
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _rounds(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
-        """Choose the distances that are held within the greatest: a few all along, then all that are nearly as great."""
+        """Choose the distances that are constrained in each round: first a few along the whole curve, then the large ones."""
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
@@ -228,7 +228,7 @@ class Refinement:
         return stretch
 
     def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Find the rotations at which the curve comes nearest to the stations in their order, by dynamic programming."""
+        """Find, by dynamic programming, the ordered rotations at which the curve is nearest to the stations."""
         normal, program = self.normal, self.program
         assert normal.points is not None
         assert start.rotation is not None
@@ -267,9 +267,9 @@ class Refinement:
 
 
 class _Descent:
-    """The problem that SLSQP solves: the measure over directions of the unknowns, as a share of its first value.
+    """The problem for SLSQP: the measure as a function of directions of the unknowns, relative to its first value.
 
-    For the greatest distance the bound of all distances is one unknown more.
+    For the greatest distance there is one more unknown, the bound of all distances.
     """
 
     def __init__(
@@ -300,12 +300,12 @@ class _Descent:
         return y
 
     def unknowns(self, y: FloatArray) -> FloatArray:
-        """Return the program's unknowns, within their bounds to the last digit."""
+        """Return the program's unknowns, clipped to their bounds."""
         z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
         return np.clip(z, self._program.low, self._program.high)
 
     def value(self, y: FloatArray) -> tuple[float, FloatArray]:
-        """Return the measure and the program's own terms, with the gradient; far more where the links cannot be joined."""
+        """Return the measure plus the program's own terms, and the gradient; a large value if the links cannot be joined."""
         if self._bound:
             return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
         z = self.unknowns(y)
@@ -320,11 +320,11 @@ class _Descent:
         return (area + added) / self._size, whole @ self._stretch / self._size
 
     def _near(self, z: FloatArray) -> list[tuple[Near, Any]]:
-        """Return the distances, and which of them are held within the bound."""
+        """Return the distances, and which of them are constrained by the bound."""
         return list(zip(self._of.apart(self.curve(z)[0]), self._some))
 
     def constraints(self) -> list[dict[str, Any]]:
-        """Return the constraints of the program, its bounds, and the bound of the distances."""
+        """Return the constraints: those of the program, its bounds, and the bound of the distances."""
         program = self._program
         low, high = program.g_low, program.g_high
         equal = low == high
@@ -379,7 +379,7 @@ class _Descent:
 
 
 def _remembered(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
-    """Keep the last value of a function for another call with the same unknowns."""
+    """Cache the last value of a function, for another call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
     def called(z: FloatArray) -> Made:
@@ -404,7 +404,7 @@ def _middles(line: FloatArray, closed: bool) -> FloatArray:
 def _nearest(
     points: FloatArray, line: FloatArray, closed: bool
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
-    """Return the distance of each point from a polyline, the nearest piece, the share of it, and the place."""
+    """Return the distance of each point from a polyline, the nearest piece, the fraction of it, and the nearest point."""
     count = points.shape[1]
     distance, piece, share = np.empty(count), np.empty(count, dtype=np.int64), np.empty(count)
     nearest(points, line, closed, distance, piece, share)
@@ -413,7 +413,7 @@ def _nearest(
 
 
 def divided(outline: NDArray[np.complex128], weights: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """Cut the pieces of an outline into short ones, rows x, y; return the weight of each too."""
+    """Cut the pieces of an outline into short ones, rows x, y; return their weights, too."""
     points = np.append(outline, outline[0]) if closed else outline
     around = np.append(weights, weights[0]) if closed else weights
     lengths = np.abs(np.diff(points))

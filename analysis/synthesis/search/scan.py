@@ -1,16 +1,16 @@
-"""The global scan: many thousand linkages, each placed optimally in closed form.
+"""Scan many thousand linkages globally; the best position, size and coupler point of each follow in closed form.
 
-Variable projection: with the shape of the linkage (its links as shares of the ground link, of a slider-crank of the coupler, of
-a geared five-bar the second crank and its phase as well) and the crank's phase given, the
-coupler point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: place, size and direction, and the
-coupler point. What is left is searched by a Sobol sequence, which a seed scrambles.
+Variable projection: let the shape of the linkage and the crank's phase be given. The shape is the ratios of the links to the
+ground link, for a slider-crank to the coupler, and for a geared five-bar also the second crank and its phase. Then the coupler
+point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: position, size with direction, and coupler point.
+The remaining unknowns are sampled by a Sobol sequence, which a seed scrambles.
 
-- Timed tasks: shape and phase are searched.
-- Few untimed stations: their crank rotations as well, in order.
-- Untimed paths: shape and coupler point are searched; each coupler curve is laid over the target by the best similarity, at
-  even arc length, over all starting points (by a fast Fourier transform of their correlation), or all pieces of it for an open
-  path.
-- Rocker functions: shape and phase; the mounting angle is the mean of what is left.
+- Timed tasks: shape and phase are sampled.
+- Few untimed stations: their crank rotations, too, in order.
+- Untimed paths: shape and coupler point are sampled. Each coupler curve is laid over the target by the best similarity
+  transformation, at equal arc lengths, over all starting points (by a fast Fourier transform of their correlation), or, for an
+  open path, over all pieces of the curve.
+- Rocker functions: shape and phase are sampled; the mounting angle is the mean of the differences.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from .start import Start, apart
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-#: Ranges of l2/l1, l3/l1, l4/l1 that are searched, evenly in the logarithm.
+#: Ranges of l2/l1, l3/l1, l4/l1 that are sampled, uniformly in the logarithm.
 SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
-#: Of a slider-crank of l1/l3 and l2/l3; of l5/l1, of a second crank; crank rotations at which a five-bar is looked at.
+#: Ranges of l1/l3 and l2/l3 of a slider-crank; of l5/l1 of a second crank; crank rotations at which a five-bar is checked.
 GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
 #: Candidates in one piece of work.
 CHUNK = 4096
-#: One of so many coupler curves is that of the crank pin.
+#: One of so many coupler points is at the crank pin.
 PINNED = 64
-#: Of a chunk of coupler curves, how many are placed over the target: the most alike.
+#: Number of coupler curves of a chunk that are placed over the target: the most similar ones.
 PLACED = 160
-#: Steps of a coupler curve and points of it at even arc length.
+#: Steps of a coupler curve, and its points at equal arc lengths.
 CURVE, EVEN = 128, 64
-#: Pieces of a coupler curve that an open target is laid over: points at even arc length, first steps, lengths in steps.
+#: Pieces of a coupler curve that are compared with an open target: points at equal arc lengths, first steps, numbers of steps.
 PIECE = 24
 STARTS = np.arange(0, CURVE, 8)
 SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])
@@ -56,9 +56,9 @@ APART = 0.08
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidates:
-    """Rows of candidates: quality (m,), finite where placed, eleven unknowns (m, 11), rotations (m, n) or None, their branch.
+    """Candidates: quality (m,), finite for those that were placed, eleven unknowns (m, 11), rotations (m, n) or None, branch.
 
-    With a second crank its length and phase, ``pivot`` (m, 2).
+    With a second crank also its length and phase, ``pivot`` (m, 2).
     """
 
     quality: FloatArray
@@ -69,9 +69,9 @@ class Candidates:
 
 
 class _FourBarShapes:
-    """The shapes of four-bars: which ratios of links are drawn, and which of them a constraint allows.
+    """Shapes of four-bars: the ratios of links that are sampled, and which of them the constraints allow.
 
-    ``base`` is the unknown that the ``others`` are ratios to, within ``ranges``.
+    The ratios are those of ``others`` to the unknown ``base``, within ``ranges``.
     """
 
     base, others, ranges = 2, slice(3, 6), SHAPES
@@ -83,7 +83,7 @@ class _FourBarShapes:
 
     @staticmethod
     def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        """Return which shapes keep the transmission angle over a turn."""
+        """Return which shapes meet the least transmission angle over a turn."""
         l1, l2, l3, l4, _ = links.T
         ends = (l1 - l2) ** 2, (l1 + l2) ** 2
         excess = limits.linkage.transmission_excess(l3, l4, *ends, cos(max(least, TURNING)))
@@ -92,13 +92,13 @@ class _FourBarShapes:
 
     @staticmethod
     def shares(start: Start) -> FloatArray:
-        """Return the ratios by which starts are told apart."""
+        """Return the ratios by which starts are distinguished."""
         ratios: FloatArray = start.q[3:6] / start.q[2]
         return ratios
 
 
 class _SliderCrankShapes(_FourBarShapes):
-    """The shapes of slider-cranks: offset and crank as shares of the coupler."""
+    """Shapes of slider-cranks: offset and crank relative to the coupler."""
 
     base, others, ranges = 4, slice(2, 5), (*GUIDED, (1.0, 1.0))
 
@@ -114,7 +114,7 @@ class _SliderCrankShapes(_FourBarShapes):
 
 
 class _FiveBarShapes(_FourBarShapes):
-    """The shapes of geared five-bars: those of a four-bar, and the second crank's length and phase."""
+    """Shapes of geared five-bars: those of a four-bar, with length and phase of the second crank."""
 
     @staticmethod
     def links(shapes: FloatArray, limits: Limits) -> FloatArray:
@@ -123,7 +123,7 @@ class _FiveBarShapes(_FourBarShapes):
 
     @staticmethod
     def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        """Return which shapes keep it at `AROUND` rotations; few come to the last of these."""
+        """Return which shapes meet it at `AROUND` rotations, which are tried in turn; few shapes reach the last one."""
         turned = limits.gears
         allowed = np.ones(len(shapes), dtype=bool)
         for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
@@ -146,19 +146,19 @@ _SHAPES: Mapping[Kind, type[_FourBarShapes]] = {
 
 
 def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
-    """Find the best starts of both assemblies, none near another, best first.
+    """Find the best starts of both assemblies, no two of them close together, best first.
 
     Parameters
     ----------
     candidates : int
-        Shapes that are tried, those that are not allowed left out.
+        Number of allowed shapes that are tried.
     starts : int
-        How many are kept.
+        Number of starts that are kept.
 
     Raises
     ------
     InfeasibleError
-        If no shape at all is allowed.
+        If no shape is allowed.
     """
     found: list[Candidates] = []
     placed = 0
@@ -177,9 +177,9 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
 
 
 def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
-    """Yield allowed shapes with the other searched numbers in [0, 1), in chunks.
+    """Yield allowed shapes, with the other sampled numbers in [0, 1), in chunks.
 
-    Rows of (l2/l1, l3/l1, l4/l1), of a slider-crank (l1/l3, l2/l3, 1), and six numbers.
+    Rows are (l2/l1, l3/l1, l4/l1), for a slider-crank (l1/l3, l2/l3, 1), and six numbers.
     """
     sequence = qmc.Sobol(9, seed=seed)
     kept, tried = 0, 0
@@ -194,7 +194,7 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
 
 
 def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
-    """Yield the same rows, about `CHUNK` at a time: of each chunk only the best are placed."""
+    """Yield the same rows in chunks of about `CHUNK`, of each of which only the best are placed."""
     rows: list[FloatArray] = []
     for chunk in chunks:
         rows.append(chunk)
@@ -206,7 +206,7 @@ def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
 
 
 def _why(limits: Limits, seed: int) -> str:
-    """Say which of the limits leaves no shape, by itself or only with the others."""
+    """Say which limit leaves no shape, by itself or together with the others."""
     free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
     alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
     if limits.turn is not None:
@@ -222,7 +222,7 @@ def _why(limits: Limits, seed: int) -> str:
 
 
 def _stretched(unit: FloatArray, limits: Limits) -> FloatArray:
-    """Return the rows of `_shapes`, from numbers in [0, 1)."""
+    """Map numbers in [0, 1) to the rows of `_shapes`."""
     low, high = np.log(_ratios(limits)).T
     return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
 
@@ -244,7 +244,7 @@ def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
 
 
 def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
-    """Return which shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
+    """Return which shapes meet transmission angle and Grashof type, and for some size the bounds of their links."""
     sized = _SHAPES[limits.linkage.kind].links(shapes, limits)
     links = sized[:, :4]
     allowed = np.ones(len(shapes), dtype=bool)
@@ -264,13 +264,13 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
 
 
 def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
-    """Return the phase of the second crank, such that the curve does not depend on the first one's."""
+    """Return the phase of the second crank for which the curve does not depend on the phase of the first one."""
     turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
     return turned
 
 
 def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest factors of links with which every one keeps its bounds."""
+    """Return the least and greatest factor with which all links are within their bounds."""
     second = limits.second or (0.0, inf)
     there = links > 0.0
     low, high = (
@@ -303,7 +303,7 @@ def _directions(
     limits: Limits,
     turned: FloatArray | float = 0.0,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the directions of coupler and rocker of shapes at crank rotations, after a rotation of each shape's own."""
+    """Compute the directions of coupler and rocker at crank rotations, counted from a rotation that each shape has."""
     first, second = limits.gears
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
@@ -316,7 +316,7 @@ def _directions(
 
 
 def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place rocker functions: the phase is searched, the mounting angle follows."""
+    """Place rocker functions: the phase is sampled, the mounting angle follows."""
     assert normal.rotation is not None
     assert normal.angle is not None
     phase = 2.0 * pi * shapes[:, 3]
@@ -337,7 +337,7 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
 
 
 def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place slider functions: shape and phase are searched; size and place of the shaft follow."""
+    """Place slider functions: shape and phase are sampled; size and position of the shaft follow."""
     assert normal.rotation is not None
     assert normal.points is not None
     phase = 2.0 * pi * shapes[:, 3]
@@ -421,7 +421,7 @@ def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexAr
 
 
 def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
-    """Place untimed paths: coupler curves laid over the target by a similarity."""
+    """Place untimed paths: coupler curves are laid over the target by a similarity transformation."""
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
     coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
@@ -539,14 +539,14 @@ def _bounded(
 def _vectors(
     links: FloatArray, size: FloatArray, scale: ComplexArray, place: ComplexArray, point: ComplexArray
 ) -> FloatArray:
-    """Return the unknowns of linkages, shape (m, 11), from sizes, scales, places and coupler points."""
+    """Return the unknowns of linkages, shape (m, 11), from sizes, scales, positions and coupler points."""
     zero, sized = np.zeros(len(links)), size[:, None] * links[:, :4]
     angles = [np.angle(scale), zero, np.angle(point), zero]
     return np.column_stack([place.real, place.imag, sized, size * np.abs(point), *angles])
 
 
 def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
-    """Resample closed curves at even arc length, shape (m, k); return the crank rotation at each of these points too."""
+    """Resample closed curves at equal arc lengths, shape (m, k); return the crank rotation at each of these points, too."""
     m, n = curves.shape
     ring = np.hstack([curves, curves[:, :1]])
     length = np.hstack([np.zeros((m, 1)), np.cumsum(np.abs(np.diff(ring, axis=1)), axis=1)])

@@ -1,4 +1,4 @@
-"""`synthesize`: from a task to ranked linkages, and the trade-off of its error against size or transmission angle."""
+"""Search for linkages that do a task and rank them; trade the error against size, transmission angle or pin force."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ from .start import (
     start_of,
 )
 
-#: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
+#: Stations of an untimed path with a moving pivot: more than with a fixed one, because harmonics cause waves in the curve.
 STATIONS = 144
-#: Untimed points that a four-bar can meet exactly, and how many times the starts they are searched from until they are met.
+#: Untimed points that a four-bar can pass exactly, and the factor by which starts are increased until it passes them.
 MOST_EXACT, AGAIN = 9, 4
 
 
@@ -62,17 +62,17 @@ class Synthesis(Shown):
     Attributes
     ----------
     task : Task
-        With the weights it was solved with.
+        The task with the weights of the search.
     solutions : tuple of Solution
-        Sound ones first, then by error. Each also stands for its mirror images and near copies, its ``variants``.
+        Those without defects first, then by error. Each also represents its mirror images and near copies, its ``variants``.
     method : str
     seed : int
     starts : int
-        Searches that were run.
+        Number of searches that were run.
     seconds : float
-        It took (s).
+        Duration of the search (s).
     complete : bool
-        False if it was stopped.
+        False if the search was stopped.
     """
 
     task: Task
@@ -99,7 +99,7 @@ class Synthesis(Shown):
     def columns(self) -> dict[str, list[float]]:
         """Return rank, errors, verdicts (1 or 0) and dimensions of `every` solution; SI, units in the names.
 
-        A variant has the rank of the solution that stands for it as ``variant of``, which is otherwise 0.
+        For a variant, ``variant of`` is the rank of the solution that represents it; otherwise it is 0.
         """
         columns = solution_columns(self.every)
         of = [float(rank) for rank, s in enumerate(self.solutions, start=1) for _ in s.variants]
@@ -107,7 +107,7 @@ class Synthesis(Shown):
 
     @property
     def every(self) -> tuple[Solution, ...]:
-        """Return the solutions, and behind them the variants of each."""
+        """Return the solutions, followed by the variants of each."""
         return (*self.solutions, *(variant for s in self.solutions for variant in s.variants))
 
     def to_csv(self, path: str | Path) -> Path:
@@ -116,7 +116,7 @@ class Synthesis(Shown):
 
 
 class SynthesisInterrupted(Interrupted):
-    """A synthesis was stopped from the keyboard; ``synthesis`` holds the best so far, or is None if there is none."""
+    """A synthesis was interrupted by Ctrl-C; ``synthesis`` has the best solutions so far, or is None."""
 
     def __init__(self, synthesis: Synthesis | None, done: int, starts: int) -> None:
         self.synthesis = synthesis
@@ -138,40 +138,41 @@ def synthesize(
 ) -> Synthesis:
     """Find linkages that do a task.
 
-    A scan over many thousand linkages of each kind, each placed in closed form, gives the starts; each is polished to an
-    optimum with exact derivatives. What cannot be done exactly is answered with the best there is, its error stated.
+    A scan over many thousand linkages of each kind, each placed in closed form, gives the starts; each start is optimised with
+    exact derivatives. If no linkage does the task exactly, the best approximations are returned with their errors.
 
     Parameters
     ----------
     task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, QuickSwing, Motion or PrecisionPoints
     bounds : mapping, optional
         (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
-        ``second_crank_length``; equal ones fix a dimension, kinds that do not have it leave it out. Without, links up to five
-        times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
+        ``second_crank_length``; equal bounds fix a dimension, and kinds of linkages without it ignore them. By default links
+        are at most five times the target's size; for a rocker function the ground link is 0.1 m and the other links are at
+        most five times that.
     constraints : sequence
-        See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
+        See `task.constraint`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
-        One per target, in the place of the task's own.
+        Weights that replace those of the task, one per target.
     pivot : SliderUnknown or CrankUnknown, optional
-        Move the rocker pivot, its motion sought together with the links.
+        Unknown motion of the rocker pivot, which is found together with the links.
     guesses : sequence of Solution
-        Searched from as well.
+        Solutions from which a search starts, too.
     search : Search
         Method, starts, seed, cores.
     kinds : sequence of "four-bar", "slider-crank", "geared-five-bar", optional
-        Mechanisms that are tried, all ranked together, the best of each among the solutions; by default four-bars, for a
-        function of a slider slider-cranks.
+        Kinds of linkages that are tried and ranked together; the best of each kind is among the solutions. By default
+        four-bars, for a slider function slider-cranks.
     gears : sequence of float
-        Ratios of the gears of five-bars: turns of the second crank for one of the first.
+        Gear ratios of five-bars: turns of the second crank per turn of the first.
 
     Raises
     ------
     InputError
-        If the task, the weights or a number here is not usable, or one of the kinds cannot do the task or keep a constraint.
+        If an argument is not usable, or a kind of linkage cannot do the task or meet a constraint.
     InfeasibleError
-        If no linkage keeps all bounds and constraints; it names the one that the nearest linkage violates most.
+        If no linkage meets all bounds and constraints; it names the one that the nearest linkage violates most.
     SynthesisInterrupted
-        On Ctrl-C, with the best so far.
+        On Ctrl-C, with the best solutions so far.
 
     Examples
     --------
@@ -252,7 +253,7 @@ def _searched(
 ) -> Polished:
     """Search for one kind of linkage, from the starts of a scan and from guesses.
 
-    Sound linkages are ranked first: where no limit keeps them sound, they are searched for by themselves too.
+    Linkages without defects rank first: if the limits do not exclude defects, a second search excludes them.
     """
     begin = [start_of(guess, normal, pivot) for guess in guesses]
     random = np.random.default_rng(search.seed)
@@ -275,7 +276,7 @@ def _searched(
 
 
 def _together(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
-    """Return the best of all solutions, at most so many, with the best of each kind among them."""
+    """Return the best ``count`` solutions, which include the best one of each kind."""
     every = ranked([s for part in found for s in part])
     first = {s.linkage.kind: s for s in reversed(every)}.values()
     rest = [s for s in every if not any(s is best for best in first)]
@@ -294,22 +295,22 @@ def improve(
     kept: Collection[str] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Search from a linkage whose rocker pivot is moved, its motion at random as often as ``search.starts``, and from guesses.
+    """Search from a linkage with a moving rocker pivot: from ``search.starts`` random motions of it, and from guesses.
 
     Parameters
     ----------
     task, bounds, constraints, guesses, search
-        As for `synthesize`; there is no scan.
+        See `synthesize`; there is no scan.
     linkage : Linkage or Solution
-        For an open path a solution, which brings the crank rotations of the stations; likewise each guess.
+        The linkage; for an open path a solution, with the crank rotations of its stations. The same holds for each guess.
     pivot : SliderUnknown or CrankUnknown
     kept : collection of str
-        Dimensions that are fixed, returned as they are to the last digit.
+        Dimensions that are fixed and returned unchanged.
 
     Raises
     ------
     InputError, InfeasibleError, SynthesisInterrupted
-        As `synthesize`.
+        See `synthesize`.
     """
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
@@ -333,10 +334,9 @@ def improve(
 
 
 def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
-    """Return the task as it is searched for: with the greatest error, where that is bounded and something else minimised.
+    """Return the task for the search: with the greatest error as objective if it is bounded and another function is minimised.
 
-    Raises InputError if what is asked is about a four-bar, and the pivot moved, or the method can make nothing but errors
-    small.
+    Raises InputError if a constraint or objective does not apply to a moving pivot, or the method can only minimise errors.
     """
     demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
     if demands and pivot is not None:
@@ -349,7 +349,7 @@ def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown |
 def _result(
     task: Task, found: tuple[Solution, ...], done: Polished, total: int, search: Search, begun: float
 ) -> Synthesis:
-    """Return the result of a search of so many starts that began at a time of `perf_counter`; or raise why there is none."""
+    """Return the result of a search with its number of starts and duration; raise an error if it has no solution."""
     result = Synthesis(
         task=task,
         solutions=found,
@@ -367,7 +367,7 @@ def _result(
 
 
 def search_form(task: Task, pivot: PivotUnknown | None) -> Normal:
-    """Return the normal form of a task for a search; an untimed path has more stations where the pivot moves."""
+    """Return the normal form of a task for a search; an untimed path has more stations if the pivot moves."""
     if pivot is not None and isinstance(task, UntimedPath):
         task = replace(task, samples=max(task.samples, STATIONS))
     return normal_form(task)
@@ -376,7 +376,7 @@ def search_form(task: Task, pivot: PivotUnknown | None) -> Normal:
 def make_solutions(
     task: Task, normal: Normal, limits: Limits, done: Polished, pivot: PivotUnknown | None, count: int
 ) -> tuple[Solution, ...]:
-    """Evaluate answers as solutions, ranked, and at most so many."""
+    """Evaluate answers as solutions, rank them, and return at most ``count``."""
 
     def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
         found = (
@@ -402,7 +402,7 @@ def make_solutions(
 
 
 def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-    """Return the crank rotations of the task's own stations, from those of the stations it was fitted at."""
+    """Return the crank rotations of the task's stations, from those of the stations of the fit."""
     own = normal_form(task)
     if rotation is None or len(rotation) == own.n:
         return rotation
@@ -421,11 +421,11 @@ class TradeOff:
     Attributes
     ----------
     over : str
-        The quantity whose limit is tightened, of `OVER`.
+        The quantity whose limit is tightened, a key of `OVER`.
     limit : ndarray, shape (n,)
         Largest link (m), least transmission angle (rad), or greatest force on a pin (N).
     solutions : tuple of Solution or None
-        The best at each; None where there is no linkage.
+        The best solution at each limit; None if there is no linkage.
     """
 
     over: str
@@ -452,7 +452,7 @@ class TradeOff:
 
 
 class Over(NamedTuple):
-    """The quantity that an error is traded for: name and SI unit of its limit, and whether a small limit is the tight one."""
+    """The quantity traded against the error: name and SI unit of its limit, and whether a smaller limit is tighter."""
 
     name: str
     unit: str
@@ -467,7 +467,7 @@ OVER: Mapping[str, Over] = {
 
 
 class TradeOffInterrupted(Interrupted):
-    """A trade-off was stopped from the keyboard; ``trade_off`` has the best so far at each limit, None where there is none."""
+    """A trade-off was interrupted by Ctrl-C; ``trade_off`` has the best solution so far at each limit, or None."""
 
     def __init__(self, trade_off: TradeOff, done: int, problems: int) -> None:
         self.trade_off = trade_off
@@ -490,9 +490,9 @@ def trade_off(
 ) -> TradeOff:
     """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
 
-    From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a
-    second pass goes back, so that a solution found late serves the looser limits too, itself or polished anew: the error of
-    sound linkages can only grow as a limit is tightened.
+    From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the one before. A
+    second pass in the opposite direction uses late solutions for looser limits, too, as they are or optimised again, since the
+    error of the best linkage can only grow as the limit is tightened.
 
     Parameters
     ----------
@@ -501,10 +501,10 @@ def trade_off(
     limits : array_like, shape (n,)
         Largest links (m), least transmission angles (rad), or greatest forces on the pins (N).
     bounds, constraints, weights, pivot, kinds, gears
-        As for `synthesize`; the limit takes the place of a constraint of its own kind. Of pin forces a `MaxPinForce` among the
-        constraints says what is made and how it runs.
+        See `synthesize`; the limit replaces a constraint of the same kind. For pin forces a `MaxPinForce` among the
+        constraints gives masses, load and speed.
     search : Search
-        As for `synthesize`, but for the candidates, at most 16384, and the solutions.
+        See `synthesize`; but there are at most 16384 candidates, and ``solutions`` is ignored.
 
     Raises
     ------
@@ -546,24 +546,24 @@ def solve_both_ways(
     search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
     begin: Sequence[Solution] = (),
 ) -> tuple[dict[int, Solution], int | None]:
-    """Solve a row of problems, each started from the ones before it, from the loosest to the tightest and back.
+    """Solve a series of problems, from the loosest to the tightest and back, each starting from the solutions before it.
 
     Parameters
     ----------
     order : sequence of int
-        The problems, the loosest first.
+        Numbers of the problems, the loosest first.
     search : callable
-        Solutions of a problem by its number, from guesses, on the way back or not; it may raise `InfeasibleError`.
+        Function of a problem's number, guesses, and whether on the way back: it returns solutions or raises `InfeasibleError`.
     begin : sequence of Solution
         Guesses for the first problem.
 
     Returns
     -------
     found : dict
-        The best solution of each problem that has one. On the way back what keeps the tighter limit keeps the looser one too:
+        The best solution of each problem that has one. A solution that meets a tighter limit also meets a looser one, so that
         errors can only grow as the limit is tightened.
     done : int or None
-        If it was stopped from the keyboard, how many of twice the problems were done.
+        If it was interrupted by Ctrl-C, the number of solved problems, each counted in both directions.
     """
     found: dict[int, Solution] = {}
     for back in (False, True):

@@ -1,4 +1,4 @@
-"""Settings of a search, its starts and answers in normal form, and its work spread over cores."""
+"""Define the settings of a search, its starts and answers in normal form, and the distribution of work over cores."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ class Search:
     Attributes
     ----------
     starts : int
-        Searches that are run: of a scan, candidates that are polished.
+        Number of searches: candidates of the scan that are optimised.
     solutions : int
-        At most that many different linkages are returned.
+        Greatest number of different linkages that are returned.
     seed : int
         The same seed gives the same solutions, on any number of cores.
     candidates : int
-        Four-bars in the scan.
+        Number of linkages in the scan.
     n_jobs : int, optional
-        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
+        Number of processes, -1 for one per core; inside `joblib.parallel_config` for a cluster, all of its cores.
     progress : bool
         Show a progress bar.
     """
@@ -79,7 +79,7 @@ QUICK_SEARCH = Search(starts=12)
 def over_cores(
     work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
 ) -> tuple[list[Made], bool]:
-    """Work on all items, in their order on any number of cores; on Ctrl-C return the results so far, and True."""
+    """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted it."""
     made: dict[int, Made] = {}
     with interruptible() as interrupted, shown(search.progress, float(len(items)), what) as show:
         for number, value in over_workers(work, items, interrupted, n_jobs=search.n_jobs):
@@ -91,29 +91,30 @@ def over_cores(
 
 
 FloatArray = NDArray[np.float64]
-#: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
+#: Initial amplitudes of the motion of a pivot, relative to the ground link.
 AMPLITUDE = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
-    """A point at which a search starts or ends, in normal form.
+    """A point at which a search starts or ends, in normal form (see `Normal`).
 
     Attributes
     ----------
     q : ndarray, shape (11,)
-        Of `constraints.UNKNOWNS`.
+        Values of `UNKNOWNS`.
     branch : int
     pivot : ndarray
-        Unknowns of the moved pivot: guide angle, mean, cosines and sines in turn; or length, phase, cosines and sines.
+        Unknowns of a moving pivot: guide angle, mean, then cosine and sine of each harmonic; for a second crank length and
+        phase instead of the first two.
     rotation : ndarray, shape (n,), or None
-        Crank rotations of the stations where they are unknown.
+        Crank rotations of the stations if they are unknown.
     quality : float
-        In units squared; of a greatest error, in units.
+        Quality in units squared; a greatest error in units.
     given : bool
         Whether it is a guess.
     linkage : type
-        Type of the linkage: without a second crank, which is the pivot's.
+        Type of the linkage; a second crank belongs to the pivot.
     """
 
     q: FloatArray
@@ -127,9 +128,9 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """The end of an optimisation: its point, whether every constraint is kept, the worst violation, and the status.
+    """Result of an optimisation: its point, whether it meets every constraint, the worst violation, and the solver's status.
 
-    By how much it is, ``violation`` is in units, rad or shares of a bound, ``excess`` a text with its unit.
+    ``violation`` is in units, rad or fractions of a bound; ``excess`` is a text with its unit.
     """
 
     start: Start
@@ -143,7 +144,7 @@ class Answer:
 
     @classmethod
     def unjoined(cls, start: Start) -> Answer:
-        """Make the answer for a start whose links cannot be joined."""
+        """Return the answer for a start whose links cannot be joined."""
         return cls(
             start=replace(start, quality=inf),
             feasible=False,
@@ -157,7 +158,7 @@ class Answer:
 
 
 def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
-    """Draw unknowns of a pivot at random: harmonics that fall off with their order, within the bounds of stroke and length.
+    """Draw random unknowns of a pivot: harmonics that decrease with their order, within the bounds of stroke and length.
 
     Parameters
     ----------
@@ -197,7 +198,7 @@ def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, F
 
 
 def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Move unknowns within their bounds, angles by whole turns where that is enough."""
+    """Clip unknowns to their bounds, angles by whole turns if that is enough."""
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
     middle = 0.5 * (low[angles] + high[angles])
@@ -208,7 +209,7 @@ def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
-    """Return how far each unknown of a start is from its bounds (units, rad); 0 in a dimension that the task does not see."""
+    """Return the distance of each unknown of a start from its bounds (units, rad); 0 for one that does not affect the task."""
     q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
     off = np.abs(wrapped(q - start.q))
     off[:7] = np.abs(q - start.q)[:7]
@@ -222,7 +223,7 @@ def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> 
 def make_linkage(
     start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
 ) -> Linkage:
-    """Make the linkage of a start, in SI; its angles within half a turn of zero, or else within their limits."""
+    """Build the linkage of a start, in SI, with angles in [-pi, pi) or, if these are out of bounds, within their limits."""
     q = start.q.copy()
     q[:7] *= normal.unit
     q[0] += normal.origin.real
@@ -248,7 +249,7 @@ def make_linkage(
 def make_start(
     linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
 ) -> Start:
-    """Make a start of a linkage; the pivot's motion is cut off after, or filled up to, the harmonics sought."""
+    """Convert a linkage to a start; the pivot's motion is truncated, or padded with zeros, to the unknown harmonics."""
     q = np.append(linkage.vector, linkage.output_angle)
     q[0] -= normal.origin.real
     q[1] -= normal.origin.imag
@@ -269,9 +270,9 @@ def make_start(
 
 
 def start_of(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
-    """Make a start of a linkage, its untimed stations at the solution's rotations, or where it comes nearest to them.
+    """Convert a linkage or solution to a start, with untimed stations at the solution's rotations or the nearest ones.
 
-    Raises InputError if rotations are needed and cannot be found so, because the path is open.
+    Raises InputError if rotations are needed and cannot be found in this way, because the path is open.
     """
     linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
     if normal.timed:
@@ -287,7 +288,7 @@ def start_of(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None)
 
 
 def closed_form(task: Task) -> tuple[Solution, ...]:
-    """Return the sound four-bars that do a task exactly, where it has a closed form: untimed poses, points of a function."""
+    """Return the four-bars without defects that do a task exactly, if it has a closed form: untimed poses, function points."""
     try:
         if isinstance(task, RockerFunction):
             return function_generators(task).sound
@@ -300,7 +301,7 @@ def closed_form(task: Task) -> tuple[Solution, ...]:
 
 
 def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
-    """Return the first items, at most so many, whose marks differ by the distance from those of all before."""
+    """Return the first ``count`` items whose marks have at least this distance from those of all items before."""
     chosen: list[Item] = []
     marks: list[FloatArray] = []
     for item in items:

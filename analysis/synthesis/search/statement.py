@@ -1,8 +1,8 @@
-"""The statement of a synthesis as a nonlinear program in CasADi's symbols; `program` evaluates and solves it.
+"""State a synthesis as a nonlinear program in CasADi symbols; `program` evaluates and solves it.
 
-Loop closure is that of the plant, traced (`analysis.numerics.symbolic`). The program is stated in normal form (`tasks.Normal`,
-`constraints.Limits`); what a start decides - assembly, direction of travel, which triangle of a region, which link is the
-shortest - comes as parameters, so that one program serves all starts.
+Loop closure is that of the plant, traced (`analysis.numerics.symbolic`). The program is in normal form (`Normal`, `Limits`).
+The choices that depend on the start - assembly, direction of travel, triangle of a region, shortest link - are parameters, so
+that one program serves all starts.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ from .start import pivot_bounds
 
 FloatArray = NDArray[np.float64]
 Objective = Literal["squares", "worst", "transmission", "curve", "least", "least curve"]
-#: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
-#: to the least transmission angle for what is between them (rad).
+#: Number of crank rotations at which assembly, speed and acceleration of a moving pivot are bounded, and the margin of the
+#: least transmission angle for the rotations between them (rad).
 GRID, BETWEEN = 96, 2.5e-3
-#: Margin of a Grashof type, as a share of the links' sum: at zero a four-bar is a change-point.
+#: Margin of a Grashof type, relative to the sum of the links: at zero a four-bar is a change-point.
 MARGIN = 1e-4
-#: Parts of the way from one station to the next at whose ends a search holds the transmission angle.
+#: Parts between two stations at whose ends a search bounds the transmission angle.
 PARTS = 4
-#: Least rotation of the crank from one untimed station to the next, as a share of an even one.
+#: Least crank rotation between untimed stations, relative to equal steps.
 ADVANCE = 1e-3
 #: Least rotation over which an open path is traced (rad).
 LEAST_WAY = 1e-3
-#: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
+#: Greatest crank rotation between untimed stations, relative to equal steps: a wider gap would leave the path uncontrolled.
 GAP = 8.0
-#: Objectives in the place of an error.
+#: Objectives that replace an error.
 SOUGHT = ("least", "least curve")
-#: Name of the bound of the greatest error; share of it by which an error of zero has a slope.
+#: Name of the bound of the greatest error; fraction of it that smooths the absolute value at an error of zero.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
-#: Rotations beside the given ones at which what holds all along is held: its greatest values in the solution before.
+#: Further rotations at which an `Along` is bounded: those of its greatest values in the solution before.
 FURTHER = 8
 
 
 class Label(NamedTuple):
-    """Name of a constraint, with the factor and the unit in which its violation is written."""
+    """Name of a constraint, with the unit in which its violation is written, and the factor to it."""
 
     name: str
     factor: float
@@ -56,7 +56,7 @@ class Label(NamedTuple):
     linkage: type[Linkage] = Linkage
 
     def measured(self, violation: float, q: FloatArray) -> str:
-        """Format a violation with its unit; of a transmission angle by its effect on the angle at the limit."""
+        """Format a violation with its unit; for a transmission angle by its effect on the angle at the limit."""
         if self.unit == "transmission":
             least = self.factor
             cosine = cos(least) + violation / float(self.linkage.excess_slope(q[4], q[5], cos(least)))
@@ -72,17 +72,19 @@ class Statement:
     normal : Normal
     limits : Limits
     pivot : PivotUnknown, optional
-        Lengths in m, as the task; None of a fixed pivot.
+        Unknown motion of the pivot, with lengths in m like the task; None for a fixed pivot.
     objective : "squares", "worst", "transmission", "curve", "least" or "least curve"
-        Weighted squared errors; the greatest weighted error, as the least bound of all; the least transmission angle, greatest,
-        with the stations met exactly; or nothing but the constraints of a path, for `analysis.synthesis.refine`, whose measure
-        needs no stations: of their rotations only the ends of an open path and of its straight part are unknown. The
-        last two are the objective of the limits instead of an error, with stations and without.
+        "squares": minimise the weighted squared errors. "worst": minimise the greatest weighted error, as the least bound of
+        all. "transmission": meet the stations exactly and maximise the least transmission angle. "curve": only the
+        constraints of a path, for `refine`, whose measure needs no stations; unknown rotations are those at the ends of
+        an open path and of its straight part. "least" and "least curve": the objective of the limits instead of an error,
+        with and without stations.
     exact : bool
-        Whether bounds of the pivot's motion can be held at its extremes, see `exact`; without, a first search is quicker.
+        Whether bounds can be imposed at the extremes of the pivot's motion, see `Program.exact`; False makes a first search
+        quicker.
     parts : int
-        Parts of the way from one station to the next at whose ends the transmission angle is held; a margin makes sure of what
-        is between them.
+        Number of parts between two stations at whose ends the transmission angle is bounded; a margin guarantees the bound
+        between them.
     """
 
     def __init__(
@@ -153,7 +155,7 @@ class Statement:
         self._close(quality, [branch, direction, size, self._share], [grashof, *planes])
 
     def _close(self, quality: Any, numbers: Sequence[Any], tables: Sequence[Any]) -> None:
-        """Put all together: the program, its bounds and the names of its constraints."""
+        """Assemble the program, its bounds and the names of its constraints."""
         casadi = self._casadi
         peaks = [
             *(symbol for _, *both in self._peaks for symbol in both),
@@ -175,18 +177,18 @@ class Statement:
         return symbol
 
     def _extra(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
-        """Add an unknown that stands for a greatest value or the middle of a range, with its starting value."""
+        """Add an auxiliary unknown, a greatest value or the middle of a range, with its starting value."""
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
 
     @property
     def least(self) -> Least:
-        """Return the function that is minimised in the place of an error."""
+        """Return the function that is minimised instead of an error."""
         assert self.limits.least is not None
         return self.limits.least
 
     def _traced(self, require: Require, p: Any) -> Any:
-        """Trace a required function; one along the crank's rotation also at the rotations given by parameters."""
+        """Trace a required function; an `Along` also at the rotations given by parameters."""
         casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
         if not isinstance(require, Along):
             return traced(require, values)
@@ -237,7 +239,7 @@ class Statement:
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
     def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
-        """State the quality function, and the constraints that belong to it."""
+        """State the quality function, with the constraints that belong to it."""
         casadi, normal = self._casadi, self.normal
         g, point = self._closed(p, v, phi, branch)
         ex: Any = None
@@ -279,7 +281,7 @@ class Statement:
         return quality + self._straight_part(p, v, phi, branch, ex, ey)
 
     def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
-        """Constrain a straight part; return what is added to the quality where its flatness is only favoured."""
+        """Constrain a straight part; return the term of the quality if its flatness is only favoured."""
         casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
         if straight is None or points is None:
             return 0.0
@@ -307,18 +309,18 @@ class Statement:
     # Constraints
 
     def _in_words(self, share: float) -> float:
-        """Return the factor to mm or degrees of an error given as a share of something in units."""
+        """Return the factor that converts an error, relative to a length in units, to mm or degrees."""
         return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
 
     def excess(self, violation: float) -> dict[str, Any]:
-        """Return the fields of an `Answer` whose greatest error is too large by that (units)."""
+        """Return the fields of an `Answer` whose greatest error exceeds its bound by ``violation`` (units)."""
         label = Label(ERROR, self._in_words(1.0), "deg" if self.normal.of_rocker else "mm")
         return {"violation": violation, "worst": ERROR, "excess": label.measured(violation, np.empty(0))}
 
     def _within(
         self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
     ) -> None:
-        """Keep a value between bounds; ``factor`` makes its unit of it, by default from units of length or rad."""
+        """Constrain a value between bounds; ``factor`` converts it to its unit, by default from units of length or rad."""
         usual = {"mm": 1e3 * self.normal.unit, "deg": degrees(1.0)}
         label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit, self.limits.linkage)
         self._constraints.append((value, low, high, label))
@@ -327,7 +329,7 @@ class Statement:
         self._within(value, -inf, 0.0, name, unit, factor)
 
     def _ordered(self, phi: Any, direction: Any) -> None:
-        """Keep the stations in order, within a turn."""
+        """Constrain the stations to be in order, within a turn."""
         n = self.normal.n
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
@@ -338,7 +340,7 @@ class Statement:
         self._within(total, *closing, "stations within a turn", "deg")
 
     def _way_of_path(self, direction: Any) -> tuple[Any, Any]:
-        """Place the stations of a path on even steps between the few with unknown rotations; return these rotations too."""
+        """Place the stations of a path at equal steps between the few with unknown rotations; return these rotations, too."""
         casadi, normal = self._casadi, self.normal
         ends = set() if normal.closed else {0, normal.n - 1}
         part = () if normal.straight is None else (normal.straight.start, normal.straight.end)
@@ -363,7 +365,7 @@ class Statement:
         return phi, knots
 
     def _shaped(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
-        """Keep the links' Grashof type, and the fixed pivots in their regions."""
+        """Constrain the Grashof type of the links, and the fixed pivots to their regions."""
         casadi, limits = self._casadi, self.limits
         if limits.grashof:
             links = casadi.vertcat(p.ground_length, p.crank_length, p.coupler_length, p.rocker_length)
@@ -377,7 +379,7 @@ class Statement:
             self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
 
     def _assembled(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
-        """Keep the transmission angle over the turn, over the way of the task, or both."""
+        """Constrain the transmission angle over a turn, over the task, or both."""
         casadi, limits = self._casadi, self.limits
         l1, l2 = p.ground_length, p.crank_length
         if limits.turn is not None and self.pivot is None:
@@ -395,7 +397,7 @@ class Statement:
             self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
-        """Keep |cos mu| below cos(least), and below the tilt, from squares of the distance BD and without division."""
+        """Constrain |cos mu| below cos(least), and below the tilt, from squares of the distance BD and without division."""
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
             links = p.coupler_length, p.rocker_length
             for excess in self.limits.linkage.transmission_excess(*links, nearest, farthest, cosine):
@@ -413,14 +415,14 @@ class Statement:
         return self.limits.linkage.square(bx, by)
 
     def _way(self, phi: Any) -> tuple[Any, Any]:
-        """Return the stations' rotations and some in between, and the distance from each to the next."""
+        """Return the stations' rotations with some in between, and the step from each to the next."""
         steps = (phi[1:] - phi[:-1]) / self._parts
         between = [phi[:-1] + k * steps for k in range(1, self._parts)]
         casadi = self._casadi
         return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], *[steps] * len(between))
 
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
-        """Bound the slider's motion; return what its smoothness adds to the quality."""
+        """Constrain the slider's motion; return the term of its smoothness in the quality."""
         casadi, unit = self._casadi, self.normal.unit
 
         def position(x: Any) -> Any:
@@ -449,7 +451,7 @@ class Statement:
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
     def _rate(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
-        """Keep a derivative of the slider's position within a bound (m)."""
+        """Constrain a derivative of the slider's position by a bound (m)."""
         if isfinite(bound):
             scale = self.normal.unit / bound
             self._bounded(
@@ -464,11 +466,12 @@ class Statement:
     def _bounded(
         self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0
     ) -> None:
-        """Keep a trigonometric polynomial of the crank's rotation within -1 and 1; IPOPT sees ``size`` times that.
+        """Constrain a trigonometric polynomial of the crank's rotation to [-1, 1]; IPOPT gets it multiplied by ``size``.
 
-        It is held at places all round and where the parameters say, less a share: of a first solution that which makes sure of
-        what is between the places, a trigonometric polynomial being nowhere larger than at these but for the cosine (Ehlich and
-        Zeller 1964); then none, the extremes of the solution before being among the places (`exact`).
+        It is bounded at grid points over the turn and at rotations given by parameters, with a margin. In a first solution the
+        margin guarantees the bound between the grid points: there a trigonometric polynomial is at most its greatest value at
+        the points divided by a cosine (Ehlich and Zeller 1964). Later the margin is almost zero, since the extremes of the
+        solution before are among the rotations (`Program.exact`).
         """
         casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
         number = len(self._peaks)
@@ -487,7 +490,7 @@ class Statement:
 
 
 def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:
-    """Evaluate a Fourier series or a derivative: mean (where there is one), then cosine and sine of each harmonic."""
+    """Evaluate a Fourier series or a derivative of it; coefficients: mean (if any), then cosine and sine of each harmonic."""
     value = (coefficients[0] if order == 0 else 0.0) + 0.0 * x if mean else 0.0 * x
     first = 1 if mean else 0
     for k in range((coefficients.numel() - first) // 2):

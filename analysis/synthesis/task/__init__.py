@@ -1,4 +1,4 @@
-"""What a linkage is asked to do and to keep: targets and tasks, constraints and bounds, all of them in normal form.
+"""Define the problem of a synthesis: targets and tasks, constraints and bounds, and their normal form.
 
 The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """

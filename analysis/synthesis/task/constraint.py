@@ -1,4 +1,4 @@
-"""Constraints on a linkage: transmission angle, turning, size, regions, time ratio, pin forces, any function."""
+"""Define constraints on a linkage: transmission angle, full turn, size, regions, time ratio, pin forces, any function."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TURNING = 0.002
 
 
 class InfeasibleError(LinkworkError):
-    """Bounds and constraints leave no linkage."""
+    """No linkage meets all bounds and constraints."""
 
 
 #: Least transmission angle by default (rad).
@@ -40,14 +40,14 @@ _LEAST_TRANSMISSION = radians(40.0)
 @in_si(angle="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeastTransmission:
-    """The angle between coupler and rocker stays at least this far from 0 and pi.
+    """The transmission angle, between coupler and rocker, deviates from 0 and pi by at least ``angle``.
 
     Attributes
     ----------
     angle : float
         rad.
     over : "turn" or "task"
-        Over a full turn, which makes the crank able to turn fully, or at the task's stations only.
+        Over a full turn, so that the crank can turn fully, or only during the task.
     """
 
     angle: Amount = _LEAST_TRANSMISSION
@@ -62,12 +62,12 @@ class LeastTransmission:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FullTurn:
-    """The crank can turn fully, however near the links come to being collinear."""
+    """The crank can turn fully, with any transmission angle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grashof:
-    """The four-bar is of this type; see `Linkage.grashof`."""
+    """The four-bar has this Grashof type; see `Linkage.grashof`."""
 
     type: GrashofType
 
@@ -79,7 +79,7 @@ class Grashof:
 @in_si(length="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestLink:
-    """No link, nor the distance of the coupler point, is longer than this (m)."""
+    """No link, and not the distance of the coupler point from B, is longer than ``length`` (m)."""
 
     length: Amount
 
@@ -102,7 +102,7 @@ class Assembly:
 @in_si(polygon="m")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PivotRegion:
-    """A pivot lies within a polygon, convex or not.
+    """A pivot lies inside a polygon, which need not be convex.
 
     Attributes
     ----------
@@ -149,23 +149,23 @@ def half_planes(triangle: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Require:
-    """Any function of the dimensions is below zero, or zero.
+    """A function of the dimensions is at most zero, or equal to zero.
 
     Attributes
     ----------
     function : callable
-        Of a namespace with the dimensions of `Linkage` by name (SI), in arithmetic and the elementary functions of `math` or
-        NumPy, without branches; it is traced, so that its derivatives are exact.
+        Function of a namespace with the dimensions of `Linkage` by name (SI). It may use arithmetic and the elementary
+        functions of `math` or NumPy, but no branches; it is traced, so that its derivatives are exact.
     equal : bool
-        Whether it is to be zero, instead of at most zero.
+        Whether the function must be zero, instead of at most zero.
     name : str
-        For messages.
+        Name in messages.
     scale : float
-        Magnitude of its values.
+        Magnitude of the values.
     unit : str
-        Theirs, for messages.
+        Unit of the values in messages.
     symbolic : bool
-        Whether it takes CasADi's symbols and numbers as it stands, and may have several values.
+        Whether the function accepts CasADi symbols and numbers without tracing; it may then have several values.
     """
 
     function: Callable[..., Any]
@@ -184,14 +184,14 @@ class Require:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Along(Require):
-    """A function of the dimensions and of the crank's rotation is below zero at rotations, or all the way between two.
+    """A function of the dimensions and the crank rotation is at most zero at given rotations, or everywhere between two.
 
     Attributes
     ----------
     rotation : ndarray, shape (n,)
-        Where it is held from the beginning (rad); ``function(d, rotation)`` has rows of n values each.
+        Rotations at which it is bounded from the beginning (rad); ``function(d, rotation)`` has rows of n values each.
     ends : (float, float) or None
-        Between which its greatest values are looked for, and held too; None where the rotations are all.
+        Range in which its greatest values are found and bounded, too; None if only the given rotations count.
     """
 
     rotation: FloatArray
@@ -206,9 +206,9 @@ class Way(NamedTuple):
     turn : bool
         Whether the crank turns fully.
     rotation : ndarray or None
-        The task's crank rotations, where it gives any.
+        The task's crank rotations, if it has any.
     straight : bool
-        Whether the bounds hold the coupler point on the line of B and C.
+        Whether the bounds fix the coupler point on the line of B and C.
     linkage : type
         Type of the linkages.
     """
@@ -219,7 +219,7 @@ class Way(NamedTuple):
     linkage: type[Linkage] = Linkage
 
     def ends(self, what: str) -> tuple[float, float]:
-        """Return the first and last crank angle of a turn, or crank rotation of the task.
+        """Return the first and last crank angle of a turn, or the first and last crank rotation of the task.
 
         Raises InputError if neither is known.
         """
@@ -236,14 +236,14 @@ class Way(NamedTuple):
 
 
 class Least(NamedTuple):
-    """A function whose greatest value is minimised while the greatest error is bounded (units)."""
+    """Objective: the greatest value of a function, minimised while the greatest error is below a bound (units)."""
 
     along: Along
     error: float
 
 
 class Demand:
-    """A constraint stated as functions of the dimensions that are kept below zero."""
+    """A constraint that is expressed by functions of the dimensions that must be at most zero."""
 
     __slots__ = ()
     #: Type of four-bar that it is about.
@@ -264,7 +264,7 @@ class Demand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimeRatio(Demand):
-    """The four-bar is a crank-rocker whose slow swing takes this many times as long as its quick one.
+    """The four-bar is a crank-rocker whose slow swing takes ``least`` to ``greatest`` times as long as its quick one.
 
     Attributes
     ----------
@@ -321,7 +321,7 @@ def _kinds() -> list[str]:
 @in_si(least="m", greatest="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stroke:
-    """The slider of a slider-crank, whose crank turns fully, travels this far from end to end.
+    """The stroke of a slider-crank, whose crank turns fully, is within bounds.
 
     Attributes
     ----------
@@ -349,21 +349,21 @@ class Stroke:
 
 
 def stroke(d: Any) -> Any:
-    """Return the travel of the slider of a slider-crank (m), of numbers and symbols."""
+    """Return the stroke of a slider-crank (m), for numbers and symbols."""
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     ends = [np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)) for side in (1.0, -1.0)]
     return ends[0] - ends[1]
 
 
 def advance(d: Any) -> Any:
-    """Return the crank's rotation between the dead centres of a slider-crank less half a turn (rad), of symbols too."""
+    """Return the crank rotation between the dead centres of a slider-crank minus half a turn (rad), for numbers and symbols."""
     l1, l2, l3 = d.ground_length, d.crank_length, d.coupler_length
     angles = [np.arctan2(np.sqrt(np.maximum((l3 + side * l2) ** 2 - l1**2, 1e-18)), l1) for side in (1.0, -1.0)]
     return angles[0] - angles[1]
 
 
 def _time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
-    """Return the time ratio of a slider-crank as required functions: (pi + advance)/(pi - advance)."""
+    """Return functions that bound the time ratio of a slider-crank, (pi + advance)/(pi - advance)."""
     low, high = (
         pi * (ratio - 1.0) / (ratio + 1.0) if isfinite(ratio) else pi for ratio in (asked.least, asked.greatest)
     )
@@ -386,7 +386,7 @@ class _Forces(Demand):
     pins: str
 
     def along(self, way: Way) -> Along:
-        """Return the forces on the pins (N), a column each."""
+        """Return the forces on the pins (N), a column for each pin."""
         ends, turn = way.ends("a force on the pins"), way.turn
 
         def magnitudes(d: Any, rotation: Any) -> Any:
@@ -410,7 +410,7 @@ class _Forces(Demand):
 @in_si(force="N")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MaxPinForce(_Forces):
-    """No pin carries more than this, over a turn of the crank or, where it need not turn fully, on the way of the task.
+    """No pin force exceeds ``force``: over a turn of the crank or, if it need not turn fully, during the task.
 
     Attributes
     ----------
@@ -443,12 +443,12 @@ class MaxPinForce(_Forces):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LeastPinForce(_Forces):
-    """Minimise the pin forces, with the greatest error below a bound.
+    """Objective: the greatest pin force, minimised while the greatest error is below a bound.
 
     Attributes
     ----------
     error : float or str
-        Bound of the greatest error, as of the objective "worst" (m; of a rocker function rad).
+        Bound of the greatest error, as defined by the objective "worst" (m; for a rocker function rad).
     make : Make
         Masses, gravity, load, and the constant speed of the crank.
     pins : str
@@ -478,9 +478,9 @@ class LeastPinForce(_Forces):
 
 #: The constraints that are about pin forces.
 FORCES = (MaxPinForce, LeastPinForce)
-#: Rotations at which what holds along the crank's rotation is held from the beginning.
+#: Number of rotations at which an `Along` is bounded from the beginning.
 GRID = 48
-#: Rotation by which more than a turn is looked at (rad).
+#: Rotation beyond a turn in which peaks are sought (rad).
 BEYOND = 0.02
 
 
@@ -493,6 +493,6 @@ def even_rotations(ends: tuple[float, float]) -> FloatArray:
 
 
 def search_range(ends: tuple[float, float]) -> tuple[float, float]:
-    """Return the range in which peaks are searched: a little more than a turn, so that one at its end is seen."""
+    """Return the range in which peaks are sought: a little more than a turn, so that a peak at its end is found."""
     over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
     return ends[0] - over, ends[1] + over

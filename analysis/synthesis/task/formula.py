@@ -1,4 +1,4 @@
-"""Formulas and requirements from text, which are parsed, never run as code; users' functions for CasADi's symbols."""
+"""Parse formulas and requirements from text without running it as code; trace users' functions with CasADi symbols."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ _LONGEST = 1000
 
 
 def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]:
-    """Make a function of one variable from a text such as ``"70 + 100*abs(sin(t/2))"``.
+    """Convert a text such as ``"70 + 100*abs(sin(t/2))"`` to a function of one variable.
 
     Numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign
-    floor ceil hypot min max degrees radians``, and the variable; angles in radians. Nothing else is run: the text is parsed
-    with `ast`, and each node either stands on this list or is refused.
+    floor ceil hypot min max degrees radians``, and the variable; angles in radians. Nothing else is evaluated: the text is
+    parsed with `ast`, and every node that is not on this list is refused.
 
     Returns
     -------
     callable
-        From an array to an array of the same shape; raises InputError where the value is not finite.
+        Function of an array, with a result of the same shape; it raises InputError if a value is not finite.
 
     Raises
     ------
     InputError
-        If the text is no such formula; the part that is not is named.
+        If the text is not such a formula; the message names the wrong part.
     """
     tree = _parsed(text)
 
@@ -156,7 +156,7 @@ def path_from_formula(
     end: float | str = 2.0 * pi,
     variable: str = "t",
 ) -> TargetPath:
-    """Make a curve from two formulas, at n equal steps of their parameter.
+    """Compute a curve from two formulas, at n equal steps of their parameter.
 
     Parameters
     ----------
@@ -165,10 +165,10 @@ def path_from_formula(
     n : int
         Number of points.
     unit : str
-        Unit of what the formulas give, such as ``"cm"``.
+        Unit of the formulas' values, such as ``"cm"``.
     start, end : float or str
-        Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve is back at its first point at the end
-        (to within 1e-9 of its extent), it is closed, and that point is not repeated.
+        Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve ends at its first point (to within
+        1e-9 of its extent), it is closed, and that point is not repeated.
 
     Raises
     ------
@@ -208,11 +208,11 @@ def function_from_formula(
     n, variable
         As for `path_from_formula`.
     unit : str
-        Unit of what the formula gives.
+        Unit of the formula's value.
     start, end : float or str
-        Range of the crank angle; one of whole turns leaves out its end, which is its start again.
+        Range of the crank angle; for whole turns the end, which equals the start, is left out.
     spacing : "even" or "chebyshev"
-        The second for precision points: see `chebyshev_spacing`.
+        "chebyshev" is for precision points: see `chebyshev_spacing`.
 
     Returns
     -------
@@ -237,9 +237,9 @@ def function_from_formula(
 
 
 def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
-    """Return the places of n precision points between two limits at which the error between them is about the least.
+    """Return n precision points between two limits for which the error between the points is about the least.
 
-    The roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
+    They are the roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
 
     Raises
     ------
@@ -270,13 +270,12 @@ _MEASURE = re.compile(
 
 
 def requirement(text: Any, name: str = "constraints.require") -> Require:
-    """Make a constraint from a text such as ``"crank_length + rocker_length <= 300 mm"``.
+    """Convert a text such as ``"crank_length + rocker_length <= 300 mm"`` to a constraint.
 
-    Two sides about ``<=``, ``>=`` or ``==``, of dimensions by their name in `Linkage`, numbers with a unit of length or angle
-    or without (SI), ``+ - * / **``, brackets, ``pi`` and functions. It is parsed, and each part either stands on this list or
-    is refused.
+    Two sides are compared by ``<=``, ``>=`` or ``==``. They may contain dimensions by their name in `Linkage`, numbers with a
+    unit of length or angle or without (SI), ``+ - * / **``, brackets, ``pi`` and functions. Anything else is refused.
 
-    Raises InputError if it is none; the part that is not is named.
+    Raises InputError if the text is not a constraint; the message names the wrong part.
     """
     if not isinstance(text, str):
         raise ParameterError(name, text, "be a text such as 'crank_length <= 50 mm'")
@@ -345,7 +344,7 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
 
 
 class _Dimensions(ast.NodeTransformer):
-    """Transformer that makes names of dimensions attributes of the argument, and numbers floats."""
+    """Syntax transformer: names of dimensions become attributes of the argument, numbers become floats."""
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if node.id not in UNKNOWNS:
@@ -357,7 +356,7 @@ class _Dimensions(ast.NodeTransformer):
 
 
 def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
-    """Compile an expression to a function of a namespace of dimensions, with `math` as in a function written by hand."""
+    """Compile an expression to a function of a namespace of dimensions that may call the functions of `math`."""
     argument = ast.arguments(posonlyargs=[], args=[ast.arg(arg="p")], kwonlyargs=[], kw_defaults=[], defaults=[])
     body = ast.Expression(body=ast.Lambda(args=argument, body=_Dimensions().visit(tree)))
     code = compile(ast.fix_missing_locations(body), "<requirement>", "eval")
@@ -368,12 +367,12 @@ def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
 
 #: Rotations among which the greatest values of a function are looked for.
 DENSE = 721
-#: What a function of the user's may take from `math` or NumPy.
+#: Names that a user's function may take from `math` or NumPy.
 TRACED = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
     "exp", "log", "sqrt", "hypot", "fabs",
 )  # fmt: skip
-#: And what CasADi has under another name, or not at all.
+#: Functions that CasADi has under another name, or not at all.
 RENAMED: dict[str, Callable[..., Any]] = {
     "degrees": lambda x: x * (180.0 / pi),
     "radians": lambda x: x * (pi / 180.0),
@@ -385,7 +384,7 @@ RENAMED: dict[str, Callable[..., Any]] = {
 
 
 def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
-    """Return dimensions in SI from those in normal form, for functions of the user."""
+    """Convert dimensions from normal form to SI, for functions of the user."""
     values = dict(vars(p))
     for name in UNKNOWNS[:7]:
         values[name] = unit * values[name]
@@ -394,12 +393,12 @@ def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespac
 
 
 def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
-    """Evaluate a function for CasADi's symbols; functions of `math` and NumPy are replaced by CasADi's.
+    """Evaluate a function with CasADi symbols; functions of `math` and NumPy are replaced by those of CasADi.
 
     Raises
     ------
     InputError
-        If it branches on its argument, or calls what CasADi cannot.
+        If it branches on its argument, or calls a function that CasADi does not have.
     """
     casadi = symbolic.library()
     if require.symbolic:
@@ -426,8 +425,8 @@ def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
     Returns
     -------
     ndarray, shape (count, 1 + n)
-        A rotation (rad), the greatest value first and again where there are fewer, and for each of the n values -1/2 over their
-        second derivative there, by which the height of a peak follows from a slope; 0 of what has no peak there.
+        In each row a rotation (rad), the greatest value first and repeated if there are fewer peaks; then for each of the n
+        values -1/2 divided by its second derivative, which gives the height of a nearby peak from the slope; 0 without a peak.
     """
     assert along.ends is not None
     rotation = np.linspace(*along.ends, DENSE)
@@ -449,7 +448,7 @@ def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
 
 
 def _rebound(value: Any, seen: dict[int, Any]) -> Any:
-    """Replace `math` and NumPy in a user's function by CasADi, and so in the functions that it calls."""
+    """Replace `math` and NumPy by CasADi in a user's function, and in the functions that it calls."""
     casadi = symbolic.library()
     if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
         known = {n: getattr(casadi, n) for n in TRACED} | RENAMED
@@ -475,5 +474,5 @@ def _rebound(value: Any, seen: dict[int, Any]) -> Any:
 
 
 def _asked_names(code: CodeType) -> set[str]:
-    """Return the global names that code, or code within it, may ask for."""
+    """Return the global names that code, or code nested in it, may use."""
     return {*code.co_names}.union(*(_asked_names(c) for c in code.co_consts if isinstance(c, CodeType)))

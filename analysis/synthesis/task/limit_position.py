@@ -1,8 +1,8 @@
-"""Limit positions and mechanical advantage of four-bars and slider-cranks, as numbers and as constraints.
+"""Compute and constrain limit positions and mechanical advantage of four-bars and slider-cranks.
 
-In a dead centre crank and coupler lie in one line, and rocker or slider rest at the end of their travel; in a toggle coupler
-and rocker do, or the coupler is square to the guide, and the crank can go no farther. See R. L. Norton, Design of Machinery,
-6th ed., 2020, chapters 2, 3 and 6.
+In a dead centre crank and coupler are collinear, and rocker or slider rest at the end of their travel. In a toggle coupler and
+rocker are collinear, or the coupler is perpendicular to the guide, and the crank can turn no further. See R. L. Norton, Design
+of Machinery, 6th ed., 2020, chapters 2, 3 and 6.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from ..linkage.linkage import Linkage
 from .constraint import TURNING, Along, Demand, Require, Way, even_rotations, search_range
 
 FloatArray = NDArray[np.float64]
-#: Two links in one line: one beyond the other, or one over the other.
+#: Two collinear links: one extends the other, or lies over it.
 InLine = Literal["stretched", "folded"]
 
 
 class _FourBarPositions:
-    """Conditions of the limit positions of a four-bar, of numbers and symbols; `POSITIONS` has those of each kind."""
+    """Conditions for the limit positions of a four-bar, for numbers and symbols; `POSITIONS` has those of each kind."""
 
     @staticmethod
     def dead_cosine(l1: float, reach: float, l4: float) -> float:
-        """Return the cosine of the direction of C from A with crank and coupler in line, C at a distance ``reach``."""
+        """Return the cosine of the direction from A to C, with crank and coupler collinear and C at the distance ``reach``."""
         return (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * reach)
 
     @staticmethod
     def dead_gap(d: Any, reach: Any, c: Any) -> Any:
-        """Return what is zero in a dead centre: how far the triangle of A, C and D is from closing."""
+        """Return the closure error of the triangle A, C, D with crank and coupler collinear: zero in a dead centre."""
         l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
         return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
 
@@ -54,14 +54,14 @@ class _FourBarPositions:
 
     @staticmethod
     def toggle_gap(d: Any, c: Any, side: float) -> Any:
-        """Return what is zero in a toggle, at the cosine of the crank angle; side 1 is stretched, -1 folded."""
+        """Return a function of the cosine of the crank angle that is zero in a toggle; side 1 is stretched, -1 folded."""
         l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
         reach = l3 + l4 if side > 0.0 else l3 - l4
         return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
 
     @staticmethod
     def out_of_line(d: Any, c: Any) -> Any:
-        """Return what is below zero where coupler and rocker are out of line."""
+        """Return a function that is negative if coupler and rocker are not collinear."""
         l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
         square = l1**2 + l2**2 - 2.0 * l1 * l2 * c
         both = Linkage.transmission_excess(l3, l4, square, square, cos(TURNING))
@@ -74,12 +74,12 @@ class _FourBarPositions:
 
     @staticmethod
     def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
-        """Return the speed of the driven link for one of the crank, from the closed loop."""
+        """Return the speed of the driven link divided by that of the crank, from loop closure."""
         return traced(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
 
 
 class _SliderCrankPositions(_FourBarPositions):
-    """Conditions of the limit positions of a slider-crank: C on its guide, the coupler square to it in a toggle."""
+    """Conditions for the limit positions of a slider-crank; in a toggle the coupler is perpendicular to the guide."""
 
     @staticmethod
     def dead_cosine(l1: float, reach: float, l4: float) -> float:
@@ -111,7 +111,7 @@ class _SliderCrankPositions(_FourBarPositions):
         return (g.s3 * c2 - g.c3 * s2) / g.s3
 
 
-#: Of a geared five-bar nothing rests.
+#: A geared five-bar has no dead centres.
 POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
     "four-bar": _FourBarPositions,
     "slider-crank": _SliderCrankPositions,
@@ -119,7 +119,7 @@ POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
 
 
 def dead_centres(linkage: Linkage) -> tuple[float, ...]:
-    """Return the crank rotations at which rocker or slider rest, within a turn from 0 (rad), increasing; none without rest.
+    """Return the crank rotations of the dead centres, within a turn from 0 (rad), in increasing order; empty without any.
 
     Raises
     ------
@@ -142,10 +142,9 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
 
 
 def toggles(linkage: Linkage) -> tuple[float, ...]:
-    """Return the crank rotations at which coupler and rocker are in line, within a turn from 0 (rad); none with a full turn.
+    """Return the crank rotations of the toggles, within a turn from 0 (rad); empty if the crank can turn fully.
 
-    Of a slider-crank where the coupler is square to the guide; where the rocker pivot moves, of the shaft that turns once
-    until all is as it was.
+    With a moving rocker pivot they are rotations of the input shaft, which turns once per period of the linkage.
     """
     if linkage.pivot is not None:
         return _toggles_by_roots(linkage)
@@ -158,7 +157,7 @@ def toggles(linkage: Linkage) -> tuple[float, ...]:
 
 
 def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
-    """Find where the cosine of the angle between coupler and rocker passes -1 or 1."""
+    """Find the rotations at which the cosine of the angle between coupler and rocker passes -1 or 1."""
 
     def beyond(phi: Any) -> Any:
         return np.abs(linkage.cosine_at_c(linkage.reach(phi))) - 1.0
@@ -170,9 +169,9 @@ def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
 
 
 def time_ratio(linkage: Linkage) -> float | None:
-    """Return the time of the slow swing or stroke over that of the quick one, the crank turning evenly: 1 at least.
+    """Return the time of the slow swing or stroke divided by that of the quick one, at constant crank speed: 1 at least.
 
-    None where the crank cannot turn fully, or the rocker turns with it.
+    None if the crank cannot turn fully, or the rocker turns fully, too.
 
     Raises
     ------
@@ -187,10 +186,11 @@ def time_ratio(linkage: Linkage) -> float | None:
 
 
 def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
-    """Return the torque on the rocker for a torque on the crank, without friction and masses.
+    """Return the torque on the rocker divided by the torque on the crank, without friction and masses.
 
-    Of a slider-crank the force on the slider for a force on the crank pin across the crank: the pin's speed over the slider's.
-    Infinite in a dead centre, zero in a toggle; NaN where the links cannot be joined. Shape of the rotations.
+    For a slider-crank it is the force on the slider divided by the force on the crank pin perpendicular to the crank: the speed
+    of the pin divided by that of the slider. It is infinite in a dead centre, zero in a toggle, and NaN if the links cannot be
+    joined. The result has the shape of the rotations.
 
     Raises
     ------
@@ -229,17 +229,15 @@ def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float,
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MechanicalAdvantage(Demand):
-    """The rocker's torque for one of the crank's, or the slider's force for one at the crank pin, is within bounds.
-
-    Either way round; see `mechanical_advantage`.
+    """The magnitude of the mechanical advantage is within bounds; see `mechanical_advantage`.
 
     Attributes
     ----------
     least, greatest : float
         Bounds.
     at : array_like, optional
-        Crank rotations where they are asked (rad). Without them they hold all the way: over the turn, or where the crank need
-        not turn fully from the first to the last of the task's rotations.
+        Crank rotations at which the bounds hold (rad). By default they hold everywhere: over a turn or, if the crank need not
+        turn fully, from the first to the last of the task's rotations.
     """
 
     least: float = 0.0
@@ -297,14 +295,14 @@ class MechanicalAdvantage(Demand):
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Place(Demand):
-    """Two links come to lie in one line at a crank rotation, or somewhere within a range of rotations.
+    """Two links are collinear at a crank rotation, or somewhere within a range of rotations.
 
     Attributes
     ----------
     at : float or (float, float)
         From the start of the task's rotations (rad).
     position : "stretched" or "folded"
-        One link beyond the other, or one over the other.
+        One link extends the other, or lies over it.
     """
 
     at: Amount
@@ -323,7 +321,7 @@ class _Place(Demand):
         return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
 
     def _between(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
-        """Require that a function which is zero in the place changes its sign within the range."""
+        """Require that a function changes its sign within the range, so that its zero, the limit position, lies there."""
         way.timed(f"a {self._name()} at crank rotations")
         low, high = self.at
         if low == high:
@@ -332,14 +330,14 @@ class _Place(Demand):
 
 
 class DeadCentre(_Place):
-    """Crank and coupler come to lie in one line, rocker or slider at the end of their travel, at a rotation or in a range.
+    """There is a dead centre, with crank and coupler collinear, at a crank rotation or within a range.
 
     Attributes
     ----------
     at : float or (float, float)
         From the start of the task's rotations (rad).
     position : "stretched" or "folded"
-        The coupler beyond the crank, or over it.
+        The coupler extends the crank, or lies over it.
     """
 
     __slots__ = ()
@@ -367,16 +365,16 @@ class DeadCentre(_Place):
 
 
 class Toggle(_Place):
-    """Coupler and rocker come to lie in one line, where the crank can go no farther, at a crank rotation or in a range.
+    """There is a toggle, in which the crank can turn no further, at a crank rotation or within a range.
 
-    Of a slider-crank the coupler comes to be square to its guide, pointing away from the ground link's start or back to it.
+    In a slider-crank's toggle the coupler is perpendicular to the guide and points away from A, or towards it.
 
     Attributes
     ----------
     at : float or (float, float)
         From the start of the task's rotations (rad).
     position : "stretched" or "folded"
-        The coupler beyond the rocker, or over it.
+        The coupler extends the rocker, or lies over it.
     """
 
     __slots__ = ()
@@ -399,7 +397,7 @@ class Toggle(_Place):
 @in_si(between="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoToggle(Demand):
-    """The links stay joined, coupler and rocker out of line, from one crank rotation to another.
+    """There is no toggle between two crank rotations, and the links stay joined.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Bounds and constraints in normal form, for each kind of linkage that a task can be given to."""
+"""Convert bounds and constraints to normal form, for each kind of linkage that can do a task."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from .constraint import (
 from .task import Normal, RockerFunction, SliderFunction, Task
 
 FloatArray = NDArray[np.float64]
-#: Largest link by default, in sizes of the target; and, of a rocker function, in ground links.
+#: Default bound of the links, in sizes of the target; for a rocker function in ground links.
 LARGEST = 5.0
 #: Ground link of a rocker function by default (m): its angles do not depend on the size.
 GROUND = 0.1
@@ -50,27 +50,27 @@ _SWINGING = ("double-rocker", "rocker-crank", "triple-rocker")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
-    """Bounds and constraints in normal form: lengths in units of the target's size, about its centre.
+    """Bounds and constraints in normal form: lengths in units of the target's size, coordinates relative to its centre.
 
     Attributes
     ----------
     low, high : ndarray, shape (11,)
-        Of `UNKNOWNS`.
+        Bounds of `UNKNOWNS`.
     turn, way : float or None
-        Least transmission angle (rad) over a turn and over the way of the task: 0 where the crank is only to turn fully, or
-        the links only to stay joined; None where nothing is asked.
+        Least transmission angle (rad) over a turn and during the task: 0 if the crank must only turn fully, or the links must
+        only stay joined; None without such a constraint.
     grashof : str or None
     branches : tuple of int
-        Assemblies to be tried.
+        Assemblies that are tried.
     regions : tuple
         (pivot, triangles of complex corners), in units.
     requires : tuple of Require
     linkage : type
         Type of the linkages.
     second : (float, float), optional
-        Bounds of a second crank's length, in units, of a geared five-bar.
+        Bounds of the second crank's length of a geared five-bar, in units.
     ratio : float
-        Of its gears.
+        Gear ratio of that five-bar.
     least : Least, optional
         The function that is minimised instead of an error.
     """
@@ -90,36 +90,36 @@ class Limits:
 
     @property
     def gears(self) -> tuple[int, int]:
-        """Return the turns of the crank and of the second one for one of the shaft whose rotation is searched."""
+        """Return the turns of the first and of the second crank per turn of the input shaft."""
         return (1, 0) if self.second is None else geared(self.ratio)
 
     def second_crank(self, unit: float) -> CrankUnknown | None:
-        """Return the second crank that a search varies; None but for a geared five-bar. The unit is in m."""
+        """Return the second crank that a search varies; None unless for a geared five-bar. ``unit`` is in m."""
         if self.second is None:
             return None
         low, high = self.second
         return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
 
     def admits(self, linkage: Linkage) -> bool:
-        """Return whether a linkage is of the kind that is searched for; a pivot moved otherwise counts as a four-bar's."""
+        """Return whether a linkage is of the kind of these limits; with a pivot on a guide it counts as a four-bar."""
         if self.linkage is FiveBar:
             return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio
         return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)
 
     @property
     def along(self) -> bool:
-        """Return whether something holds along the crank's rotation."""
+        """Return whether a function is bounded along the crank's rotation."""
         return any(isinstance(require, Along) for require in self.requires)
 
     def sound(self, normal: Normal) -> Limits | None:
-        """Return these limits for linkages without defects; None if they keep them sound already, or minimise no error."""
+        """Return these limits with defects excluded; None if they exclude them already, or do not minimise an error."""
         if self.turn is not None or self.way is not None or self.least is not None:
             return None
         return replace(self, turn=0.0) if normal.whole_turn else replace(self, way=0.0)
 
     @property
     def bounds_only(self) -> bool:
-        """Return whether nothing but bounds is asked, so that a least squares method can do it."""
+        """Return whether there are bounds only, so that a least squares method is sufficient."""
         return (
             self.turn is None
             and self.way is None
@@ -137,10 +137,10 @@ def make_limits(
     *,
     linkage: type[Linkage] = Linkage,
 ) -> Limits:
-    """Return bounds and constraints of a task in normal form, of a four-bar or a slider-crank.
+    """Return bounds and constraints of a task in normal form, for one type of linkage.
 
     Raises ParameterError if a bound does not have the name of a dimension, or its ends are in the wrong order; InfeasibleError
-    if they contradict one another.
+    if bounds and constraints contradict one another.
     """
     if not isinstance(bounds, Mapping | None):
         raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
@@ -193,7 +193,7 @@ def make_limits(
 def _ends(
     task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]
 ) -> dict[str, tuple[float, float]]:
-    """Return the least and greatest value of every unknown (m, rad): as asked, or the usual ones."""
+    """Return the least and greatest value of every unknown (m, rad), as given or by default."""
     caps = [c.length for c in constraints if isinstance(c, LargestLink)]
     function = isinstance(task, RockerFunction)
     cap = min(caps, default=LARGEST * (GROUND if function else normal.unit))
@@ -232,7 +232,7 @@ def _required(constraint: Constraint, way: Way) -> tuple[Require, ...]:
 
 
 def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
-    """Return the least transmission angles over a turn and over the way of the task, and Grashof's type; see `Limits`."""
+    """Return the least transmission angles over a turn and during the task, and the Grashof type; see `Limits`."""
     turn, way = (
         max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
         for over in ("turn", "task")
@@ -258,7 +258,7 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
 
 
 def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]) -> tuple[float, float]:
-    """Return bounds as given, with the usual value for an end that is None or infinite."""
+    """Return bounds as given, with the default for an end that is None or infinite."""
     try:
         low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
     except (TypeError, ValueError):
@@ -274,7 +274,7 @@ def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[fl
 def _check_links(
     given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], linkage: type[Linkage]
 ) -> None:
-    """Make sure that bounds alone leave a linkage whose crank turns, where that is asked."""
+    """Check that the bounds alone allow a linkage whose crank turns fully, if that is required."""
     if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
         return
     l1, l2, l3, l4 = (given[name] for name in LINKS)
@@ -289,7 +289,7 @@ def _check_links(
 
 
 def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, constraints: Sequence[Constraint]) -> None:
-    """Make sure that the coupler point, which stays within crank and point distance of the shaft, can span the target."""
+    """Check that the coupler point can span the target: its distance from A is at most crank plus point distance."""
     from shapely import MultiPoint, Polygon, box
 
     (left, right), (bottom, top) = given["pivot_x"], given["pivot_y"]
@@ -322,21 +322,21 @@ def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, const
         )
 
 
-#: Ratios of the gears of a five-bar that are tried.
+#: Default gear ratios of five-bars.
 GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
-#: Constraints that any linkage can keep, and those of a slider-crank.
+#: Constraints that apply to any linkage, and those for slider-cranks.
 _ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
 _KEPT: Mapping[Kind, tuple[type, ...]] = {
     "four-bar": get_args(Constraint),
     "slider-crank": (*_ANY, Demand, Stroke),
     "geared-five-bar": _ANY,
 }
-#: Why a five-bar can keep none of the demands.
+#: Reason why these constraints do not apply to a five-bar.
 _NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant of the pin forces has no second crank"
 
 
 def usual_kinds(task: Task) -> tuple[Kind, ...]:
-    """Return the kinds that are tried where none are asked for."""
+    """Return the kinds of linkages that are tried by default."""
     return ("slider-crank",) if isinstance(task, SliderFunction) else ("four-bar",)
 
 
@@ -348,10 +348,10 @@ def limits_by_kind(
     kinds: Sequence[Kind] | None = None,
     gears: Sequence[float] = GEARS,
 ) -> list[Limits]:
-    """Return bounds and constraints for each kind of linkage, of geared five-bars for each ratio; see `usual_kinds`.
+    """Return bounds and constraints for each kind of linkage, and for geared five-bars for each ratio; see `usual_kinds`.
 
-    Raises InputError if a kind is none, cannot do the task, or has no such constraint; ParameterError, InfeasibleError as
-    `make_limits`.
+    Raises InputError if a kind is unknown, cannot do the task, or does not support a constraint; ParameterError,
+    InfeasibleError as `make_limits` does.
     """
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(kinds, str) or not kinds:
@@ -443,7 +443,7 @@ def _five_bar_limits(
 
 
 def as_asked(task: Task, linkage: Linkage) -> Linkage:
-    """Move a slider-crank's guide to the x axis and its coupler point to the slider, exactly, where the task asks for that."""
+    """For a slider function, move a slider-crank's guide exactly to the x axis, and its coupler point to the slider."""
     if not isinstance(task, SliderFunction):
         return linkage
     side = 1.0 if linkage.ground_angle > 0.0 else -1.0

@@ -1,6 +1,6 @@
-"""Targets: plane curves as points in m, and measures of how far a traced curve is from them.
+"""Represent target curves as points in m, and measure the deviation of a traced curve from them.
 
-A curve is a polyline: its points joined by straight segments, the last one to the first if it is closed. Length, centroid,
+A curve is a polyline: straight segments join its points, and the last point to the first if it is closed. Length, centroid,
 size and areas are exact for the polyline.
 """
 
@@ -18,20 +18,20 @@ from linkwork.errors import InputError
 from ...files import read_points
 
 FloatArray = NDArray[np.float64]
-#: Share of a curve's extent below which two points are the same one, and of its length squared below which it has no area.
+#: Fraction of a curve's extent below which two points coincide, and of its length squared below which its area is zero.
 COINCIDENT = 1e-12
-#: Most points that the smoothing takes; a curve of more is first resampled to as many.
+#: Greatest number of points for smoothing; a curve with more points is resampled first.
 MOST_SMOOTHED = 1000
-#: Weight of the degrees of freedom in the generalised cross-validation: 1 is the plain one, which smooths too little now
-#: and then; 1.4 is advised by Kim and Gu, J. R. Statist. Soc. B 66 (2004), p 337.
+#: Weight of the degrees of freedom in the generalised cross-validation: 1 sometimes smooths too little; Kim and Gu advise
+#: 1.4 (J. R. Statist. Soc. B 66, 2004, p 337).
 FREEDOM_WEIGHT = 1.4
 
 
 def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
     """Return points as an array of shape (n, 2) of finite numbers, a copy.
 
-    Raises InputError if the shape is another, a coordinate is not finite, or there are less than ``least`` points; ``what``
-    they are is named.
+    Raises InputError, with ``what`` as their name, if the shape is another, a coordinate is not finite, or there are fewer than
+    ``least`` points.
     """
     try:
         array = np.array(points, dtype=float)
@@ -50,8 +50,14 @@ def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
 
 
 def ring(points: FloatArray, closed: bool) -> FloatArray:
-    """Return the polyline's vertices in order, the first one again at the end if it is closed."""
+    """Return the polyline's vertices in order; a closed one ends with the first vertex again."""
     return np.vstack([points, points[:1]]) if closed else points
+
+
+def transform_points(points: FloatArray, scale: float, angle: float, shift: ArrayLike) -> FloatArray:
+    """Return points, shape (n, 2), scaled and rotated (rad, counter-clockwise) about the origin, then shifted (m)."""
+    c, s = scale * cos(angle), scale * sin(angle)
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + shift)
 
 
 def arc_lengths(vertices: FloatArray) -> FloatArray:
@@ -60,7 +66,7 @@ def arc_lengths(vertices: FloatArray) -> FloatArray:
 
 
 def halves(lengths: FloatArray, closed: bool) -> FloatArray:
-    """Return half of both segments at each point of a polyline, from the lengths of its segments."""
+    """Return half the length of the two segments at each point of a polyline, from the lengths of its segments."""
     before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
     after = lengths if closed else np.append(lengths, 0.0)
     both: FloatArray = 0.5 * (before + after)
@@ -74,12 +80,12 @@ def along(vertices: FloatArray, s: ArrayLike) -> FloatArray:
 
 
 def even_odd_area(*rings: FloatArray) -> float:
-    """Compute the area of the points that closed polylines go round an odd number of times in all (m2).
+    """Compute the area of the points that closed polylines encircle an odd number of times in total (m2).
 
-    Of one polyline it is the enclosed area, by the even-odd rule where it crosses itself: both lobes of a figure-eight
-    count, an inner loop does not. Of two it is the area of the symmetric difference of what they enclose, because a
-    point is in that if it is inside one of them and not the other. The polylines are cut at their crossings, and the faces
-    between the pieces counted or not by a point in each.
+    For one polyline it is the enclosed area by the even-odd rule: both lobes of a figure-eight count, an inner loop does not.
+    For two it is the area of the symmetric difference of the enclosed areas, since a point is in that if it is inside one
+    polyline and not the other. The polylines are cut at their crossings, and each face between the pieces counts or not
+    according to a point inside it.
 
     Parameters
     ----------
@@ -182,7 +188,7 @@ class TargetPath:
 
     @property
     def signed_area(self) -> float:
-        """Return the integral of x dy round the closed curve (m2): positive counter-clockwise; lobes of a figure-eight cancel.
+        """Return the integral of x dy around the closed curve (m2): positive counter-clockwise; lobes of a figure-eight cancel.
 
         Raises
         ------
@@ -195,7 +201,7 @@ class TargetPath:
 
     @property
     def enclosed_area(self) -> float:
-        """Return the area inside, by the even-odd rule where the curve crosses itself (m2); see `even_odd_area`.
+        """Return the enclosed area, by the even-odd rule (m2); see `even_odd_area`.
 
         Raises
         ------
@@ -216,10 +222,10 @@ class TargetPath:
 
     @property
     def normals(self) -> FloatArray:
-        """Return the unit normals at the points, shape (n, 2): outwards of a closed curve, to the right along an open one.
+        """Return the unit normals at the points, shape (n, 2): outward for a closed curve, to the right along an open one.
 
         The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), at an
-        open end that of the segment. Of a closed curve that crosses itself 'outwards' is that of the lobe with more area.
+        open end that of the segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
         """
         vertices = ring(self.points, self.closed)
         steps = np.diff(vertices, axis=0)
@@ -239,17 +245,17 @@ class TargetPath:
         return normals
 
     def reversed(self) -> TargetPath:
-        """Return the same curve the other way round; a closed one starts at the same point."""
+        """Return the same curve in the opposite direction; a closed one starts at the same point."""
         points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
         return TargetPath(points=points, closed=self.closed)
 
     def resampled(self, n: int) -> TargetPath:
-        """Return n points at equal arc length along the polyline, from the first point on, with both ends of an open one.
+        """Return n points at equal arc length along the polyline, from the first point, including both ends of an open one.
 
         Raises
         ------
         InputError
-            If n is less than 3 (2 if open), or the points fall on each other.
+            If n is less than 3 (2 if open), or points coincide.
         """
         least = 3 if self.closed else 2
         if n < least:
@@ -269,8 +275,7 @@ class TargetPath:
         """
         if not scale > 0.0:
             raise InputError(f"the scale is {scale!r}: it must be greater than zero")
-        c, s = scale * cos(angle), scale * sin(angle)
-        return TargetPath(points=self.points @ np.array([[c, s], [-s, c]]) + shift, closed=self.closed)
+        return TargetPath(points=transform_points(self.points, scale, angle, shift), closed=self.closed)
 
     def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
         """Fit a cubic smoothing spline to a noisy curve; return n points of it at equal arc length.
@@ -286,15 +291,15 @@ class TargetPath:
         ----------
         n : int
         deviation : float, optional
-            Root of the mean squared distance of the points from the spline (m), if the noise is known; by default lambda is
-            chosen by generalised cross-validation, which takes what is not correlated from point to point as noise. For
-            a slow tremor of the hand give the deviation.
+            Root mean square distance of the points from the spline (m), if the noise is known. By default lambda is chosen by
+            generalised cross-validation, which assumes that the noise is not correlated from point to point; for a slow tremor
+            of the hand give the deviation.
 
         Raises
         ------
         InputError
-            If the curve has less than 6 points, or the deviation is not greater than zero and less than that of the
-            smoothest curve there is (a point if closed, a straight line if open).
+            If the curve has fewer than 6 points, or the deviation is not greater than zero and less than that of the
+            smoothest possible curve (a point if closed, a straight line if open).
         """
         from scipy.interpolate import CubicSpline
         from scipy.optimize import brentq, minimize_scalar
@@ -392,7 +397,7 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
 
 
 def _cut(vertices: FloatArray) -> tuple[FloatArray, float]:
-    """Return the middles of the `PIECES` of a polyline, and its length."""
+    """Divide a polyline into `PIECES` pieces; return their middles, and its length."""
     length = float(arc_lengths(vertices)[-1])
     return along(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
 
@@ -400,16 +405,16 @@ def _cut(vertices: FloatArray) -> tuple[FloatArray, float]:
 def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the area between a traced curve and its target (m2).
 
-    Both closed: the area of the symmetric difference of what they enclose, each by the even-odd rule where it crosses itself
+    If both are closed it is the area of the symmetric difference of the enclosed areas, by the even-odd rule
     (`even_odd_area`); exact for the polylines.
 
-    Else, with d(p, S) the distance of a point p from the nearest point of a curve S,
+    Otherwise, with d(p, S) the distance of a point p from the nearest point of a curve S, it is
 
         A = 1/2 (integral over the target of d(p, curve) ds + integral over the curve of d(p, target) ds),
 
     which is symmetric and zero only for equal curves. For parallel curves it is the area of the strip between them, exactly
-    (Steiner's formula: their distance times the mean of their lengths). An open target that a closed curve traces on part of
-    its way is an exception, since the rest of the way is free:
+    (Steiner's formula: their distance times the mean of their lengths). If a closed curve traces an open target with a part of
+    it, the rest of the curve does not count:
 
         A = integral over the target of d(p, curve) ds.
 
@@ -442,8 +447,8 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
 def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
-    Of an open target and a closed curve only the target's points are taken, as in `area_between`. It is the largest over
-    the vertices and over `PIECES` points at equal arc length: short of the true one by at most half their spacing.
+    For an open target and a closed curve only the target's points count, as in `area_between`. It is the largest distance of
+    the vertices and of `PIECES` points at equal arc length, smaller than the true one by at most half their spacing.
 
     Parameters
     ----------
@@ -453,7 +458,7 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
     Raises
     ------
     InputError
-        As `area_between`.
+        As for `area_between`.
     """
     points = plane_points(curve, "the curve", 3 if closed else 2)
     seen = np.vstack([target.points, _cut(ring(target.points, target.closed))[0]])
@@ -476,11 +481,11 @@ class Straightness:
     travel : float
         Distance from the part's first to its last point, along the line (m).
     extent : float
-        Distance between the outermost points along the line (m): more than the travel where the part turns back.
+        Distance between the outermost points along the line (m): more than the travel if the part turns back.
     flatness : float
         Distance between the outermost points across the line (m).
     direction : float
-        Of the line, from the first point to the last (rad, -pi to pi).
+        Direction of the line, from the first point to the last (rad, -pi to pi).
     start : int
         Index of the part's first point in the curve.
     """
@@ -498,10 +503,10 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
     Parameters
     ----------
     part : array_like, shape (n, 2)
-        Its points in order (m), for example those within a window of crank angles.
+        Points of the part in order (m), for example those within a range of crank angles.
     direction : float, optional
-        Of the line that is to be followed (rad). By default it is free: that of the narrowest strip that holds the points
-        (the minimum zone of ISO 1101; an edge of the convex hull lies along it).
+        Direction of the wanted line (rad). By default it is that of the narrowest strip that contains the points (the
+        minimum zone of ISO 1101; an edge of the convex hull lies along it).
 
     Raises
     ------
@@ -526,7 +531,7 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
 
 
 def _narrowest(points: FloatArray) -> float:
-    """Return the direction of the narrowest strip that holds the points."""
+    """Return the direction of the narrowest strip that contains the points."""
     import shapely
 
     hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(points)))
@@ -547,25 +552,25 @@ def straightest_part(
     least_travel: float = 0.0,
     closed: bool = True,
 ) -> Straightness:
-    """Find the flattest part of ``count`` successive points of a curve, such as a window of crank angles.
+    """Find the flattest part of a curve with ``count`` successive points, such as a range of crank angles.
 
     Parameters
     ----------
     curve : array_like, shape (n, 2)
         m.
     count : int
-        Number of points: of a curve at 5 deg steps 25 for a window of 120 deg.
+        Number of points: for a range of 120 deg at 5 deg steps it is 25.
     direction : float, optional
         As for `straightness`.
     least_travel : float
-        Travel below which a part is not taken (m).
+        Least travel of the part (m).
     closed : bool
-        Whether a part may run over the curve's last point to its first.
+        Whether a part may continue from the curve's last point to its first.
 
     Raises
     ------
     InputError
-        If there are not as many points, or no part has the travel.
+        If there are fewer points, or no part has the least travel.
     """
     points = plane_points(curve, "the curve", 2)
     if not 2 <= count <= len(points):

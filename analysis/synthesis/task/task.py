@@ -1,11 +1,11 @@
-"""The tasks of synthesis, and their normal form.
+"""Define the tasks of synthesis, and their normal form.
 
-A task holds target values and weights. `Task.normal` puts it in the form that every method here works on: lengths in units
-of the target's size, about its centre, so that a watch and an excavator are the same problem.
+A task has target values and weights. All methods here work on its normal form (`normal_form`): lengths are in units of the
+target's size, relative to its centre, so that a watch and an excavator are the same problem.
 
-The quality functions are the thesis's (chapter VI): timed, the sum of weighted squared distances at the given crank
-rotations; of a rocker, the sum of weighted squared errors of angle; untimed, the area between the curves or the
-squared distance to the curve.
+The quality functions are the thesis's (chapter VI). For a timed path it is the sum of weighted squared distances at the given
+crank rotations; for a rocker function the sum of weighted squared angular errors; for an untimed path the area between the
+curves or the squared distance to the curve.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
 
 
 def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None) -> None:
-    """Check that targets without crank rotations differ from the ones before: there is no time in which to dwell."""
+    """Check that successive targets without crank rotations differ: a dwell needs crank rotations."""
     same = (np.diff(points, axis=0) == 0.0).all(axis=1)
     if angle is not None:
         same &= np.diff(angle) == 0.0
@@ -106,7 +106,7 @@ def _check_objective(objective: str) -> None:
 
 
 def _set(task: Any, **values: Any) -> None:
-    """Set fields of a frozen task as it is made."""
+    """Set fields of a frozen task during its construction."""
     for name, value in values.items():
         object.__setattr__(task, name, value)
 
@@ -119,16 +119,16 @@ def turn(n: int) -> FloatArray:
 @in_si(points="m", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedPath:
-    """The coupler point is to be at given points at given crank rotations.
+    """Task: the coupler point passes given points at given crank rotations.
 
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        m, at least three; the same one over successive rotations is a dwell.
+        At least three target points (m); the same point at successive rotations is a dwell.
     rotation : ndarray, shape (n,)
         Crank rotation from the start (rad), within a turn; equal steps over one turn by default.
     weights : ndarray, shape (n,)
-        Of the squared distances.
+        Weights of the squared distances.
     objective : "error" or "worst"
         The objective: the quality function, or the greatest error, times the root of its weight.
     """
@@ -150,17 +150,17 @@ class TimedPath:
 @in_si(position="m", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderFunction(TimedPath):
-    """The slider of a slider-crank is to be at given positions at given crank rotations.
+    """Task: the slider of a slider-crank is at given positions at given crank rotations.
 
-    It is a path of the slider's pin C along the x axis: its points follow from the positions, and where the crank shaft lies is
-    found.
+    It is a path of the slider's pin C along the x axis: its points follow from the positions, and the search finds the position
+    of the crank shaft.
 
     Attributes
     ----------
     position : ndarray, shape (n,)
         x of the slider (m).
     rotation, weights, objective
-        As of `TimedPath`.
+        See `TimedPath`.
     """
 
     position: ArrayLike
@@ -176,18 +176,18 @@ class SliderFunction(TimedPath):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straight:
-    """A part of an untimed path that must be straight, and quick.
+    """A part of an untimed path that must be straight and passed within a crank rotation.
 
     Attributes
     ----------
     start, end : int
         First and last of the path's points on the straight part, in the order of the points.
     rotation : float
-        Crank rotation within which it must be run through (rad).
+        Greatest crank rotation for that part (rad).
     flatness : float, optional
-        Largest extent across the line over that part (m); without it flatness is only favoured, by ``weight``.
+        Greatest extent of that part across the line (m); without it flatness is only favoured, by ``weight``.
     weight : float
-        Of the deviation across the line there.
+        Weight of the deviation across the line.
     """
 
     start: int
@@ -211,20 +211,21 @@ class Straight:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UntimedPath:
-    """The coupler point is to trace a curve, whatever the crank's rotation on the way.
+    """Task: the coupler point traces a curve, at any crank rotations.
 
     Attributes
     ----------
     path : TargetPath
         Closed or open.
     measure : "area" or "distance"
-        What ranks solutions: the area between the curves (m2), or the mean squared distance times the number of points (m2).
+        Quality function that ranks solutions: the area between the curves (m2), or the mean squared distance times the
+        number of points (m2).
     samples : int
         Points at equal arc length at which the curve is fitted.
     straight : Straight, optional
-        A straight part run through within a crank rotation; its points are those of ``path``.
+        A straight part that is passed within a crank rotation; its points are those of ``path``.
     weights : ndarray, shape (number of the path's points,), optional
-        Per point of ``path``; in between they are interpolated along it.
+        Weight of each point of ``path``, interpolated between the points.
     objective : "error" or "worst"
         The objective: the quality function, or the Hausdorff distance between curve and path, in which weights do not
         count.
@@ -253,7 +254,7 @@ class UntimedPath:
 @in_si(angle="rad", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RockerFunction:
-    """The rocker is to be at given angles at given crank rotations.
+    """Task: the rocker is at given angles at given crank rotations.
 
     Attributes
     ----------
@@ -290,23 +291,23 @@ class RockerFunction:
 @in_si(points="m", angle="rad", rotation="rad", length="m")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
-    """The coupler is to carry a body through given poses.
+    """Task: the coupler carries a body through given poses.
 
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        Places of the coupler point (m); one place in several directions is a body that turns there, one pose over successive
-        crank rotations a dwell.
+        Positions of the coupler point (m). One position with several directions is a body that rotates there; one pose at
+        successive crank rotations is a dwell.
     angle : ndarray, shape (n,)
-        Direction of the body at each (rad); how it is mounted on the coupler is free.
+        Direction of the body at each point (rad); its mounting angle on the coupler is free.
     rotation : ndarray, shape (n,), optional
-        Crank rotations; without them only the order is asked.
+        Crank rotations; without them only the order of the poses matters.
     length : float, optional
-        Length by which an error of angle counts as one of place (m/rad); half the target's extent by default, of a body that
-        only turns 50 mm.
+        Length by which an angular error is multiplied to count as an error of position (m/rad); by default half the target's
+        extent, or 50 mm for a body that only rotates.
     weights : ndarray, shape (n,)
     objective : "error" or "worst"
-        The objective: the quality function, or the greatest error, place and angle together.
+        The objective: the quality function, or the greatest error, position and angle combined.
     """
 
     points: ArrayLike
@@ -331,21 +332,21 @@ class Motion:
 @in_si(points="m", angle="rad", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PrecisionPoints:
-    """The coupler point is to pass exactly through a few points, in their order, at any crank rotations or at given ones.
+    """Task: the coupler point passes exactly through a few points, in order, at any crank rotations or at given ones.
 
-    A four-bar can do nine untimed points or five timed ones, and rarely with a good transmission angle; what
-    cannot be done exactly comes as close as it can. With an ``angle`` they are poses: five untimed.
+    A four-bar can pass nine untimed points or five timed ones, but rarely with a good transmission angle; if it cannot pass
+    them exactly it comes as close as possible. With an ``angle`` they are poses: five untimed ones are possible.
 
     Attributes
     ----------
     points : ndarray, shape (n, 2)
         m.
     angle, rotation : ndarray, shape (n,), optional
-        Directions of the carried body, crank rotations (rad).
+        Directions of the carried body, and crank rotations (rad).
     length : float, optional
-        As in `Motion`.
+        See `Motion`.
     objective : "error" or "worst"
-        The objective: the quality function, or the greatest error, where the points cannot be met.
+        The objective if the points cannot be passed exactly: the quality function, or the greatest error.
     """
 
     points: ArrayLike
@@ -376,7 +377,7 @@ def _extent(points: FloatArray) -> float:
 
 
 def _leverage(length: float | None, points: FloatArray) -> float:
-    """Return the length by which an error of angle counts as one of place: as given, or the usual one."""
+    """Return the length by which an angular error counts as an error of position, as given or by default."""
     if length is None:
         return 0.5 * (_extent(points) or TURNED)
     if not (isfinite(length) and length > 0.0):
@@ -385,49 +386,49 @@ def _leverage(length: float | None, points: FloatArray) -> float:
 
 
 def covers_turn(rotation: FloatArray) -> bool:
-    """Return whether crank rotations cover a whole turn: as far apart across its end as elsewhere."""
+    """Return whether crank rotations cover a whole turn: the step from last to first is not wider than the others."""
     gap = 2.0 * pi - float(np.ptp(rotation))
     return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Normal:
-    """A task in normal form: targets at n stations, in units of the target's size about its centre.
+    """A task in normal form: targets at n stations, in units of the target's size and relative to its centre.
 
     Attributes
     ----------
     origin : complex
         Centre of the target (m).
     unit : float
-        Its size (m): diagonal of its bounding box; of a rocker function, 1 m.
+        Size of the target (m): diagonal of its bounding box; for a rocker function 1 m.
     points : ndarray of complex, shape (n,), or None
         Target of the coupler point.
     angle : ndarray, shape (n,), or None
         Target of the coupler's or the rocker's angle (rad).
     of_rocker : bool
-        Whether the angle is the rocker's, from the ground link, or the coupler's, in the plane.
+        Whether the angle is that of the rocker, relative to the ground link, or of the coupler, in the plane.
     of_slider : bool
-        Whether the points are of the slider of a slider-crank.
+        Whether the points are positions of a slider.
     mounting : bool
         Whether the output angle is free.
     leverage : float
-        Factor of an error of angle (units per rad); 1 of a rocker function.
+        Factor of an angular error (units per rad); 1 for a rocker function.
     weights : ndarray, shape (n,)
         Of the squared errors.
     rotation : ndarray, shape (n,), or None
-        Crank rotations, None where only their order is given.
+        Crank rotations; None if only the order is given.
     closed : bool
-        Whether the stations close upon themselves.
+        Whether the last station is followed by the first.
     arc : ndarray, shape (n,)
-        Length of the target that each station stands for.
+        Length of the target that belongs to each station.
     outline : ndarray of complex, shape (m,), or None
-        The own points of a path whose timing is free.
+        The points of an untimed path, as the task gives them.
     outline_weights : ndarray, shape (m,)
-        Of the errors there.
+        Weights of the errors at these points.
     straight : Straight or None
-        Its ends counted in stations, its flatness in units.
+        Straight part, with its ends as numbers of stations and its flatness in units.
     exact : bool
-        Whether the points are to be met exactly.
+        Whether the points must be passed exactly.
     quality : "squares", "area" or "worst"
         Sum of squared errors, area between the curves, or greatest error.
     """
@@ -457,7 +458,7 @@ class Normal:
 
     @property
     def places(self) -> NDArray[np.complex128]:
-        """Return the targets of the coupler point in the plane (m), shape (n,)."""
+        """Return the target points in the plane (m), shape (n,)."""
         assert self.points is not None
         return self.origin + self.unit * self.points
 
@@ -468,12 +469,12 @@ class Normal:
 
     @property
     def whole_turn(self) -> bool:
-        """Return whether the task takes a whole turn of the crank, as far as that is known."""
+        """Return whether the task is known to take a whole turn of the crank."""
         return self.closed or (self.rotation is not None and covers_turn(self.rotation))
 
     @property
     def shares(self) -> FloatArray:
-        """Return the share of the length of the line through the stations' targets up to each of them, shape (n,)."""
+        """Return the arc length of the polyline through the stations up to each of them, relative to the total, shape (n,)."""
         assert self.points is not None
         steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
         length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -482,9 +483,9 @@ class Normal:
 
 
 def reweighted(task: Task, weights: ArrayLike | None) -> Task:
-    """Return the task with other weights, where any are given.
+    """Return the task with other weights, if any are given.
 
-    Raises InputError if they are not one per target, or the task has none.
+    Raises InputError if the number of weights differs from that of the targets, or the task does not take weights.
     """
     if weights is None:
         return task
@@ -501,7 +502,7 @@ def normal_form(task: Task) -> Normal:
     Raises
     ------
     InputError
-        If it is no task.
+        If it is not a task.
     """
     if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
         raise InputError(f"{task!r} is no task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints")

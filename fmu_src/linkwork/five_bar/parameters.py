@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import cos, sin
 from typing import ClassVar, NamedTuple
 
-from ..parameters import Least, Rules, check_initial, check_parameters
+from ..parameters import CheckedParameters, CheckedState, Least, Rules
 
 
 class Constants(NamedTuple):
@@ -91,7 +91,7 @@ _RULES = Rules(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FiveBarParameters:
+class FiveBarParameters(CheckedParameters):
     """A five-bar slider: a four-bar whose rocker-to-ground pivot slides on a sprung and damped guide.
 
     Lengths in m, masses in kg, moments of inertia in kg.m2, angles in rad, stiffness in N/m, damping in N.s/m. The
@@ -140,9 +140,6 @@ class FiveBarParameters:
     gravity: float = 9.81
     ground_inclination: float = 0.0
     assembly_branch: int = 1
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
 
     def constants(self) -> Constants:
         """Compute the constants of the equations."""
@@ -198,7 +195,7 @@ class FiveBarParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InitialState:
+class InitialState(CheckedState):
     """Initial state of a run: rad, rad/s, m, m/s.
 
     With the speed prescribed the commanded speed at the start takes the place of ``crank_speed``.
@@ -213,9 +210,6 @@ class InitialState:
     crank_speed: float = 0.0
     slider_position: float = 0.0
     slider_velocity: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 def without_friction(parameters: FiveBarParameters) -> FiveBarParameters:

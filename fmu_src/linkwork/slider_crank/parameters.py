@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import ClassVar, NamedTuple
 
-from ..parameters import Least, Rules, check_initial, check_parameters
+from ..parameters import CheckedParameters, CheckedState, Least, Rules
 
 
 class Constants(NamedTuple):
@@ -99,7 +99,7 @@ _RULES = Rules(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SliderCrankParameters:
+class SliderCrankParameters(CheckedParameters):
     """A generalised slider-crank: crank on a cylindrical joint, rod between two ball joints, slider on a straight guide.
 
     Lengths in m, masses in kg, moments and products of inertia in kg.m2, angles in rad, stiffness in N/m, damping in
@@ -156,9 +156,6 @@ class SliderCrankParameters:
     gravity_z: float = 0.0
     assembly_branch: int = 1
 
-    def __post_init__(self) -> None:
-        check_parameters(self)
-
     def constants(self) -> Constants:
         """Compute the constants of the equations."""
         share = self.rod_cog_distance / self.rod_length
@@ -202,7 +199,7 @@ class SliderCrankParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InitialState:
+class InitialState(CheckedState):
     """Initial state of a run: rad, rad/s, m, m/s.
 
     A commanded speed at the start takes the place of ``crank_speed``, a commanded axial speed that of ``shift_velocity``;
@@ -218,6 +215,3 @@ class InitialState:
     crank_speed: float = 0.0
     shift_position: float = 0.0
     shift_velocity: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_initial(self)

@@ -7,7 +7,7 @@ from math import pi
 from typing import ClassVar
 
 from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Mechanism, Part, PublishedSet
-from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
 from . import equations
@@ -15,7 +15,7 @@ from .equations import Constants
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(CheckedParameters):
     """SI units."""
 
     RULES: ClassVar[Rules] = Rules(positive=("pendulum_inertia",))
@@ -24,23 +24,17 @@ class Parameters:
     pendulum_weight: float
     pendulum_damping: float = 0.0
 
-    def __post_init__(self) -> None:
-        check_parameters(self)
-
     def constants(self) -> Constants:
         """What the equations use."""
         return Constants(self.pendulum_inertia, self.pendulum_damping, self.pendulum_weight)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Initial:
+class Initial(CheckedState):
     """State at the start: rad, rad/s."""
 
     pendulum_angle: float = 0.0
     pendulum_speed: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 VARIABLES = (

@@ -7,7 +7,7 @@ from math import pi
 from typing import ClassVar
 
 from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, Mode, PublishedSet
-from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
 from . import equations
@@ -15,7 +15,7 @@ from .equations import Constants
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(CheckedParameters):
     """SI units."""
 
     RULES: ClassVar[Rules] = Rules(positive=("rotor_mass", "rotor_radius", "cart_mass"))
@@ -27,9 +27,6 @@ class Parameters:
     cart_stiffness: float
     cart_damping: float
     gravity: float = 9.81
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
 
     def constants(self) -> Constants:
         """What the equations use."""
@@ -45,16 +42,13 @@ class Parameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Initial:
+class Initial(CheckedState):
     """State at the start: rad, rad/s, m, m/s."""
 
     rotor_angle: float = 0.0
     rotor_speed: float = 0.0
     cart_position: float = 0.0
     cart_velocity: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 _DEMO = Parameters(

@@ -7,7 +7,7 @@ from math import pi
 from typing import ClassVar
 
 from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, PublishedSet
-from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
 from . import equations
@@ -15,7 +15,7 @@ from .equations import Constants
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(CheckedParameters):
     """SI units."""
 
     RULES: ClassVar[Rules] = Rules(
@@ -31,9 +31,6 @@ class Parameters:
     rotor_weight: float = 0.0
     rotor_excitation: float = 0.0
 
-    def __post_init__(self) -> None:
-        check_parameters(self)
-
     def constants(self) -> Constants:
         """What the equations use."""
         return Constants(
@@ -48,16 +45,13 @@ class Parameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Initial:
+class Initial(CheckedState):
     """State at the start: rad, rad/s."""
 
     crank_angle: float = 0.0
     crank_speed: float = 0.0
     rotor_angle: float = 0.0
     rotor_speed: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 def _p(name: str, unit: str, description: str, role: str = "") -> Variable:

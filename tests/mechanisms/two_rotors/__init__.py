@@ -7,7 +7,7 @@ from math import pi
 from typing import ClassVar
 
 from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Mechanism, Mode, Part, PublishedSet
-from linkwork.parameters import Rules, check_initial, check_parameters
+from linkwork.parameters import CheckedParameters, CheckedState, Rules
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
 from . import drawing, equations
@@ -15,7 +15,7 @@ from .equations import Constants
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameters:
+class Parameters(CheckedParameters):
     """SI units."""
 
     RULES: ClassVar[Rules] = Rules(positive=("left_mass", "left_radius", "right_mass", "right_radius", "cart_mass"))
@@ -27,9 +27,6 @@ class Parameters:
     cart_mass: float
     cart_stiffness: float
     cart_damping: float
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
 
     def constants(self) -> Constants:
         """Return what the equations use; each rotor has its unbalance once more about its axis, as a disc of ten times."""
@@ -46,7 +43,7 @@ class Parameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Initial:
+class Initial(CheckedState):
     """State at the start: rad, rad/s, m, m/s."""
 
     left_angle: float = 0.0
@@ -55,9 +52,6 @@ class Initial:
     right_speed: float = 0.0
     cart_position: float = 0.0
     cart_velocity: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_initial(self)
 
 
 _DEMO = Parameters(
