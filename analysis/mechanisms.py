@@ -244,7 +244,7 @@ def output_units() -> dict[str, str]:
 
 
 def wrapping_outputs() -> frozenset[str]:
-    """Return the names of the outputs that are angles between -pi and pi."""
+    """Return the names of the outputs that are angles of links, which may jump by a turn."""
     return frozenset(v.name for mechanism in MECHANISMS.values() for v in mechanism.variables if v.wraps)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from linkwork.five_bar.dynamics import Inputs, derivative
-from linkwork.five_bar.kinematics import coefficients, coupler_angle, position, rocker_angle
+from linkwork.five_bar.kinematics import coefficients, link_angles, position
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
 
@@ -158,7 +158,7 @@ def start(case: Case, p: Constants) -> Start:
     """Return the start of a case."""
     g = position(0.0, 0.0, p)
     k = coefficients(g, p)
-    return Start(coupler_angle(g), rocker_angle(g), k.k32 * case.start_speed, k.k42 * case.start_speed)
+    return Start(*link_angles(g, p), k.k32 * case.start_speed, k.k42 * case.start_speed)
 
 
 def centre(distance: float, angle: float) -> tuple[float, float]:

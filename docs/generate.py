@@ -154,12 +154,19 @@ def masters(of: str, page: str) -> str:
     return markdown(read(HERE / "masters.csv"))
 
 
+def commanded(of: str, page: str) -> str:
+    """Return the table of docs/commanded.csv."""
+    from benchmarks.commanded import markdown, read
+
+    return markdown(read(HERE / "commanded.csv"))
+
+
 #: The parts of the pages of the theses: chapters of Youssef's, Rahman's figures, and our own studies.
 CHAPTERS = (*"345678", "R", "ours")
 #: Functions that fill a table, from its subject and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "rule": rule, "probe": probe, "race": race,
-    "crossing": crossing, "accuracy": accuracy, "masters": masters,
+    "crossing": crossing, "accuracy": accuracy, "masters": masters, "commanded": commanded,
 }  # fmt: skip
 
 

@@ -6,7 +6,6 @@ model description comes with the archive.
 
 from __future__ import annotations
 
-import ctypes
 import json
 import sys
 import zlib
@@ -29,7 +28,7 @@ from linkwork.errors import (
 from linkwork.mechanism import Mechanism
 from linkwork.plant import TOLERANCE_RANGE, Plant
 from linkwork.variables import Variable
-from linkwork.wrapper import end_library_in_order, keep_namespace
+from linkwork.wrapper import end_library_in_order, keep_namespace, outlive_exception
 
 STATUS_GOOD = 0
 STATUS_NOT_INITIALISED = 5
@@ -60,11 +59,7 @@ INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
 
 
 def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
-    """Make a method that the wrapper calls safe to raise from.
-
-    After an exception the wrapper drops its references to class, instance and log, and drops them again when the master
-    frees the instance; one more reference each makes the second drop harmless.
-    """
+    """Make a method that the wrapper calls safe to raise from."""
 
     @wraps(call)
     def method(self: LinkworkSlave, *arguments: Any) -> Any:
@@ -74,8 +69,7 @@ def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
             if not isinstance(error, LinkworkError):
                 self._say(f"internal error in {call.__name__}: {error!r}", Fmi2Status.fatal)
             if self._wrapped:
-                for kept in (self, type(self), self.log_queue):
-                    ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+                outlive_exception(self)
             raise
 
     return method

@@ -7,26 +7,41 @@ long for its answer.
 
 from __future__ import annotations
 
-from math import cos, exp, floor, pi, sin
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Callable
+from math import cos, exp, floor, isfinite, pi, sin
+from typing import Any, ClassVar, NamedTuple, NoReturn
 from xml.etree.ElementTree import Element, SubElement
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
 from pythonfmu.variables import Integer, Real
 
-from linkwork.wrapper import end_library_in_order, keep_namespace
+from linkwork.wrapper import end_library_in_order, keep_namespace, outlive_exception
 
 
 class Row(NamedTuple):
-    """A variable: a parameter, an input, an output, or a local one that is a state of the controller."""
+    """A variable: a parameter, an input, an output, or a local one that is a state of the controller.
+
+    ``rule`` is what a parameter must be, beside finite: a key of `RULES`.
+    """
 
     name: str
     causality: str
     unit: str
     start: float
     text: str
+    rule: str = ""
 
+
+#: What a parameter must be, in words, and whether a finite value is.
+RULES: dict[str, tuple[str, Callable[[float], bool]]] = {
+    "": ("be a finite number", lambda value: True),
+    "positive": ("be greater than zero", lambda value: value > 0.0),
+    "not negative": ("not be negative", lambda value: value >= 0.0),
+}
+
+#: The parameter of every controller, and the only one that is fixed.
+SAMPLE_TIME = Row("sample_time", "parameter", "s", 1e-3, "Time between two samples", "positive")
 
 #: Exponents of the base units.
 UNITS: dict[str, dict[str, int]] = {
@@ -49,7 +64,10 @@ UNITS: dict[str, dict[str, int]] = {
 
 
 class Controller(Fmi2Slave):  # type: ignore[misc]
-    """What the controllers share. Each has its ``rows``, and `sample`, which reads and sets attributes of their names."""
+    """What the controllers share. Each has its ``rows``, and `sample`, which reads and sets attributes of their names.
+
+    All parameters but the sample time may be set between steps: they act from the next sample on.
+    """
 
     rows: ClassVar[tuple[Row, ...]]
     sample_time: float
@@ -60,20 +78,21 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **keywords: Any) -> None:
         super().__init__(**keywords)
-        if "logger" in keywords:
+        self._wrapped = "logger" in keywords
+        if self._wrapped:
             end_library_in_order(self.resources, type(self).__name__)
         self.description = (type(self).__doc__ or "").strip().partition("\n")[0]
         self.count = 0
         self.author = "Linkwork"
-        period = Row("sample_time", "parameter", "s", 1e-3, "Time between two samples")
-        for row in (period, *self.rows):
+        self.parameters = {row.name: row for row in (SAMPLE_TIME, *self.rows) if row.causality == "parameter"}
+        for row in (SAMPLE_TIME, *self.rows):
             setattr(self, row.name, row.start)
-            sampled = "continuous" if row.causality == "input" else "discrete"
+            changes = {"parameter": "tunable", "input": "continuous"}.get(row.causality, "discrete")
             self.register_variable(
                 Real(
                     row.name,
                     causality=Fmi2Causality[row.causality],
-                    variability=Fmi2Variability["fixed" if row.causality == "parameter" else sampled],
+                    variability=Fmi2Variability["fixed" if row is SAMPLE_TIME else changes],
                     description=row.text,
                 )
             )
@@ -84,7 +103,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
     def to_xml(self, model_options: dict[str, str] = {}) -> Element:  # noqa: B006 - the signature is pythonfmu's
         """Return the model description, with the units, which pythonfmu does not know."""
         root: Element = super().to_xml(model_options)
-        units = {"sample_time": "s", **{row.name: row.unit for row in self.rows if row.unit in UNITS}}
+        units = {row.name: row.unit for row in (SAMPLE_TIME, *self.rows) if row.unit in UNITS}
         definitions = Element("UnitDefinitions")
         for unit in dict.fromkeys(units.values()):
             node = SubElement(definitions, "Unit", name=unit)
@@ -95,8 +114,11 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         for number, variable in enumerate(root.iterfind("ModelVariables/ScalarVariable"), 1):
             if variable.get("causality") == "output":
                 SubElement(unknowns, "Unknown", index=str(number))
-            if variable.get("name") in units:
-                variable[0].set("unit", units[str(variable.get("name"))])
+            name = str(variable.get("name"))
+            if name in units:
+                variable[0].set("unit", units[name])
+            if name in self.parameters and self.parameters[name].rule:
+                variable[0].set("min", "0.0")
         return root
 
     def get_real(self, vrs: list[int]) -> list[float]:
@@ -106,9 +128,34 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         values: list[float] = super().get_real(vrs)
         return values
 
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """Set values, all of them or none; in a run the parameters must be valid, and the sample time stays."""
+        for reference, value in zip(vrs, values):
+            if reference not in self.vars:
+                self._refuse(f"there is no variable with the value reference {reference}")
+            name = self.vars[reference].name
+            if self.count > 0 and name == SAMPLE_TIME.name:
+                self._refuse(f"{name} is a fixed parameter: the value {value} was not taken")
+            if self.count > 0 and name in self.parameters:
+                self._check(name, value)
+        super().set_real(vrs, values)
+
+    def _valid(self, name: str, value: float) -> bool:
+        return isfinite(value) and RULES[self.parameters[name].rule][1](value)
+
+    def _check(self, name: str, value: float) -> None:
+        if not self._valid(name, value):
+            self._refuse(f"parameter {name} is {value}: it must {RULES[self.parameters[name].rule][0]}")
+
+    def _refuse(self, sentence: str) -> NoReturn:
+        self.log(sentence, Fmi2Status.error)
+        if self._wrapped:
+            outlive_exception(self)
+        raise ValueError(sentence)
+
     def preview(self) -> None:
         """Set the outputs that a sample at the start would give, and leave the states."""
-        if not self.sample_time > 0.0:
+        if not all(self._valid(name, getattr(self, name)) for name in self.parameters):
             return
         states = {row.name: getattr(self, row.name) for row in self.rows if row.causality == "local"}
         self.sample(0.0)
@@ -117,9 +164,8 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def exit_initialization_mode(self) -> None:
         """Take the sample at the start."""
-        if not self.sample_time > 0.0:
-            self.log(f"sample_time is {self.sample_time} s: it must be above 0", Fmi2Status.error)
-            raise ValueError("sample_time")
+        for name in self.parameters:
+            self._check(name, getattr(self, name))
         self.count = 0
         self._up_to(0.5 * self.sample_time)
 
@@ -153,9 +199,9 @@ class Pid(Controller):
         Row("gain", "parameter", "N/m", 0.0, "Force by the error"),
         Row("integral_gain", "parameter", "N/(m.s)", 0.0, "Growth of the force by the error"),
         Row("derivative_gain", "parameter", "N.s/m", 0.0, "Force by the rate of the error"),
-        Row("filter_time", "parameter", "s", 0.0, "Time constant of the filter before the derivative"),
-        Row("tracking_time", "parameter", "s", 0.1, "Time in which the integral follows the limit"),
-        Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force"),
+        Row("filter_time", "parameter", "s", 0.0, "Time constant of the filter before the derivative", "not negative"),
+        Row("tracking_time", "parameter", "s", 0.1, "Time in which the integral follows the limit", "positive"),
+        Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
         Row("reference", "input", "m", 0.0, "What the position is to be"),
         Row("measured", "input", "m", 0.0, "The position"),
         Row("feed_forward", "input", "N", 0.0, "Force that is added"),
@@ -186,7 +232,7 @@ class StateFeedback(Controller):
     rows = (
         Row("position_gain", "parameter", "N/m", 0.0, "Force against the deviation of the position"),
         Row("velocity_gain", "parameter", "N.s/m", 0.0, "Force against the deviation of the velocity"),
-        Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force"),
+        Row("limit", "parameter", "N", 1e6, "Greatest magnitude of the force", "not negative"),
         Row("reference", "input", "m", 0.0, "What the position is to be"),
         Row("reference_velocity", "input", "m/s", 0.0, "What the velocity is to be"),
         Row("position", "input", "m", 0.0, "The position"),
@@ -267,13 +313,20 @@ class DcServo(Controller):
     """
 
     rows = (
-        Row("resistance", "parameter", "V/A", 1.0, "Of the winding"),
-        Row("inductance", "parameter", "V.s/A", 1e-3, "Of the winding"),
-        Row("torque_constant", "parameter", "N.m/A", 0.1, "Torque by current, and voltage by speed"),
-        Row("voltage_limit", "parameter", "V", 24.0, "Greatest magnitude of the voltage"),
-        Row("current_limit", "parameter", "A", 10.0, "Greatest magnitude of the current that is asked for"),
+        Row("resistance", "parameter", "V/A", 1.0, "Of the winding", "positive"),
+        Row("inductance", "parameter", "V.s/A", 1e-3, "Of the winding", "positive"),
+        Row("torque_constant", "parameter", "N.m/A", 0.1, "Torque by current, and voltage by speed", "positive"),
+        Row("voltage_limit", "parameter", "V", 24.0, "Greatest magnitude of the voltage", "not negative"),
+        Row(
+            "current_limit",
+            "parameter",
+            "A",
+            10.0,
+            "Greatest magnitude of the current that is asked for",
+            "not negative",
+        ),
         Row("current_gain", "parameter", "V/A", 5.0, "Voltage by the error of the current"),
-        Row("encoder_counts", "parameter", "1", 4096.0, "Counts of the encoder in a turn"),
+        Row("encoder_counts", "parameter", "1", 4096.0, "Counts of the encoder in a turn", "positive"),
         Row("torque_reference", "input", "N.m", 0.0, "What the torque is to be"),
         Row("angle", "input", "rad", 0.0, "Angle of the shaft"),
         Row("speed", "input", "rad/s", 0.0, "Speed of the shaft"),

@@ -119,8 +119,8 @@ class Variable(NamedTuple):
 
     @property
     def wraps(self) -> bool:
-        """Return whether the variable is an angle between -pi and pi, which jumps by a turn."""
-        return self.minimum == -pi and self.maximum == pi
+        """Return whether the variable is the angle of a link, which may jump by a turn."""
+        return self.minimum is not None and self.minimum in (-pi, -2.0 * pi) and self.maximum == -self.minimum
 
 
 def parameter(

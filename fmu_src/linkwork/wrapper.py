@@ -6,6 +6,7 @@ import atexit
 import ctypes
 import sys
 from pathlib import Path
+from typing import Any
 
 #: Libraries of FMUs that `end_library_in_order` has seen to.
 _libraries: set[Path] = set()
@@ -33,3 +34,13 @@ def keep_namespace(kind: type) -> None:
     module's namespace that it only borrowed: without one more each time the namespace dies with all its names.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(vars(sys.modules[kind.__module__])))
+
+
+def outlive_exception(slave: Any) -> None:
+    """Keep an instance usable whose method is about to raise an exception.
+
+    After one the wrapper gives up its references to instance, class and log, and gives them up again when the master frees the
+    instance; one more reference each makes the second time harmless.
+    """
+    for kept in (slave, type(slave), slave.log_queue):
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))

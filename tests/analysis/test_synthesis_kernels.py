@@ -78,7 +78,7 @@ def function() -> Any:
     x, y = plant.coupler_point(g, p)
     c, s = casadi.cos(v["ground_angle"]), casadi.sin(v["ground_angle"])
     values = casadi.vertcat(
-        v["pivot_x"] + c * x - s * y, v["pivot_y"] + s * x + c * y, plant.coupler_angle(g), plant.rocker_angle(g)
+        v["pivot_x"] + c * x - s * y, v["pivot_y"] + s * x + c * y, casadi.atan2(g.s3, g.c3), casadi.atan2(g.s4, g.c4)
     )
     return casadi.Function("traced", [z, phi, branch], [values, casadi.jacobian(values, z)])
 

@@ -56,10 +56,10 @@ def test_it_runs_like_the_native_one(
     )
     assert (web.status, web.message) == (native.status, native.message)
     # sine and cosine of another C library differ by a unit in the last place
-    scale = np.maximum(np.abs(native.values).max(axis=0), 1e-6)
-    assert np.abs(web.values - native.values).max(axis=0) == pytest.approx(np.zeros(len(scale)), abs=1e-9 * scale.max())
-    states = [list(native.names).index(freedom.coordinate) for freedom in mechanism.freedoms]
-    np.testing.assert_allclose(web.values[:, states], native.values[:, states], rtol=1e-10, atol=1e-12)
+    difference, largest = (np.abs(values).max(axis=0) for values in (web.values - native.values, native.values))
+    assert difference.max() < 1e-12 * largest.max()
+    states = [list(native.names).index(name) for freedom in mechanism.freedoms for name in freedom[:2]]
+    assert (difference[states] <= 1e-12 * largest[states]).all()
 
 
 def test_the_archive_is_that_of_the_layered_standard(webs: dict[str, Path]) -> None:

@@ -83,8 +83,8 @@ def five_bar(x: five_bar_dynamics.State, par: FiveBarParameters) -> tuple[Body, 
     slider_pin = par.ground_length + u * guide
     arms = (
         cmath.rect(par.crank_cog_distance, th2 + par.crank_cog_angle),
-        cmath.rect(par.coupler_cog_distance, kinematics.coupler_angle(g) + par.coupler_cog_angle),
-        cmath.rect(par.rocker_cog_distance, kinematics.rocker_angle(g) + par.rocker_cog_angle),
+        complex(g.c3, g.s3) * cmath.rect(par.coupler_cog_distance, par.coupler_cog_angle),
+        complex(g.c4, g.s4) * cmath.rect(par.rocker_cog_distance, par.rocker_cog_angle),
     )
     # about its own centre of mass
     crank_inertia = par.crank_inertia - par.crank_mass * par.crank_cog_distance**2

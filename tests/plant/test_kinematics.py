@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import atan2, cos, hypot, pi, radians, sin, sqrt
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 
@@ -23,7 +24,7 @@ several = settings(max_examples=100, derandomize=True, deadline=None)
 def angles(th2: float, u: float, p: Constants, near: tuple[float, float]) -> tuple[float, float]:
     """th3 and th4 without the jumps of atan2: those next to ``near``."""
     g = K.position(th2, u, p)
-    th3, th4 = K.coupler_angle(g), K.rocker_angle(g)
+    th3, th4 = K.link_angles(g, p)
     return th3 - 2 * pi * round((th3 - near[0]) / (2 * pi)), th4 - 2 * pi * round((th4 - near[1]) / (2 * pi))
 
 
@@ -47,7 +48,7 @@ def test_loop_closes(case: Case) -> None:
     assert hypot(x, y) < 2e-14 * (p.l1 + p.l3 + p.l4)
     assert hypot(g.c3, g.s3) == pytest.approx(1.0, abs=2e-14)
     assert hypot(g.c4, g.s4) == pytest.approx(1.0, abs=2e-14)
-    assert K.closure_residual(th2, K.coupler_angle(g), K.rocker_angle(g), u, p) < 2e-14 * (p.l1 + p.l3 + p.l4)
+    assert K.closure_residual(th2, *K.link_angles(g, p), u, p) < 2e-14 * (p.l1 + p.l3 + p.l4)
     assert g.c43 == pytest.approx(g.c3 * g.c4 + g.s3 * g.s4, abs=2e-14)
     assert g.s43 == pytest.approx(g.c3 * g.s4 - g.s3 * g.c4, abs=2e-13)
 
@@ -77,7 +78,7 @@ def test_velocity_coefficients_are_the_partial_derivatives(seed: int) -> None:
     th2, u, *_ = case.state
     p = case.parameters.constants()
     _, _, g, k = speeds(case)
-    near = (K.coupler_angle(g), K.rocker_angle(g))
+    near = K.link_angles(g, p)
     step = STEP * g.s43**2
     k32, k42 = derivative(lambda h: angles(th2 + h, u, p, near), step)
     k3u, k4u = derivative(lambda h: angles(th2, u + h * p.l1, p, near), step)
@@ -130,6 +131,44 @@ def test_coupler_point_lies_where_its_distance_and_angle_say(case: Case) -> None
     direction = atan2(g.s3, g.c3) + par.coupler_point_angle
     assert x == pytest.approx(par.coupler_point_distance * cos(direction), abs=1e-13)
     assert y == pytest.approx(par.coupler_point_distance * sin(direction), abs=1e-13)
+
+
+@several
+@given(case=cases())
+def test_angles_of_the_links_are_their_directions(case: Case) -> None:
+    th2, u, *_ = case.state
+    p = case.parameters.constants()
+    g = K.position(th2, u, p)
+    th3, th4 = K.link_angles(g, p)
+    assert (cos(th3), sin(th3), cos(th4), sin(th4)) == pytest.approx((g.c3, g.s3, g.c4, g.s4), abs=1e-13)
+    assert (cos(th4 - th3), sin(th4 - th3)) == pytest.approx((g.c43, g.s43), abs=1e-13)
+    assert max(abs(th3), abs(th4)) < 2.0 * pi
+
+
+def changes(places: list[tuple[float, float]], p: Constants) -> np.ndarray:
+    """The changes of th3 and th4 from each crank angle and slider position to the next."""
+    return np.diff([K.link_angles(K.position(th2, u, p), p) for th2, u in places], axis=0)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_the_angles_of_the_links_do_not_leap(branch: int) -> None:
+    """The slider pin lies beyond all places of the crank pin, and the rocker swings through the direction of half a turn."""
+    lengths = {"ground_length": 0.3, "crank_length": 0.1, "coupler_length": 0.11, "rocker_length": 0.32}
+    p = replace(TABLE_3_1, slider_guide_angle=0.5 * pi, assembly_branch=branch, **lengths).constants()
+    places = [(angle, 0.1 * branch) for angle in np.linspace(0.0, 4.0 * pi, 2001)]
+    directions = [K.position(*place, p) for place in places]
+    assert max(abs(np.diff([atan2(g.s4, g.c4) for g in directions]))) > 6.0
+    assert np.abs(changes(places, p)).max() < 0.02
+
+
+def test_no_function_of_crank_and_slider_has_no_leap_where_their_pins_can_meet() -> None:
+    """Round the place where both pins meet crank and slider come back to where they were, and the links have made a turn."""
+    p = TABLE_3_1.constants()
+    turn = np.linspace(0.0, 2.0 * pi, 721)
+    changed = changes([(0.3 * sin(angle), p.l2 - p.l1 + 0.02 * cos(angle)) for angle in turn], p)
+    small = np.remainder(changed + pi, 2.0 * pi) - pi
+    assert np.abs(small).max() < 0.1
+    assert np.abs(small.sum(axis=0)) == pytest.approx([2.0 * pi, 2.0 * pi])
 
 
 @several

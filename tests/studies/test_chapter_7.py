@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, pi, sin
+from math import atan2, cos, pi, sin
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def by_the_plant(linkage: Linkage, phi: float, u: float, guide: float) -> tuple[
     g = kinematics.position(phi + linkage.crank_phase, u, p)
     place = complex(linkage.pivot_x, linkage.pivot_y)
     turned = complex(cos(linkage.ground_angle), sin(linkage.ground_angle))
-    return place + turned * complex(*kinematics.coupler_point(g, p)), kinematics.rocker_angle(g)
+    return place + turned * complex(*kinematics.coupler_point(g, p)), atan2(g.s4, g.c4)
 
 
 def weighted_error(linkage: Linkage) -> float:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fmpy import extract, instantiate_fmu, read_model_description
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 from analysis import Inputs, simulate
@@ -168,6 +170,81 @@ def test_a_force_table_is_met_at_its_points_and_straight_between_them_in_every_t
         made.sample(0.0)
         place = degrees % 360.0 / 5.0
         assert made.force == pytest.approx(np.interp(place, np.arange(73), [*right, right[0]]), abs=1e-11)
+
+
+def set_values(made: Controller, **values: float) -> None:
+    """Set values as a master does, by their references."""
+    references = {v.name: reference for reference, v in made.vars.items()}
+    made.set_real([references[name] for name in values], list(values.values()))
+
+
+def test_gains_and_limits_act_from_the_next_sample_on() -> None:
+    pid = controller("pid", gain=2.0, integral_gain=5.0, reference=1.0, sample_time=0.1, limit=100.0)
+    pid.exit_initialization_mode()
+    pid.do_step(0.1, 0.1)
+    before, integral = pid.force, pid.integral
+    set_values(pid, gain=3.0)
+    assert pid.force == before
+    pid.do_step(0.2, 0.1)
+    # the integral has the force that it had grown to: a change of the gain alone changes the share of the error alone
+    assert pid.force == pytest.approx(3.0 + integral)
+    set_values(pid, limit=0.5)
+    pid.do_step(0.3, 0.1)
+    assert pid.force == 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "sentence"),
+    [
+        ("pid", {"sample_time": 0.01}, "sample_time is a fixed parameter"),
+        ("pid", {"gain": float("nan")}, "gain is nan: it must be a finite number"),
+        ("pid", {"gain": 3.0, "tracking_time": 0.0}, "tracking_time is 0.0: it must be greater than zero"),
+        ("state-feedback", {"limit": -1.0}, "limit is -1.0: it must not be negative"),
+        ("dc-servo", {"inductance": 0.0}, "inductance is 0.0: it must be greater than zero"),
+    ],
+)
+def test_what_a_controller_does_not_take_in_a_run(name: str, values: dict[str, float], sentence: str) -> None:
+    made = controller(name)
+    made.exit_initialization_mode()
+    kept = {parameter: getattr(made, parameter) for parameter in made.parameters}
+    with pytest.raises(ValueError, match=sentence):
+        set_values(made, **values)
+    assert {parameter: getattr(made, parameter) for parameter in made.parameters} == kept
+    made.do_step(0.0, 1e-3)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_bad_parameter_of_a_controller_fails_the_initialisation(name: str) -> None:
+    for parameter, row in controller(name).parameters.items():
+        bad = {"positive": 0.0, "not negative": -1.0}.get(row.rule, float("inf"))
+        made = controller(name)
+        set_values(made, **{parameter: bad})
+        made.get_real([0])
+        with pytest.raises(ValueError, match=parameter):
+            made.exit_initialization_mode()
+
+
+@pytest.mark.fmu
+def test_a_controller_lives_on_after_a_refusal(tmp_path: Path) -> None:
+    fmu = build_controller("pid", tmp_path)
+    description = read_model_description(str(fmu))
+    kinds = {v.name: v.variability for v in description.modelVariables if v.causality == "parameter"}
+    assert {name for name, kind in kinds.items() if kind == "fixed"} == {"sample_time"}
+    assert set(kinds.values()) == {"fixed", "tunable"}
+    of = {v.name: v.valueReference for v in description.modelVariables}
+    slave = instantiate_fmu(extract(str(fmu), str(tmp_path / "pid")), description, "CoSimulation")
+    slave.setupExperiment()
+    slave.enterInitializationMode()
+    slave.setReal([of["gain"], of["reference"]], [2.0, 1.0])
+    slave.exitInitializationMode()
+    for wrong in ("sample_time", "tracking_time"):
+        with pytest.raises(FMICallException):
+            slave.setReal([of[wrong]], [0.0])
+    slave.setReal([of["gain"]], [3.0])
+    slave.doStep(0.0, 2e-3)
+    assert slave.getReal([of["force"], of["tracking_time"]]) == [3.0, 0.1]
+    slave.terminate()
+    slave.freeInstance()
 
 
 @pytest.mark.parametrize("name", PARTNERS)

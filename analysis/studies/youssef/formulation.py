@@ -72,7 +72,7 @@ def closed(crank: float, u: float, speed: float, velocity: float) -> tuple[NDArr
     g = kinematics.position(crank, u, p)
     k = kinematics.coefficients(g, p)
     rates = [speed, k.k32 * speed + k.k3u * velocity, k.k42 * speed + k.k4u * velocity, velocity]
-    return np.array([crank, kinematics.coupler_angle(g), kinematics.rocker_angle(g), u]), np.array(rates)
+    return np.array([crank, *kinematics.link_angles(g, p), u]), np.array(rates)
 
 
 def all_derivatives(t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:

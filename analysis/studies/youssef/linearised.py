@@ -38,7 +38,7 @@ def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np
     """Return the angles of coupler and rocker over a turn with the slider held."""
     p = parameters.constants()
     places = [kinematics.position(angle, zeta * p.l4, p) for angle in TURN.tolist()]
-    coupler, rocker = (np.array([f(g) for g in places]) for f in (kinematics.coupler_angle, kinematics.rocker_angle))
+    coupler, rocker = np.array([kinematics.link_angles(g, p) for g in places]).T
     return coupler, rocker
 
 

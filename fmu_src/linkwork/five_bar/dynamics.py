@@ -24,11 +24,10 @@ from .kinematics import (
     centripetal,
     closure_residual,
     coefficients,
-    coupler_angle,
     coupler_point,
     coupler_point_velocity,
+    link_angles,
     position,
-    rocker_angle,
     transmission_angle,
 )
 from .parameters import Constants
@@ -427,8 +426,7 @@ def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     k = coefficients(g, p)
     m = motion(g, k, x, i, p)
     f = reactions(g, x, m, i, p)
-    th3 = coupler_angle(g)
-    th4 = rocker_angle(g)
+    th3, th4 = link_angles(g, p)
     px, py = coupler_point(g, p)
     kinetic = kinetic_energy(inertia(g, k, p), w2, v)
     potential = potential_energy(g, u, p)

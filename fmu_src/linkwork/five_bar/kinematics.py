@@ -117,14 +117,16 @@ def centripetal(g: Position, w2: float, w3: float, w4: float, p: Constants) -> t
     )
 
 
-def coupler_angle(g: Position) -> float:
-    """Return the absolute angle of the coupler B -> C, in (-pi, pi]."""
-    return atan2(g.s3, g.c3)
+def link_angles(g: Position, p: Constants) -> tuple[float, float]:
+    """Return the absolute angles of the coupler B -> C and the rocker D -> C (the thesis's theta4 + alpha), in (-2 pi, 2 pi).
 
-
-def rocker_angle(g: Position) -> float:
-    """Return the absolute angle of the rocker D -> C, in (-pi, pi] (the thesis's theta4 + alpha)."""
-    return atan2(g.s4, g.c4)
+    They are the direction of the line B -> D, and the angles of the triangle B, D, C, which lie between 0 and pi. Both change
+    continuously unless that line comes to point against the ground link: where B passes behind D.
+    """
+    dx = p.l3 * g.c3 - p.l4 * g.c4
+    dy = p.l3 * g.s3 - p.l4 * g.s4
+    th3 = atan2(dy, dx) + atan2(dx * g.s3 - dy * g.c3, dx * g.c3 + dy * g.s3)
+    return th3, th3 + atan2(g.s43, g.c43)
 
 
 def transmission_angle(g: Position, p: Constants) -> float:

@@ -163,16 +163,23 @@ def _pin(pin: str, description: str) -> tuple[Variable, Variable]:
 OUTPUTS = (
     *crank_outputs("\\theta_2"),
     output(
-        "coupler.angle", "rad", "Coupler angle B to C", "\\theta_3", *POSITION, minimum=-pi, maximum=pi, display="deg"
+        "coupler.angle",
+        "rad",
+        "Coupler angle B to C, continuous unless B passes behind D",
+        "\\theta_3",
+        *POSITION,
+        minimum=-2.0 * pi,
+        maximum=2.0 * pi,
+        display="deg",
     ),
     output(
         "rocker.angle",
         "rad",
-        "Absolute rocker angle D to C",
+        "Absolute rocker angle D to C, continuous unless B passes behind D",
         "\\theta_4 + \\alpha",
         *POSITION,
-        minimum=-pi,
-        maximum=pi,
+        minimum=-2.0 * pi,
+        maximum=2.0 * pi,
         display="deg",
     ),
     output("slider.position", "m", "Slider position along the guide", "u", *POSITION),

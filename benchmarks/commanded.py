@@ -1,0 +1,345 @@
+"""How well each master follows a commanded speed that moves: error of the coordinate after 0.2 s, and its order in the step.
+
+    python -m benchmarks.commanded                   # all masters, two minutes; writes docs/commanded.csv
+    python -m benchmarks.commanded --master FMPy     # one of them (repeatable); prints what it finds
+
+The command is a + b sin(20 t), which is set at the communication points, alone or with its rate; the coordinate is its
+integral. Each master has a process of its own. `docs/generate.py` puts the table into docs/fmu.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import tempfile
+from collections.abc import Callable
+from math import cos, log2
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from analysis.export import KINDS, build, build_native
+from analysis.mechanisms import MECHANISMS
+from linkwork.mechanism import Mechanism
+from tests.fmu.runner import run_in_process
+
+RESULTS = Path(__file__).parents[1] / "docs" / "commanded.csv"
+#: Communication steps (s), and the number of the greater ones.
+STEPS, COUNT = (2e-3, 1e-3), 100
+#: Errors below this are those of the solvers and of rounding.
+LEAST = 1e-9
+#: Rows of text by the headings of the table.
+Table = list[dict[str, str]]
+
+
+class Command(NamedTuple):
+    """A command of a mechanism: its input, that of its rate, the coordinate, and the numbers a and b of its law."""
+
+    mechanism: str
+    speed: str
+    rate: str
+    coordinate: str
+    a: float
+    b: float
+
+
+COMMANDS = (
+    Command("five-bar", "drive.speed", "drive.acceleration", "crank.angle", 40.0, 10.0),
+    Command("slider-crank", "axial.speed", "axial.acceleration", "shift.position", 0.0, 0.3),
+)
+
+
+# The masters: each function runs in a process of its own, and imports what it needs inside itself. It takes cases, each of an
+# FMU, what a `Command` has, whether the rate is set too, the communication step, how many there are, and arguments of a `Row`;
+# it returns the coordinate at the end of each.
+
+
+def by_fmpy(cases: list[Any]) -> list[float]:
+    """FMPy's `simulate_fmu`; for its CVode, which sets inputs at the ends of its own steps, the command is given densely."""
+    import numpy as np
+    from fmpy import simulate_fmu
+
+    def run(
+        fmu: str, of: list[Any], rated: bool, step: float, count: int, kind: str = "CoSimulation", solver: str = "Euler"
+    ) -> float:
+        _, speed, rate, coordinate, a, b = of
+        times = np.linspace(0.0, count * step, (count if solver == "Euler" else 100 * count) + 1)
+        columns = {"time": times, speed: a + b * np.sin(20.0 * times)}
+        if rated:
+            columns[rate] = 20.0 * b * np.cos(20.0 * times)
+        rows = simulate_fmu(
+            fmu,
+            fmi_type=kind,
+            solver=solver,
+            stop_time=count * step,
+            step_size=step,
+            output_interval=step,
+            relative_tolerance=1e-9,
+            start_values={speed: a},
+            input=np.array(list(zip(*columns.values())), dtype=[(name, float) for name in columns]),
+            output=[coordinate],
+        )
+        return float(rows[-1][coordinate])
+
+    return [run(*case) for case in cases]
+
+
+def by_libcosimpy(cases: list[Any]) -> list[float]:
+    """libcosim's fixed-step algorithm."""
+    from math import cos, sin
+
+    from fmpy import read_model_description
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = of
+        reference = {v.name: v.valueReference for v in read_model_description(fmu).modelVariables}
+        execution = CosimExecution.from_step_size(round(step * 1e9))
+        slave = execution.add_local_slave(CosimLocalSlave(fmu_path=fmu, instance_name="one"))
+        execution.add_observer(observer := CosimObserver.create_last_value())
+        execution.add_manipulator(override := CosimManipulator.create_override())
+        execution.real_initial_value(slave, reference[speed], a)
+        names = [speed, rate] if rated else [speed]
+        for n in range(count):
+            values = [a + b * sin(20.0 * n * step), 20.0 * b * cos(20.0 * n * step)]
+            override.slave_real_values(slave, [reference[name] for name in names], values[: len(names)])
+            assert execution.step(1)
+        return float(observer.last_real_values(slave, [reference[coordinate]])[0])
+
+    return [run(*case) for case in cases]
+
+
+def by_ecospy(cases: list[Any]) -> list[float]:
+    """Run by ecos."""
+    from math import cos, sin
+
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = of
+        with EcosSimulationStructure() as structure:
+            structure.add_model("one", fmu)
+            structure.add_parameter_set("case", {f"one::{speed}": a})
+            with EcosSimulation(structure=structure, step_size=step) as simulation:
+                simulation.init(parameter_set="case")
+                for n in range(count):
+                    simulation.set_real(f"one::{speed}", a + b * sin(20.0 * n * step))
+                    if rated:
+                        simulation.set_real(f"one::{rate}", 20.0 * b * cos(20.0 * n * step))
+                    simulation.step(1)
+                found = float(simulation.get_real(f"one::{coordinate}"))
+                simulation.terminate()
+        return found
+
+    return [run(*case) for case in cases]
+
+
+def by_cofmupy(cases: list[Any]) -> list[float]:
+    """CoFMUPy, which sets all inputs, those that it is not given to zero."""
+    import sys
+    from math import cos, sin
+
+    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that it is for
+    from cofmupy import Coordinator
+
+    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int) -> float:
+        _, speed, rate, coordinate, a, b = of
+        start = {"drive.speed": 5.0} | {speed: a}
+        one = {"id": "one", "name": "one", "path": fmu, "initialization": start}
+        coordinator = Coordinator()
+        coordinator.start({"fmus": [one], "connections": [], "cosim_method": "jacobi", "iterative": False})
+        for n in range(count):
+            given = {speed: [a + b * sin(20.0 * n * step)]}
+            if rated:
+                given[rate] = [20.0 * b * cos(20.0 * n * step)]
+            coordinator.master.do_step(step, input_dict={"one": given})
+        return float(coordinator.master.fmu_handlers["one"].get_variable(coordinate)[0])
+
+    return [run(*case) for case in cases]
+
+
+def by_pathsim(cases: list[Any]) -> list[float]:
+    """PathSim's block for co-simulation, or with a solver that for model exchange."""
+    from math import cos, sin
+
+    import pathsim.solvers
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Source
+    from pathsim_fmi.blocks import CoSimulationFMU, ModelExchangeFMU
+
+    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int, solver: str = "") -> float:
+        _, speed, rate, coordinate, a, b = of
+        start = {speed: a}
+        block = ModelExchangeFMU(fmu, "one", start) if solver else CoSimulationFMU(fmu, "one", start, dt=step)
+        laws = {name: (lambda t: 0.0) for name in block.fmu_wrapper.input_refs}
+        laws["drive.speed"] = lambda t: 5.0
+        laws[speed] = lambda t: a + b * sin(20.0 * t)
+        if rated:
+            laws[rate] = lambda t: 20.0 * b * cos(20.0 * t)
+        sources = [Source(law) for law in laws.values()]
+        connections = [Connection(source, block[place]) for place, source in enumerate(sources)]
+        options = {"Solver": getattr(pathsim.solvers, solver), "tolerance_lte_rel": 1e-9} if solver else {}
+        simulation = Simulation([*sources, block], connections, dt=step, log=False, **options)
+        # for co-simulation it steps at the beginning of each period
+        simulation.run(count * step if solver else (count - 1.5) * step)
+        return float(dict(zip(block.fmu_wrapper.output_refs, block.fmu_wrapper.get_outputs_as_array()))[coordinate])
+
+    return [run(*case) for case in cases]
+
+
+def by_cosimulate(cases: list[Any]) -> list[float]:
+    """`analysis.cosimulate`, which sets the rate itself: the change of the coordinate."""
+    from math import cos, sin
+
+    from analysis import Function, Inputs, cosimulate
+    from analysis.mechanisms import MECHANISMS
+
+    def run(fmu: str, of: list[Any], rated: bool, step: float, count: int, interface: str) -> float:
+        mechanism, _, _, coordinate, a, b = of
+        parameters = next(iter(MECHANISMS[mechanism].published.values())).parameters
+
+        def speed(t: float, q1: float, q2: float, v1: float, v2: float) -> float:
+            return float(a + b * sin(20.0 * t))
+
+        def rate(t: float, q1: float, q2: float, v1: float, v2: float) -> float:
+            return float(20.0 * b * cos(20.0 * t))
+
+        law = Function(speed, rate)
+        inputs = Inputs(speed=law) if mechanism == "five-bar" else Inputs(speed=5.0, shift_speed=law)
+        found = cosimulate(fmu, parameters, inputs, stop_time=count * step, step=step, interface=interface)
+        return float(found[coordinate][-1] - found[coordinate][0])
+
+    return [run(*case) for case in cases]
+
+
+class Row(NamedTuple):
+    """A master on FMUs of some kinds, with one interface; ``sets_rate`` where it sets the rate of a command itself."""
+
+    master: str
+    interface: str
+    kinds: tuple[str, ...]
+    by: Callable[[list[Any]], list[float]]
+    arguments: tuple[str, ...] = ()
+    sets_rate: bool = False
+
+
+BOTH = ("native", "native-fmi3")
+_STEPS, _STATES = "co-simulation", "model exchange"
+ROWS = (
+    Row("FMPy", _STEPS, tuple(KINDS), by_fmpy),
+    Row("FMPy", f"{_STATES}, Euler", BOTH, by_fmpy, ("ModelExchange", "Euler")),
+    Row("FMPy", f"{_STATES}, CVode", BOTH, by_fmpy, ("ModelExchange", "CVode")),
+    Row("libcosimpy", _STEPS, ("native",), by_libcosimpy),
+    Row("ecospy", _STEPS, BOTH, by_ecospy),
+    Row("CoFMUPy", _STEPS, BOTH, by_cofmupy),
+    Row("PathSim", _STEPS, BOTH, by_pathsim),
+    Row("PathSim", f"{_STATES}, RK4", BOTH, by_pathsim, ("RK4",)),
+    Row("PathSim", f"{_STATES}, RKDP54", BOTH, by_pathsim, ("RKDP54",)),
+    Row("`cosimulate`", _STEPS, BOTH, by_cosimulate, ("co-simulation",), True),
+    Row("`cosimulate`", "`linear-co-simulation`", ("native",), by_cosimulate, ("linear-co-simulation",), True),
+    Row("`cosimulate`", f"{_STATES}, CVode", BOTH, by_cosimulate, ("model-exchange",), True),
+)
+
+
+def _column(command: Command, rated: bool) -> str:
+    return f"`{command.rate}` too" if rated else f"`{command.speed}`"
+
+
+COLUMNS = [_column(command, rated) for command in COMMANDS for rated in (False, True)]
+
+
+def fmu_of(mechanism: Mechanism, kind: str, folder: Path) -> Path:
+    """Return an FMU, built if it is not in the folder."""
+    target = folder / KINDS[kind].file_name(mechanism)
+    if not target.is_file():
+        target = build(mechanism, folder) if kind == "python" else build_native(mechanism, KINDS[kind], folder)
+    return target
+
+
+def right(command: Command, row: Row) -> float:
+    """Return what the coordinate must be in the end; of `cosimulate` its change, as it starts where the published set does."""
+    end = COUNT * STEPS[0]
+    start = {v.name: v.start for v in MECHANISMS[command.mechanism].variables}[
+        f"initial.{command.coordinate.replace('.', '_')}"
+    ]
+    return command.a * end + command.b * (1.0 - cos(20.0 * end)) / 20.0 + (0.0 if row.sets_rate else float(start))
+
+
+def text(errors: list[float]) -> str:
+    """Return order and error at the smaller step, in words."""
+    coarse, fine = errors
+    if fine < LEAST:
+        return f"below {LEAST:.0e}"
+    order = round(log2(coarse / fine), 1)
+    return f"{fine:.1e}, {'whatever the step' if abs(order) < 0.5 else f'order {order:g}'}"
+
+
+def find(master: str, folder: Path) -> Table:
+    """Return the rows of a master; where FMUs of several kinds differ, both are said."""
+    looked = [
+        (row, command, rated, kind)
+        for row in ROWS
+        for command in COMMANDS
+        for rated in (False, True)
+        for kind in row.kinds
+        if row.master == master and (rated or not row.sets_rate)
+    ]
+    cases = [
+        [
+            str(fmu_of(MECHANISMS[c.mechanism], kind, folder)),
+            [*c],
+            rated,
+            h,
+            round(COUNT * STEPS[0] / h),
+            *row.arguments,
+        ]
+        for row, c, rated, kind in looked
+        for h in STEPS
+    ]
+    ends = run_in_process(looked[0][0].by, cases, options=(), timeout=3000.0)
+    table: dict[Row, dict[str, str]] = {}
+    for n, (row, command, rated, kind) in enumerate(looked):
+        found = table.setdefault(row, {"master": row.master, "interface": row.interface} | dict.fromkeys(COLUMNS, ""))
+        name = _column(command, rated)
+        said = text([abs(end - right(command, row)) for end in ends[2 * n : 2 * n + 2]])
+        if not found[name]:
+            found[name] = said
+        elif found[name] != said:
+            found[name] += f"; {kind}: {said}"
+    return [{name: said or "-" for name, said in found.items()} for found in table.values()]
+
+
+def read(path: Path) -> Table:
+    """Read what was found."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def write(path: Path, table: Table) -> None:
+    """Write what was found."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.DictWriter(file, list(table[0]), lineterminator="\n")
+        rows.writeheader()
+        rows.writerows(table)
+
+
+def markdown(table: Table) -> str:
+    """Write the table of the page."""
+    rows = [list(table[0]), ["---"] * len(table[0]), *(list(row.values()) for row in table)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    names = tuple(dict.fromkeys(row.master for row in ROWS))
+    parser.add_argument("--master", choices=names, action="append", help="this master alone (repeatable)")
+    parser.add_argument("--fmus", type=Path, help="folder of FMUs that are built already")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        folder = (chosen.fmus or Path(place)).resolve()
+        table = [row for master in chosen.master or names for row in find(master, folder)]
+    if not chosen.master:
+        write(RESULTS, table)
+    print(markdown(table))
