@@ -250,7 +250,7 @@ def closed_form_pictures() -> Iterator[Picture]:
 
     for name, count in (("five-poses", 6), ("four-poses", 1)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        yield name, plot(guidance(case.task, count), title=case.title), 70
+        yield name, plot(guidance(case.task, count), title=case.title), {"five-poses": 100, "four-poses": 92}[name]
 
 
 def linkage_pictures() -> Iterator[Picture]:
@@ -268,7 +268,7 @@ def linkage_pictures() -> Iterator[Picture]:
         page = (HERE / "linkages.md").read_text(encoding="utf-8")
         motor = path.with_name("motor.toml")
         motor.write_text(page.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
-        yield "motor-four-bar", plot(run_system(load_system(motor).wiring())), 70
+        yield "motor-four-bar", plot(run_system(load_system(motor).wiring())), 100
     files = sorted((HERE.parent / "examples" / "linkages").glob("*.toml"))
     yield "linkage-library", plot_schemes([load_linkage(path) for path in files]), 90
 
@@ -289,7 +289,7 @@ def system_pictures() -> Iterator[Picture]:
              "press": ["flywheel.shaft.exerted_torque", "press.crank.speed", "load.contact.exerted_force"]}  # fmt: skip
     for name, outputs in names.items():
         run = run_system(load_system(library()[name]).wiring(), coupling="derivatives")
-        yield f"system-{name}", draw.plot(run, outputs), 70
+        yield f"system-{name}", draw.plot(run, outputs), 100
     found = convergence(load_system(library()["press"]))
     yield "system-check", draw.plot(found), 90
 
