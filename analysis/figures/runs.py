@@ -146,9 +146,9 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
         return
     parts = np.array_split(np.arange(len(values)), min(_BANDS, _oscillations(values) // 2))
     middle = np.array([time[part].mean() for part in parts])
-    low, mean, high = (np.array([of(values[part]) for part in parts]) for of in (np.min, _smooth_mean, np.max))
-    (drawn,) = axis.plot(middle, mean, line, label=label or None)
-    axis.fill_between(middle, low, high, color=drawn.get_color(), alpha=0.25, linewidth=0.0)
+    ends = np.array([(values[part].min(), values[part].max()) for part in parts])
+    (drawn,) = axis.plot(middle, [_smooth_mean(values[part]) for part in parts], line, label=label or None)
+    axis.fill_between(middle, *ends.T, color=drawn.get_color(), alpha=0.25, linewidth=0.0)
 
 
 def _smooth_mean(values: FloatArray) -> float:

@@ -94,7 +94,8 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
     """Write the names of pins where no line that is drawn covers them."""
     from shapely import LineString
 
-    lines = [LineString(line.get_xydata()) for line in axis.lines if len(line.get_xydata()) > 1]
+    curves = [np.asarray(line.get_xydata()) for line in axis.lines]
+    lines = [LineString(curve) for curve in curves if len(curve) > 1]
     edges = [LineString(patch.get_path().vertices) for patch in axis.patches]
     drawn = [shape for shape in (*lines, *edges) if np.isfinite(shape.bounds).all()]
     taken = list(pins.values())
