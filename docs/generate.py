@@ -328,7 +328,9 @@ def save_picture(figure: Figure, path: Path, dpi: int) -> None:
 
     save_figure(figure, path, dpi=dpi)
     with Image.open(path) as image:
-        few = image.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        # the other methods lose a colour that only a legend has
+        way = Image.Quantize.MAXCOVERAGE
+        few = image.convert("RGB").quantize(256, method=way, dither=Image.Dither.NONE)
     few.save(path, optimize=True)
 
 
