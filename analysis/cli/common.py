@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,9 +17,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from linkwork.errors import InputError, Interrupted, LinkworkError
+from linkwork.errors import AssemblyError, InputError, Interrupted, LinkworkError
 
 from ..libraries import MissingLibraryError, require
+from ..units import display_of
 from .codes import CHECK_FAILED as CHECK_FAILED
 from .codes import ENDED_EARLY as ENDED_EARLY
 from .codes import INTERRUPTED as INTERRUPTED
@@ -39,6 +41,21 @@ def visible(text: str) -> str:
 def plain(text: str) -> Text:
     """Return a text for a table as it was typed, without reading markup or emoji codes in it."""
     return Text(visible(text))
+
+
+#: A number in a sentence, and one with a unit of the mechanisms' equations; quoted ones are as the user wrote them.
+NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+_QUANTITY = re.compile(rf"(?<![-'\w.])({NUMBER}) (N\.m|N|m)(?!\w|[./](?!rad\b)\w)")
+
+
+def in_units(text: str, shown: Callable[[str], tuple[str, float]]) -> str:
+    """Return a sentence about a mechanism with lengths, forces and torques in other units: ``shown`` gives name and factor."""
+
+    def converted(found: re.Match[str]) -> str:
+        unit, factor = shown(found[2])
+        return found[0] if unit == found[2] else f"{float(found[1]) * factor:.6g} {unit}"
+
+    return _QUANTITY.sub(converted, text)
 
 
 def print_error(text: str, style: str = "yellow") -> None:
@@ -74,6 +91,8 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
             return command(*arguments, **options)
         except Interrupted as error:
             text, style, code = str(error), "yellow", INTERRUPTED
+        except AssemblyError as error:
+            text, style, code = f"error: {in_units(str(error), display_of)}", "red", WRONG
         except LinkworkError as error:
             text, style, code = f"error: {error}", "red", WRONG
         except OSError as error:

@@ -28,6 +28,7 @@ from .common import (
     console,
     folder_of,
     handled,
+    in_units,
     kind_of,
     number_or_text,
     out_option,
@@ -135,7 +136,7 @@ def run(
         print_error(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept")
         sys.exit(INTERRUPTED)
     if result.status:
-        print_error(f"the run ended early: {result.message}", "red")
+        print_error(f"the run ended early: {in_units(result.message, display_of)}", "red")
         for sentence in _bare_speeds(case, settings, chosen):
             print_error(sentence)
         sys.exit(ENDED_EARLY)

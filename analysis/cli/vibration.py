@@ -11,7 +11,7 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.parameters import field_name
 
 from ..mechanisms import FIVE_BAR, mechanism_of
-from ..units import RAD_S_PER_RPM
+from ..units import RAD_S_PER_RPM, display_of
 from .common import (
     console,
     folder_of,
@@ -141,7 +141,7 @@ def resonance(
             response = with_isolas(response, places=places, turns=turns, progress=console.is_terminal)
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
-    factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit_of(mechanism, vary))
+    unit, factor = display_of(unit_of(mechanism, vary))
     if natural is not None:
         console.print(
             f"natural frequency (mean effective mass): {natural / RAD_S_PER_RPM:.2f} rpm, {natural:.5g} rad/s",
@@ -158,7 +158,7 @@ def resonance(
     if sensitivity:
         written += report_sensitivity(response, factor, unit, f"{stem}-sensitivity.csv")
     if plot:
-        picture = figures.picture(response, title=title, rpm=over_speed, beside=table)
+        picture = figures.picture(response, title=title, beside=table)
         written += save_picture(picture, stem, html=html)
     chosen.finish(written, response.problems, interrupted=interrupted)
 
@@ -191,6 +191,8 @@ def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural
 
 
 def _branches(title: str, response: Any, factor: float, unit: str) -> None:
+    from ..periodic import speed_names
+
     events_heading = f"what happens on it, at [{unit}]"
     headings = ("branch", "turns", "points", f"from [{unit}]", f"to [{unit}]", "motion", events_heading)
     rows = []

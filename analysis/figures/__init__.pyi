@@ -7,6 +7,7 @@ from .curves import Panel as Panel
 from .curves import Picture as Picture
 from .curves import draw as draw
 from .curves import plot_curves as plot_curves
+from .curves import resize as resize
 from .decay import plot_decay as plot_decay
 from .dispatch import DrawingError as DrawingError
 from .dispatch import animate as animate

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..libraries import lazy
 from ..linear import Design, LinearModel
 from .dispatch import plot
-from .style import BOLD, COLOURS, LINE, LINES, REFERENCE, finish, legend_above, styled, write_title
+from .style import BOLD, COLOURS, DOT, LINE, LINES, REFERENCE, finish, legend_above, styled, write_title
 
 if TYPE_CHECKING:
     import control
@@ -139,6 +139,10 @@ def plot_linear_model(
     return plot_bode({"": model.to_state_space((target,), (source,))}, unit=f"{units[target]}/{per}", **options)
 
 
+def _of(label: str, what: str) -> str:
+    return f"{label}: {what}" if label else what
+
+
 def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
     """Plot poles (crosses) and zeros (circles) of systems, in the complex plane with one scale on both axes.
 
@@ -155,11 +159,13 @@ def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
         for number, (label, system) in enumerate(systems.items()):
             points = control.pole_zero_map(system)
             colour = COLOURS[number % len(COLOURS)]
-            look: dict[str, Any] = {"linestyle": "none", "color": colour, "zorder": 3}
+            # rings about each other where systems have one place in common
+            size = DOT * (1.0 + 0.5 * number)
+            look: dict[str, Any] = {"linestyle": "none", "color": colour, "zorder": 3, "markersize": size}
             poles, zeros = np.asarray(points.poles), np.asarray(points.zeros)
-            axis.plot(poles.real, poles.imag, marker="x", label=f"{label} poles".strip(), markeredgewidth=LINE, **look)
+            axis.plot(poles.real, poles.imag, marker="x", label=_of(label, "poles"), markeredgewidth=LINE, **look)
             if len(zeros):
-                axis.plot(zeros.real, zeros.imag, marker="o", fillstyle="none", label=f"{label} zeros".strip(), **look)
+                axis.plot(zeros.real, zeros.imag, marker="o", fillstyle="none", label=_of(label, "zeros"), **look)
         axis.set_xlabel("real part [1/s]")
         axis.set_ylabel("imaginary part [rad/s]")
         axis.set_aspect("equal", adjustable="datalim")

@@ -21,7 +21,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from .dispatch import picture, plot
-from .marks import label_place, mark_place, place_marks
+from .marks import label_place, mark_place, settle
 from .style import (
     COLOURS,
     LINE,
@@ -225,7 +225,15 @@ def draw(picture: Picture) -> Figure:
             align_labels(list(axes.flat))
         write_title(figure, picture.title)
         write_notes(figure, picture.notes)
-        return place_marks(finish(figure))
+        return settle(finish(figure))
+
+
+def resize(figure: Figure, width: float, height: float) -> Figure:
+    """Lay a figure that was drawn out anew at another size (inches)."""
+    with styled():
+        figure.set_layout_engine("constrained")
+        figure.set_size_inches(width, height)
+        return settle(finish(figure))
 
 
 @singledispatch

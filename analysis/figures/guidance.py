@@ -38,6 +38,8 @@ from .style import (
 MM_PER_METRE = 1e3
 #: Arms of the mark of a pose, as a share of the poses' size.
 ARM = 0.09
+#: The least length of an arm beside curves, as a share of the view.
+_ARM_IN_VIEW = 0.045
 #: Of a four-bar, what is in view: so many times the poses' size about them.
 VIEW = 2.2
 
@@ -86,7 +88,8 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
     with styled():
         figure = Figure(figsize=(10.4, 5.4))
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        _draw_poses(left, found, numbered=True)
+        low, high = _view(found)
+        _draw_poses(left, found, numbered=True, arm=_ARM_IN_VIEW * (high - low).real)
         for curve, colour, label in (
             (found.pivots, GROUND, "where a fixed pivot can be"),
             (found.points, TRACE, "where its point of the body is in pose 1"),
@@ -111,7 +114,6 @@ def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
             dots, cax=scale, label="pivot of the crank: least transmission angle\nwith the best rocker [deg]"
         )
         scale.grid(False)
-        low, high = _view(found)
         for axis in (left, right):
             axis.set_aspect("equal", adjustable="box")
             axis.set_xlabel("x [mm]")
@@ -148,11 +150,11 @@ def _view(found: GuidanceMap) -> tuple[complex, complex]:
     return 0.5 * (low + high) - half, 0.5 * (low + high) + half
 
 
-def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = False) -> None:
-    """Draw each pose as a mark with a long arm along the body and a short one across."""
+def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = False, arm: float = 0.0) -> None:
+    """Draw each pose as a mark with a long arm along the body, of this length (mm) or more, and a short one across."""
     places, angles, size = _poses(found)
     for number, (place, angle) in enumerate(zip(places, angles), start=1):
-        along = ARM * size * np.exp(1j * angle)
+        along = max(arm, ARM * size) * np.exp(1j * angle)
         mark = place + np.array([along, 0.0, 0.5j * along])
         name = "pose, its long arm along the body" if numbered and number == 1 else None
         axis.plot(*_parts(mark), color=TARGET, linewidth=2.2, zorder=3, solid_joinstyle="miter", label=name)

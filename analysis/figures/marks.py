@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.path import Path
 from matplotlib.text import Annotation, Text
+from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
@@ -26,6 +27,8 @@ _SIDES: tuple[_Side, _Side] = ("right", "left")
 #: Distances (points) from its point at which a text may be, the first the best, and directions there.
 _DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
 _DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 90.0, 70.0, 110.0, -90.0, -70.0, -110.0])
+#: Largest share of an axis that a legend may add to it.
+_ROOM = 0.45
 #: How much a line that crosses a text counts beside a text that covers a curve.
 _CROSSED = 3
 #: Directions from a pin in which its letter may stand.
@@ -110,20 +113,65 @@ class _Scene:
         if self.legend is not None:
             count += box.overlaps(self.legend)
         count += sum(box.x0 < place < box.x1 for place in self.marks)
+        count += sum(arrow.intersects_bbox(box, filled=False) for arrow in self.arrows)
+        return int(count) + self.hidden(box)
+
+    def hidden(self, box: Bbox) -> int:
+        """Count the curves and the rows of markers that a box covers."""
+        count = 0
         for path, marker, line in self.curves:
             if marker:
                 # the size in points is a little more than half of it in pixels
-                count += box.padded(marker).count_contains(path.vertices) > 0
+                count += bool(box.padded(marker).count_contains(path.vertices))
             if line:
-                count += path.intersects_bbox(box, filled=False)
-        count += sum(arrow.intersects_bbox(box, filled=False) for arrow in self.arrows)
-        return int(count)
+                count += bool(path.intersects_bbox(box, filled=False))
+        return count
 
     def crossed(self, leader: Path, others: Sequence[Bbox]) -> int:
         """Count the names and arrows that the line from a point to its text crosses."""
         return sum(leader.intersects_bbox(other, filled=True) for other in others) + sum(
             leader.intersects_path(arrow, filled=False) for arrow in self.arrows
         )
+
+
+def settle(figure: Figure) -> Figure:
+    """Give legends room, leave out ticks that touch, and place the marks; the figure must be laid out."""
+    for axis in figure.axes:
+        _thin_ticks(axis)
+        _make_room(axis)
+    return place_marks(figure)
+
+
+def _thin_ticks(axis: Axes) -> None:
+    """Leave out every other one of ticks that were chosen, while their numbers touch."""
+    while isinstance(axis.xaxis.get_major_locator(), FixedLocator) and len(axis.get_xticks()) > 3:
+        boxes = [label.get_window_extent() for label in axis.get_xticklabels() if label.get_text()]
+        if all(right.x0 - left.x1 > _GAP for left, right in pairwise(boxes)):
+            return
+        texts = [label.get_text() for label in axis.get_xticklabels()]
+        axis.set_xticks(axis.get_xticks()[::2], texts[::2])
+
+
+def _make_room(axis: Axes) -> None:
+    """Extend an axis upwards by the height of a legend that would cover curves wherever it is."""
+    legend = axis.get_legend()
+    if legend is None or axis.get_aspect() != "auto":
+        return
+    box, inside = legend.get_window_extent(), axis.get_window_extent()
+    hidden = _Scene.of(axis).hidden(box)
+    share = (box.height + 2.0 * _GAP) / inside.height
+    if not hidden or not inside.overlaps(box) or box.y0 > inside.y1 - _GAP or share > _ROOM:
+        return
+    before, scale = axis.get_ylim(), axis.yaxis.get_transform()
+    low, high = scale.transform(before)
+    ticks = axis.get_yticks()
+    axis.set_ylim(before[0], float(scale.inverted().transform(low + (high - low) / (1.0 - share))))
+    legend.set_loc("best")
+    if _Scene.of(axis).hidden(legend.get_window_extent()) >= hidden:
+        axis.set_ylim(before)
+    else:
+        # the room has no numbers, which would be wider than those that were laid out
+        axis.set_yticks([tick for tick in ticks if before[0] <= tick <= before[1]])
 
 
 def place_marks(figure: Figure) -> Figure:

@@ -13,6 +13,7 @@ from scipy.signal import find_peaks
 from shapely import LineString, distance
 from shapely import points as make_points
 
+from ..mechanisms import mechanism_of
 from ..periodic import (
     FORCE,
     TOLERANCE,
@@ -27,7 +28,7 @@ from ..periodic import (
     Stability,
     fold_jumps,
 )
-from ..units import RAD_S_PER_RPM, display_of
+from ..units import display_of
 from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
 from .style import COLOURS, LINE, THIN, spoken
@@ -60,7 +61,7 @@ _RISKS = tuple(Risk)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Scale:
-    """How a parameter and the amplitude are drawn: factors from SI, units, names."""
+    """How a parameter and the amplitude are drawn: factors from SI, units, names; ``what`` is the short one of the latter."""
 
     family: Family
     factor: float
@@ -68,6 +69,7 @@ class _Scale:
     scale: float
     shown: str
     what: str
+    name: str
 
     @property
     def axis(self) -> str:
@@ -124,10 +126,11 @@ def describe_branches(
 ) -> Picture:
     """Return the picture that `plot_branches` draws, with a line above the legend on what the ranges do not know."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
-    rpm &= family.unit == "rad/s"
-    factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
+    unit, factor = display_of(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
     shown, scale = display_of(si)
-    look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what)
+    outputs = (v for v in mechanism_of(family.parameters).variables if v.causality == "output")
+    name = next((spoken(v.name) for v in outputs if v.symbol == what), spoken(what))
+    look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what, name=name)
     others = [] if beside is None else _approximated(branches, beside)
     shades = [
         Shade(low=factor * a.low, high=factor * a.high, label=f"avoid: {a.risk.value}", number=_RISKS.index(a.risk))
@@ -167,9 +170,10 @@ def _amplitudes(
         Label(x=look.factor * jump.parameter, y=look.scale * jump.before, text=_jump(jump, look)) for jump in found
     ]
     labels += _crossings(branches, look, top)
+    short = "" if spoken(look.what) == look.name else f" {look.what}"
     return Panel(
         x_label=look.axis,
-        y_label=f"amplitude of {look.what} [{look.shown}]",
+        y_label=f"amplitude of {look.name}{short} [{look.shown}]",
         curves=[*_keys(branches), *curves],
         y_range=(0.0, top),
         legend_at="above",
@@ -273,11 +277,12 @@ def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
     } | ({torque: table[torque]} if torque in table else {})
 
 
-def _letters(x: FloatArray, y: FloatArray, text: str, **options: Any) -> Curve:
-    """Return letters at a few places of a curve, evenly along x."""
+def _letters(x: FloatArray, y: FloatArray, text: str, *, shift: float = 0.0, **options: Any) -> Curve:
+    """Return letters at a few places of a curve, evenly along x; ``shift`` as a share of their distance."""
     finite = np.flatnonzero(np.isfinite(y))
     if len(finite):
         places = np.linspace(x[finite].min(), x[finite].max(), 2 * _LETTERS + 1)[1::2]
+        places = places + shift * np.ptp(x[finite]) / _LETTERS
         finite = np.unique([finite[np.abs(x[finite] - place).argmin()] for place in places])
     return Curve(x=x[finite], y=y[finite], line="", marker=f"${text}$", order=3.0, **options)
 
@@ -417,7 +422,7 @@ def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: 
         seen = points * np.column_stack([x, y])[y < top]
         apart = [distance(LineString(line), make_points(seen)) for line in true if len(line) > 1]
         if len(seen) and apart and np.min(apart, axis=0).max() > _HIDDEN:
-            curves.append(Curve(x=x, y=y, label=other.name, order=1.5, **other.look))
+            curves.append(Curve(x=x, y=y, label=f"approximation, {other.name}", order=1.5, **other.look))
     return curves
 
 
@@ -435,7 +440,10 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
             top = max(top, float(np.nanmax(y, initial=0.0)))
             curves += _along(branch, n, look, y, **options)
             x = look.factor * branch.parameter
-            letters = _letters(x, np.where(_unstable(branch), np.nan, y), str(order + 1), label=label, **options)
+            # beside those of the other harmonics, whose curves may be near
+            shift = (order + 1.0) / (len(names) + 1.0) - 0.5
+            stable = np.where(_unstable(branch), np.nan, y)
+            letters = _letters(x, stable, str(order + 1), shift=shift, label=label, **options)
             if len(np.atleast_1d(letters.x)):
                 curves.append(letters)
                 label = ""

@@ -27,6 +27,9 @@ _STILL = 1e-9
 _ROUNDING = 1e-12
 #: Inches: width of a panel beside the mechanism's picture, of a panel alone, and its height.
 _BESIDE, _WIDTH, _HEIGHT = 5.3, 6.4, 1.55
+#: Oscillations in a panel beyond which it would be a block of colour, parts of the band drawn instead, and what is said of it.
+_FAST, _BANDS = 120, 200
+BANDS = "Band: range of an oscillation that is too fast to be drawn; its line is the mean."
 #: What stands for the picture of the mechanism among the numbers of panels.
 _DRAWN = -1
 
@@ -103,6 +106,8 @@ def plot_outputs(
             axis = place(_DRAWN)
             axis.set_title(draw_mechanism(run.parameters, axis, run), fontsize=SMALL, color=MARKED)
         write_title(figure, title)
+        if any(is_fast(values) for panel in panels for values in panel.curves.values()):
+            notes.append(BANDS)
         write_notes(figure, notes)
         return finish(figure)
 
@@ -128,10 +133,41 @@ def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
         axis.set_axis_off()
         return
     for number, (name, values) in enumerate(panel.curves.items()):
-        axis.plot(time, values, label=name or None, linestyle=LINES[number % len(LINES)])
+        draw_over_time(axis, time, values, label=name, line=LINES[number % len(LINES)])
     axis.set_ylabel(panel.label)
     if any(panel.curves):
         legend_above(axis)
+
+
+def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: str = "", line: Any = "-") -> None:
+    """Draw a curve over time; of an oscillation too fast to be seen as one, the band that it fills and its mean."""
+    if not is_fast(values):
+        axis.plot(time, values, line, label=label or None)
+        return
+    parts = np.array_split(np.arange(len(values)), min(_BANDS, _oscillations(values) // 2))
+    middle = np.array([time[part].mean() for part in parts])
+    ends = np.array([(values[part].min(), values[part].max()) for part in parts])
+    (drawn,) = axis.plot(middle, [_smooth_mean(values[part]) for part in parts], line, label=label or None)
+    axis.fill_between(middle, *ends.T, color=drawn.get_color(), alpha=0.25, linewidth=0.0)
+
+
+def _smooth_mean(values: FloatArray) -> float:
+    """Return the mean of a part, weighted so that it matters little where in an oscillation the part ends."""
+    return float(np.average(values, weights=np.hanning(len(values) + 2)[1:-1]))
+
+
+def is_fast(values: FloatArray) -> bool:
+    """Return whether a curve oscillates so often that a panel shows a block."""
+    return _oscillations(values) > _FAST
+
+
+def _oscillations(values: FloatArray) -> int:
+    """Count how often a curve goes up and down by a level, of which its range has twenty."""
+    size = float(np.ptp(values)) if len(values) else 0.0
+    if not size > 0.0:
+        return 0
+    steps = np.diff(np.round(20.0 / size * values))
+    return int(np.count_nonzero(np.diff(np.sign(steps[steps != 0.0])))) // 2
 
 
 def _mechanism(run: Trajectory) -> Mechanism:

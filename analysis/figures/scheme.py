@@ -20,6 +20,7 @@ from ..mechanisms import mechanism_of
 from ..run import Trajectory
 from .animation import check_frames, gif
 from .dispatch import animate, last_samples, plot
+from .marks import roomiest
 from .style import (
     BLOCK,
     COLOURS,
@@ -78,15 +79,30 @@ def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array]
     shown = {name for part in drawing.parts for name in part.joints if part.kind in ("link", "pivot")} | set(
         drawing.paths
     )
-    for name in (joint.name for joint in drawing.joints if joint.name in shown):
-        x, y = now[name]
+    pins = {joint.name: now[joint.name] for joint in drawing.joints if joint.name in shown}
+    for x, y in pins.values():
         axis.plot(x, y, "o", markersize=DOT, markerfacecolor="white", markeredgecolor=GROUND, zorder=6)
-        if letters and not name.endswith("Block"):
-            axis.annotate(name, (x, y), (4, 4), textcoords="offset points", fontsize=SMALL, color=MARKED, zorder=7)
+    if letters:
+        _write_letters(axis, pins, unit)
     axis.set_aspect("equal", adjustable="datalim")
     axis.margins(0.08)
     axis.set_xlabel("x [mm]")
     axis.set_ylabel("y [mm]")
+
+
+def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
+    """Write the names of pins where no line that is drawn covers them."""
+    from shapely import LineString
+
+    curves = [np.asarray(line.get_xydata()) for line in axis.lines]
+    lines = [LineString(curve) for curve in curves if len(curve) > 1]
+    edges = [LineString(patch.get_path().vertices) for patch in axis.patches]
+    drawn = [shape for shape in (*lines, *edges) if np.isfinite(shape.bounds).all()]
+    taken = list(pins.values())
+    for name, pin in pins.items():
+        if not name.endswith("Block"):
+            taken.append(roomiest(pin, 1.3 * unit, drawn, taken))
+            axis.text(*taken[-1], name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7)
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:

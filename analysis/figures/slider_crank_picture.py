@@ -50,6 +50,7 @@ from .style import (
     TINY,
     TRACE,
     finish,
+    legend_above,
     styled,
     write_title,
 )
@@ -556,7 +557,10 @@ def plot_range(
         )
         _circle(panels["circle"], parts, factor * p.a1, unit)
         upper = panels["margin"]
-        upper.fill_between(np.degrees(angles), margin, 0.0, where=(margin < 0.0).tolist(), color="0.85", linewidth=0.0)
+        missing: dict[str, Any] = {"where": (margin < 0.0).tolist(), "label": "the rod does not reach the guide"}
+        upper.fill_between(np.degrees(angles), margin, 0.0, color="0.85", linewidth=0.0, **missing)
+        if margin.min() < 0.0:
+            legend_above(upper)
         upper.plot(np.degrees(angles), margin, color=COLOURS[0])
         upper.axhline(0.0, color="0.3", linewidth=HAIR)
         upper.set_ylabel(f"assembly margin [{unit}]")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from textwrap import fill
+from textwrap import fill, wrap
 from typing import Any
 
 import matplotlib.style
@@ -91,8 +91,12 @@ def styled(*, laid_out: bool = True) -> Iterator[None]:
 
 def write_title(figure: Figure, title: str) -> None:
     """Write the title of a figure over as many lines as it needs; write nothing if it is empty."""
-    if title:
-        figure.suptitle(fill(title, int(_LETTERS * figure.get_figwidth())))
+    if title.strip():
+        width = int(_LETTERS * figure.get_figwidth())
+        lines, longest = len(wrap(title, width)), max(map(len, title.split()))
+        # over lines of like length, so that none has a word alone
+        narrow = next((w for w in range(longest, width) if len(wrap(title, w)) <= lines), width)
+        figure.suptitle(fill(title, narrow))
 
 
 def write_notes(figure: Any, notes: Sequence[str]) -> None:

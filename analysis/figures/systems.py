@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.patches import FancyBboxPatch
@@ -11,7 +12,21 @@ from matplotlib.patches import FancyBboxPatch
 from ..systems import Convergence, SystemRun, Wiring, boxes
 from ..units import display_of
 from .dispatch import plot
-from .style import COLOURS, LINE, SMALL, THIN, TINY, Figure, finish, styled, write_title
+from .runs import BANDS, draw_over_time, is_fast
+from .style import (
+    COLOURS,
+    LINE,
+    LINES,
+    SMALL,
+    THIN,
+    TINY,
+    Figure,
+    finish,
+    spoken,
+    styled,
+    write_notes,
+    write_title,
+)
 
 #: Room that a connection keeps from the parts, and between two connections (mm).
 _CLEAR, _LANE = 8.0, 5.0
@@ -88,17 +103,19 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
         axes = np.atleast_1d(figure.subplots(rows, sharex=True))
         for place, name in zip(axes, names):
             unit, factor = display_of(run.units[name])
-            place.plot(run.time, factor * run[name])
+            draw_over_time(place, run.time, factor * run[name])
             of, _, output = name.rpartition(".")
-            place.set_ylabel(f"{of}\n{output}\n[{unit}]", fontsize=SMALL)
+            place.set_ylabel(f"{spoken(of)}\n{spoken(output)}\n[{unit}]", fontsize=SMALL)
         for name, power in run.powers.items():
-            axes[-1].plot(run.time, power, label=name)
+            draw_over_time(axes[-1], run.time, power, label=f"at {spoken(name.rpartition('.')[0])}")
         if run.powers:
-            axes[-1].set_ylabel("power residual\n[W]", fontsize=SMALL)
+            axes[-1].set_ylabel("power that the\ncoupling brings in\n[W]", fontsize=SMALL)
             # above the axes: the curves fill them
             axes[-1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=TINY, borderaxespad=0.2)
         axes[-1].set_xlabel("time [s]")
         write_title(figure, title or f"{run.title}, coupling: {run.coupling}")
+        if any(is_fast(values) for values in (*(run[name] for name in names), *run.powers.values())):
+            write_notes(figure, [BANDS])
         return finish(figure)
 
 
@@ -108,9 +125,12 @@ def plot_convergence(found: Convergence, *, title: str = "") -> Figure:
     with styled():
         figure = Figure(figsize=(6.0, 4.2))
         axes = figure.add_subplot()
-        for way, errors in found.errors.items():
-            order = found.order(way)
-            axes.loglog(found.steps, errors, "o-", ms=3.5, label=f"{way}: order {order:.2f}")
+        for number, (way, errors) in enumerate(found.errors.items()):
+            # seen under another curve by its line and its size
+            look: dict[str, Any] = {"linestyle": LINES[number % len(LINES)], "marker": "osD^v"[number % 5]}
+            size = 7.0 - min(number, 4)
+            label = f"{way}: order {found.order(way):.2f}"
+            axes.loglog(found.steps, errors, markersize=size, markerfacecolor="none", label=label, **look)
         axes.set(xlabel="communication step [s]", ylabel="greatest relative error of the connected outputs")
         axes.legend()
         write_title(figure, title or found.title)

@@ -51,7 +51,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
                 x_label=f"{spoken(family.name)} [{of_x}]",
                 y_label=label,
                 curves=curves,
-                shades=[Shade(low=low, high=high, label="range of the wish")],
+                shades=[Shade(low=low, high=high, label="range to be kept clear")],
                 x_range=(span[0], span[1]),
                 y_range=_in_view(curves),
                 legend_at="above",

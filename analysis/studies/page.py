@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 
-from ..figures import Figure
+from ..figures import Figure, resize
 from . import ENTRIES, STUDIES, file_stem, load
 from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement
 
@@ -86,9 +86,8 @@ def save_small(figure: Figure, path: Path) -> None:
     path.parent.mkdir(exist_ok=True)
     width, height = figure.get_size_inches()
     if width < THREE_PANELS:
-        figure.set_layout_engine("constrained")
         # panels beside each other need more height for their labels
-        figure.set_size_inches(WIDTH_IN, height * WIDTH_IN / width * (1.15 if width > 8.0 else 1.0))
+        resize(figure, WIDTH_IN, height * WIDTH_IN / width * (1.15 if width > 8.0 else 1.0))
     for quality in (80, 60, 40, 20):
         figure.savefig(path, dpi=WIDTH_PX / WIDTH_IN, format="webp", pil_kwargs={"quality": quality, "method": 6})
         if path.stat().st_size <= MOST_BYTES:

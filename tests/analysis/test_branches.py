@@ -252,7 +252,7 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
     path = softened.to_csv(tmp_path / "branch.csv")  # type: ignore[operator]
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
     assert rows.shape == (len(softened), len(columns))
-    assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of u [mm]"
+    assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of slider position u [mm]"
 
 
 def _drawn(axis: Axes, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -275,7 +275,7 @@ def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> N
         columns = branch.columns()
         figure = figures.plot(branch)
         expected = {
-            "amplitude of u [mm]": 1e3 * branch.amplitude,
+            "amplitude of slider position u [mm]": 1e3 * branch.amplitude,
             "greatest crank\ntorque [N.m]": columns["greatest crank torque [N.m]"],
             "greatest\npin force [N]": np.max([columns[name] for name in forces], axis=0),
         }

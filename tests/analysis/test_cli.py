@@ -344,7 +344,7 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     assert "speeds to avoid" in result.output
     assert "resonance, above 0.71 of the peak" in result.output
     out = tmp_path / "out"
-    assert "amplitude of u [mm]" in (out / "rig-2-spring-c-resonance.html").read_text(encoding="utf-8")
+    assert "amplitude of slider position u [mm]" in (out / "rig-2-spring-c-resonance.html").read_text(encoding="utf-8")
     header = (out / "rig-2-spring-c-resonance.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header.startswith("branch,drive.speed [rad/s],turns in a period")
     assert (out / "rig-2-spring-c-resonance.png").read_bytes().startswith(b"\x89PNG")

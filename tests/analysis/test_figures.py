@@ -322,3 +322,69 @@ def test_leaders_of_texts_cross_no_text_and_no_arrow() -> None:
         for other in boxes:
             assert other is own or not leader.intersects_bbox(other)
             assert other is own or not own.overlaps(other)
+
+
+def test_a_legend_has_room_above_curves_that_leave_it_none() -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    curves = [Curve(x=x, y=np.sin(40.0 * x), label="a wave"), Curve(x=x, y=np.cos(37.0 * x), label="another wave")]
+    axis = figures.plot_curves([Panel(x_label="x", y_label="y", curves=curves)], title="waves").axes[0]
+    box = axis.get_legend().get_window_extent()
+    for line in axis.lines:
+        assert not line.get_transform().transform_path(line.get_path()).intersects_bbox(box, filled=False)
+    assert axis.get_ylim()[1] > 1.2
+    assert max(axis.get_yticks()) <= 1.1
+
+
+def test_ticks_that_touch_are_thinned_at_the_size_that_is_shown() -> None:
+    x = np.linspace(0.0, 360.0, 9)
+    panel = Panel(
+        x_label="angle [deg]", y_label="y", curves=[Curve(x=x, y=x)], x_ticks=x.tolist(), verticals={"p": 90.0}
+    )
+    figure = figures.plot_curves([panel] * 3, title="t", columns=3)
+
+    def ticks(axis):
+        return [label.get_text() for label in axis.get_xticklabels()]
+
+    assert ticks(figure.axes[0]) == [f"{tick:g}" for tick in x]
+    narrow = figures.resize(figure, 6.4, 2.4)
+    for axis in narrow.axes:
+        boxes = [label.get_window_extent() for label in axis.get_xticklabels()]
+        assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+        assert ticks(axis) == ["0", "90", "180", "270", "360"]
+
+
+def test_a_title_over_several_lines_has_no_word_alone() -> None:
+    title = "Fig 3.13  Free motion: phase plane of the slider; Table 3.1, k = 5e5 dyn/cm"
+    figure = figures.plot_curves([Panel(x_label="x", y_label="y", curves=[Curve(x=[0, 1], y=[0, 1])])], title=title)
+    first, second = figure.get_suptitle().split("\n")
+    assert [*first.split(), *second.split()] == title.split()
+    assert abs(len(first) - len(second)) < 15
+
+
+def test_an_oscillation_too_fast_to_be_drawn_is_a_band_with_its_mean(run) -> None:
+    time = np.linspace(0.0, 10.0, 20001)
+    position = 0.01 * np.sin(2.0 * np.pi * 50.0 * time) + 0.001 * time
+    values = np.column_stack([position, time])
+    fast = replace(run, time=time, values=values, names=("slider.position", "crank.angle"), parameters=None)
+    figure = figures.plot(fast, ["slider.position", "crank.angle"])
+    first, second = figure.axes
+    (band,) = first.collections
+    corners = band.get_paths()[0].vertices[:, 1]
+    assert corners.min() == pytest.approx(-10.0, abs=0.1)
+    assert corners.max() == pytest.approx(20.0, abs=0.1)
+    (mean,) = first.lines
+    np.testing.assert_allclose(mean.get_ydata(), mean.get_xdata(), atol=0.3)
+    assert "Band" in figure.get_supxlabel()
+    assert not second.collections
+    assert "Band" not in figures.plot(fast, ["crank.angle"]).get_supxlabel()
+
+
+def test_letters_of_a_described_linkage_cover_no_line() -> None:
+    from analysis.linkages import load_linkage
+
+    axis = figures.plot(load_linkage(Path(__file__).parents[2] / "examples" / "linkages" / "watt-1.toml")).axes[0]
+    assert len(axis.texts) > 5
+    for text in axis.texts:
+        box = text.get_window_extent()
+        for line in axis.lines:
+            assert not line.get_transform().transform_path(line.get_path()).intersects_bbox(box, filled=False)

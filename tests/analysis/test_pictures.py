@@ -180,7 +180,7 @@ def test_page_has_the_same_values_to_full_precision(folded: Response) -> None:
     at = main["x"].index(float(folded.branches[0].parameter[3]))
     names = [row.partition(":")[0] for row in main["hovertemplate"].removesuffix("<extra></extra>").split("<br>")]
     said = dict(zip(names[2:], main["customdata"][at]))
-    assert names[:2] == ["p", "amplitude of u [mm]"]
+    assert names[:2] == ["p", "amplitude of slider position u [mm]"]
     torque = 2.0 * folded.branches[0].amplitude[3]
     assert said == {
         "branch": 1,

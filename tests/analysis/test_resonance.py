@@ -150,8 +150,8 @@ def test_approximations_hidden_under_the_true_motion_are_drawn_by_their_errors()
 def test_approximations_that_can_be_seen_are_in_the_legend() -> None:
     far = frequency_response(RIG["b"], 900.0 * RPM, 1100.0 * RPM)
     main = figures.plot(far, beside=approximations(far, points=5)).axes[0]
-    assert "two harmonics" in [text.get_text() for text in main.get_legend().get_texts()]
-    assert "two harmonics" in [line.get_label() for line in main.lines]
+    assert "approximation, two harmonics" in [text.get_text() for text in main.get_legend().get_texts()]
+    assert "approximation, two harmonics" in [line.get_label() for line in main.lines]
 
 
 def test_approximations_beside_the_true_motion() -> None:

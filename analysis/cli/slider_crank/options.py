@@ -21,7 +21,7 @@ from ... import slider_crank as sc
 from ...mechanisms import SLIDER_CRANK
 from ...units import RAD_S_PER_RPM
 from .. import common
-from ..common import PARAMETERS, changes, check_kind, handled, number_or_text, print_error, quantity
+from ..common import NUMBER, PARAMETERS, changes, check_kind, handled, in_units, number_or_text, print_error, quantity
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 DEFAULT = "rahman-a4-10-s1-3.5"
 
 Command = Callable[..., Any]
-_NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
 class Units:
@@ -59,14 +58,8 @@ class Units:
             unit = variables[found[1]].unit if found[1] in variables else ""
             return found[0][:-1] + f" {unit}:" if unit in ("m", "N", "N.m") else found[0]
 
-        def converted(found: re.Match[str]) -> str:
-            si, per = found[2], found[3] or ""
-            return f"{float(found[1]) * self.per(si):.6g} {self.name(si)}{per}"
-
-        text = re.sub(rf"^parameter ([\w.]+) is {_NUMBER}:", parameter, text)
-        if self.system == "SI":
-            return text
-        return re.sub(rf"(?<!['\w.])({_NUMBER}) (N\.m|N|m)(/rad)?(?![\w/.]\w)", converted, text)
+        text = re.sub(rf"^parameter ([\w.]+) is {NUMBER}:", parameter, text)
+        return in_units(text, lambda si: (self.name(si), self.per(si)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,7 +243,8 @@ _MECHANISM_OPTIONS = (
         type=click.Choice(["SI", "inch"]),
         default="SI",
         show_default=True,
-        help="Units of the output, in which SI has millimetres, and of errors; inch: inches, pounds force and degrees.",
+        help="Units of tables, pictures and errors, in which SI has millimetres, and of CSV files, in which it has metres "
+        "as those of a run; inch: inches, pounds force and degrees.",
     ),
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")

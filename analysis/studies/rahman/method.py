@@ -1020,11 +1020,14 @@ def draw(result: StudyResult) -> Figure:
         # the forces are infinite at the dead centres
         inside = clear(_PLANE) if unit == "[lb]" else slice(None)
         limit = 1.05 * max((float(np.nanmax(np.abs(column[inside]))) for column in shown.values()), default=0.0)
+        labels = {name: printed(name.removesuffix(f" {unit}").removeprefix(f"{label} ")) for name in shown}
+        said = {curve.label for panel in panels for curve in panel.curves}
         curves = [
             Curve(
                 x=result.columns[ANGLE],
                 y=np.where(np.abs(column) < 2.0 * limit, column, np.nan),
-                label=printed(name.removesuffix(f" {unit}").removeprefix(f"{label} ")),
+                # one legend serves all panels
+                label="" if labels[name] in said else labels[name],
                 line="--" if any(words in name for words in _DASHED) else "-",
             )
             for name, column in shown.items()

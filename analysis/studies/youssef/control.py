@@ -317,6 +317,7 @@ def draw(result: StudyResult) -> Figure:
                 for name in ("Fig 7.11", "Fig 7.12")
             ],
             equal=True,
+            legend_at="outside",
         ),
     ]
     return plot_curves(panels, title=result.heading, columns=2, size=(4.9, 2.9))

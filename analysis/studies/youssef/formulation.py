@@ -252,6 +252,8 @@ def draw(result: StudyResult) -> Figure:
         logarithmic="y",
         legend_at="outside",
         x_range=(0.0, STOP),
+        # the start is closed but for rounding
+        y_range=(ROUNDING, 2.0 * max(float(result.columns[name].max()) for name in names)),
     )
     return plot_curves([panel], title=result.heading)
 

@@ -208,8 +208,8 @@ def curves_over_speed(result: StudyResult, name: str, colour: str, label: str = 
 
 def marks(spring: str, *orders: int) -> Mapping[str, float]:
     """Return the natural frequency of a spring, or fractions of it, as marks of a panel."""
-    words = {1: "natural", 2: "half", 3: "a third", 4: "a quarter"}
-    return {f"{words[n]}, {natural_speed(spring) / n:.0f}": natural_speed(spring) / n for n in orders}
+    words = {1: "natural", 2: "half of it", 3: "a third", 4: "a quarter"}
+    return {f"{words[n]}, {natural_speed(spring) / n:.0f} rpm": natural_speed(spring) / n for n in orders}
 
 
 def largest_multiplier(spring: str, low: float, high: float) -> float:
