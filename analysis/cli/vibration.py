@@ -203,7 +203,8 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
         begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
-    over = "speed" if response.family.name == "drive.speed" else response.family.name
+    family = response.family
+    over = "speed" if speed_names(mechanism_of(family.parameters)) == (family.name,) else family.name
     table = (
         f"{title}: how it moves at each {over}, and where that jumps or becomes unstable (branches of periodic motions)"
     )
