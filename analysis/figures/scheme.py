@@ -101,8 +101,9 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
     taken = list(pins.values())
     for name, pin in pins.items():
         if not name.endswith("Block"):
-            taken.append(roomiest(pin, 1.3 * unit, drawn, taken))
-            axis.text(*taken[-1], name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7)
+            place = roomiest(pin, 1.3 * unit, drawn, taken)
+            taken.append(place)
+            axis.text(float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7)
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:

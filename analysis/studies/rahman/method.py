@@ -1014,7 +1014,7 @@ _DASHED = ("37f mended", "both mended", "Davidon")
 
 def draw(result: StudyResult) -> Figure:
     """Draw one panel for each unit of the columns, mended equations dashed."""
-    panels = []
+    panels: list[Panel] = []
     for unit, label in _SHOWN.items():
         shown = {name: column for name, column in result.columns.items() if name.endswith(unit) and name != ANGLE}
         # the forces are infinite at the dead centres
