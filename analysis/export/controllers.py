@@ -8,7 +8,7 @@ long for its answer.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, exp, floor, isfinite, pi, sin
+from math import cos, exp, floor, inf, isfinite, pi, sin
 from typing import Any, ClassVar, NamedTuple, NoReturn
 from xml.etree.ElementTree import Element, SubElement
 
@@ -71,6 +71,9 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     rows: ClassVar[tuple[Row, ...]]
     sample_time: float
+    #: Where it is in its life, which a saved state tells, too; the times of the run (s).
+    phase = "instantiated"
+    start_time, stop_time = 0.0, inf
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -130,15 +133,26 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set values, all of them or none; in a run the parameters must be valid, and the sample time stays."""
+        self._expect("fmi2SetReal", "instantiated", "in initialisation", "running")
         for reference, value in zip(vrs, values):
             if reference not in self.vars:
                 self._refuse(f"there is no variable with the value reference {reference}")
             name = self.vars[reference].name
+            if self.vars[reference].causality not in (Fmi2Causality.parameter, Fmi2Causality.input):
+                self._refuse(f"{name} is computed: the value {value} was not taken")
             if self.count > 0 and name == SAMPLE_TIME.name:
                 self._refuse(f"{name} is a fixed parameter: the value {value} was not taken")
             if self.count > 0 and name in self.parameters:
                 self._check(name, value)
         super().set_real(vrs, values)
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """Refuse: the only integer is the count of samples."""
+        self._refuse("no integer can be set")
+
+    def _expect(self, call: str, *phases: str) -> None:
+        if self.phase not in phases:
+            self._refuse(f"{call} out of order: the controller is {self.phase}, not {' or '.join(phases)}")
 
     def _valid(self, name: str, value: float) -> bool:
         return isfinite(value) and RULES[self.parameters[name].rule][1](value)
@@ -162,21 +176,49 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         for name, value in states.items():
             setattr(self, name, value)
 
+    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        """Take the times of the run."""
+        self._expect("fmi2SetupExperiment", "instantiated")
+        self.start_time, self.stop_time = start_time, inf if stop_time is None else stop_time
+        if not start_time <= self.stop_time:
+            self._refuse(f"the stop time is {stop_time} s: it must not be before the start time, {start_time} s")
+
+    def enter_initialization_mode(self) -> None:
+        """Begin the initialisation."""
+        self._expect("fmi2EnterInitializationMode", "instantiated")
+        self.phase = "in initialisation"
+
     def exit_initialization_mode(self) -> None:
         """Take the sample at the start."""
+        self._expect("fmi2ExitInitializationMode", "in initialisation")
         for name in self.parameters:
             self._check(name, getattr(self, name))
-        self.count = 0
-        self._up_to(0.5 * self.sample_time)
+        self.count, self.phase = 0, "running"
+        self._up_to(self.start_time + 0.5 * self.sample_time)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Take the samples whose instants are in the step, the one at its end left to the next."""
-        self._up_to(current_time + step_size)
+        """Take the samples whose instants are in the step, the one at its end left to the next; refuse what is no step."""
+        end = current_time + step_size
+        wrong = f"the controller is {self.phase}" if self.phase != "running" else ""
+        if not (isfinite(end) and step_size > 0.0 and end <= self.stop_time + 1e-6 * step_size):
+            wrong = f"it must be finite and above 0, and end by the stop time, {self.stop_time} s"
+        if wrong:
+            self.log(f"a step of {step_size} s at {current_time} s: {wrong}", Fmi2Status.discard)
+            return False
+        self._up_to(end)
         return True
 
+    def terminate(self) -> None:
+        """End the run; whatever the phase, a master that cleans up does no harm."""
+        self.phase = "terminated"
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        state: dict[str, Any] = super()._get_fmu_state()
+        return state | {"phase": self.phase}
+
     def _up_to(self, end: float) -> None:
-        while self.count * self.sample_time < end - 1e-6 * self.sample_time:
-            self.sample(self.count * self.sample_time)
+        while (t := self.start_time + self.count * self.sample_time) < end - 1e-6 * self.sample_time:
+            self.sample(t)
             self.count += 1
 
     def sample(self, t: float) -> None:

@@ -103,7 +103,9 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
         if not name.endswith("Block"):
             place = roomiest(pin, 1.3 * unit, drawn, taken)
             taken.append(place)
-            axis.text(float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7)
+            axis.text(
+                float(place[0]), float(place[1]), name, fontsize=SMALL, color=MARKED, ha="center", va="center", zorder=7
+            )
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:
