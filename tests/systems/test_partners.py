@@ -300,7 +300,12 @@ def test_what_a_probe_finds_in_a_controller_is_the_wrappers(tmp_path: Path) -> N
     fmus = [build_controller("pid", tmp_path), build(FIVE_BAR, tmp_path)]
     found = [{f.key.removesuffix(": Fatal") for f in probe(fmu, calls=100, seconds=1.0).findings} for fmu in fmus]
     # times are those of the master; a bad value is refused at once in a run; who cleans up may end a run twice
-    left = ("DoStep: a gap in time", "DoStep: a time in the past", "SetReal: NaN", "Terminate in terminated: out of order")
+    left = (
+        "DoStep: a gap in time",
+        "DoStep: a time in the past",
+        "SetReal: NaN",
+        "Terminate in terminated: out of order",
+    )
     assert found[0] - found[1] <= {f"cs: {key}" for key in left}
 
 
