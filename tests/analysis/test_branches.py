@@ -306,7 +306,7 @@ def test_approximations_beside_are_in_the_same_units(softened: Branch) -> None:
         return {"a tenth more": 1.1 * np.interp(speed, branch.parameter[order], branch.amplitude[order])}
 
     main, _, errors, *_ = figures.plot_branches([branch], beside=beside).axes
-    (line,) = (line for line in main.lines if line.get_label() == "a tenth more")
+    (line,) = (line for line in main.lines if line.get_label() == "approximation, a tenth more")
     x, y = line.get_data()
     assert y == pytest.approx(1100.0 * np.interp(x * RPM, branch.parameter[order], branch.amplitude[order]))
     assert errors.get_ylabel() == "relative error of\nthe amplitude [%]"
