@@ -247,7 +247,7 @@ def test_frequency_response_of_the_shift() -> None:
     turn = response.branches[0].orbits[3].turn()
     across = np.sqrt(sum(turn[f"crank_pin.f{axis}"] ** 2 for axis in "xyz"))
     assert columns["greatest force in crank_pin [N]"][3] == pytest.approx(across.max())
-    assert figures.plot(response).axes[0].get_ylabel() == "amplitude of S_1 [mm]"
+    assert figures.plot(response).axes[0].get_ylabel() == "amplitude of shift position S_1 [mm]"
 
 
 def test_stability_chart_of_the_shift() -> None:
