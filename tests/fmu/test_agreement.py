@@ -118,8 +118,8 @@ def files_of(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> dict[
 @pytest.mark.parametrize("fmu", MECHANISMS)
 def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> None:
     files = {kind: str(path) for kind, path in files_of(fmu, fmus, natives).items()}
-    found = run_in_process(run_random, ROOT, fmu, files, list(range(100)), timeout=300.0)
-    assert {row[0] for row in found} == set(range(100))
+    found = run_in_process(run_random, ROOT, fmu, files, list(range(50)), timeout=900.0)
+    assert {row[0] for row in found} == set(range(50))
     for seed, kind, interface, name, relative, status, status_fmu, end in found:
         exchange = interface == "model-exchange"
         assert status == status_fmu, (seed, kind, interface)
