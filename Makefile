@@ -1,4 +1,4 @@
-# make demo: all FMUs built, run and checked. make quick, test, test-all: less or more of the tests. Each makes .venv itself.
+# make demo: all FMUs built, run and checked. make quick, test, test-all, test-long: less or more of the tests. Each makes .venv itself.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 # every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
 PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo quick test test-all lint docs figures bench bench-targets mutate studio release clean
+.PHONY: demo quick test test-all test-long lint docs figures bench bench-targets mutate studio release clean
 
 demo: $(RUN)
 	$(BIN)/python build_fmu.py
@@ -25,7 +25,11 @@ test: $(DEV) lint
 
 test-all: $(DEV) lint
 	$(BIN)/python build_fmu.py
-	$(PYTEST) $(PARALLEL)
+	$(PYTEST) -m 'not long' $(PARALLEL)
+
+test-long: $(DEV)
+	$(BIN)/python build_fmu.py
+	$(PYTEST) -m long $(PARALLEL)
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -56,10 +56,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what builds or runs an FMU; on several cores what takes longest goes first: the pages and the longest studies."""
+    """Mark what builds or runs an FMU, and what is long as slow; on several cores what takes longest goes first."""
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: item.path.name not in ("test_docs.py", "test_chapter_8.py"))
     for item in items:
+        if item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.slow)
         if {"fmus", "natives"} & set(getattr(item, "fixturenames", ())) or item.path.parent.name == "fmu":
             item.add_marker(pytest.mark.fmu)
 

@@ -199,7 +199,7 @@ def run_page(name, tmp_path):
     return commands, checked, printed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
     commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path)
     assert (commands, checked) == (9, 43)
@@ -230,7 +230,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
             ("out/rahman-a4-10-s1-3.5.gif", "out/slider-crank-range.png", "mechanism.png", "crank.toml"),
         ),
         ("closed-form.md", 4, 2, ("out/poses.png",)),
-        ("synthesis-cases.md", 2, 2, ("calm/solutions.csv",)),
+        pytest.param("synthesis-cases.md", 2, 2, ("calm/solutions.csv",), marks=pytest.mark.long),
         ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
         ("workers.md", 2, 2, ()),
         (

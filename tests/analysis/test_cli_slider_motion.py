@@ -263,7 +263,7 @@ def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork,
     assert done.exit_code == 0, done.output
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_links_that_are_free_do_better(tmp_path) -> None:
     case = tables(slider={"harmonics": 1, "starts": 4, "stroke": "10 mm"}, constraints={"largest_link": "300 mm"})
     free = case | {"slider": case["slider"] | {"links": "free"}}

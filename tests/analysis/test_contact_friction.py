@@ -25,7 +25,9 @@ JAMMED = replace(TABLE_3_1, slider_friction_coefficient=4.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("spring", "rpm"), [("a", 300.0), ("b", 580.0), ("b", 800.0)])
+@pytest.mark.parametrize(
+    ("spring", "rpm"), [("a", 300.0), ("b", 580.0), pytest.param("b", 800.0, marks=pytest.mark.long)]
+)
 def test_a_run_settles_on_the_periodic_motion(spring: str, rpm: float) -> None:
     speed, parameters = rpm * RAD_S_PER_RPM, replace(RIG[spring], **ROUGH)
     orbit = find_orbit(parameters, speed=speed)

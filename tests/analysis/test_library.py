@@ -31,6 +31,8 @@ from .test_studio import _drag, _opened, _shown, in_browser
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
+#: Of the FMUs those that are always probed: slots, gears, racks, friction and two cranks.
+PROBED = ("elastic-bearing", "geared-five-bar", "hybrid-press", "rack-and-pinion", "shaper")
 pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
@@ -333,7 +335,11 @@ def test_two_commanded_cranks_are_driven_by_the_torques_of_the_multipliers(ratio
 
 @pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [path if path.stem in PROBED else pytest.param(path, marks=pytest.mark.long) for path in FILES],
+    ids=lambda path: path.stem,
+)
 def test_the_fmu_of_a_linkage_probes_clean(path, tmp_path):
     assert probe(build_native(load_linkage(path), NATIVE_FMI3, tmp_path), calls=150, seconds=1.5).findings == []
 

@@ -29,7 +29,9 @@ def made(seed: int, folder: Any) -> Mechanism:
     return package.mechanism(folder)
 
 
-@pytest.mark.parametrize("seed", range(400, 424))
+@pytest.mark.parametrize(
+    "seed", [*range(400, 406), *(pytest.param(n, marks=pytest.mark.long) for n in range(406, 424))]
+)
 def test_the_python_fmu_is_the_plant(seed, tmp_path):
     mechanism = made(seed, tmp_path)
     loads = {c.name: 2.0 for c in mechanism.channels if c.kind == "force"}

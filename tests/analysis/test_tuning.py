@@ -179,7 +179,7 @@ def test_resonance_is_led_to_the_nearer_end_and_its_margin(margin, end):
     assert f"{end:g} rpm" in tuned.requirements[0].wished
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_where_no_way_leads_to_what_is_wished_one_is_begun_next_to_it():
     """The jump of a tongue and its closed branch are both gone where the curve of the jump's folds has its cusp."""
     tuned = tune(wish(**OF_TONGUE, speeds=(0.8, 1.5)))
@@ -218,7 +218,7 @@ def test_swing_of_the_axial_shift_of_a_slider_crank_stays_below_its_limit():
     assert max(branch.amplitude.max() for branch in response.branches) == pytest.approx(bound, rel=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_motion_of_two_turns_beside_a_stable_one_is_seen_and_removed():
     """Below the doubling a motion of 20 cm repeats itself after two turns, beside a stable one of 2 mm."""
     asked = {
@@ -238,7 +238,7 @@ def test_a_motion_of_two_turns_beside_a_stable_one_is_seen_and_removed():
         assert any(found) == there
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_least_change_for_a_pin_force_is_that_of_slsqp():
     asked = wish(speeds=("550 rpm", "620 rpm"), limits=[PIN])
     speeds = np.linspace(*asked.span, 25)

@@ -102,7 +102,7 @@ def test_processes_give_the_same() -> None:
     assert np.array_equal(runs(n_jobs=2).output(OUTPUTS[1]), runs().output(OUTPUTS[1]))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ten_thousand_runs_on_a_cluster_whose_worker_is_killed(tmp_path: Path) -> None:
     """One in a thousand has a spring that may not be; what is kept is read again without a run."""
     springs = np.random.default_rng(1).normal(1500.0, 200.0, 10_000)
