@@ -66,6 +66,7 @@ def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: st
     assert compared > 20
 
 
+@pytest.mark.slow
 def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
     contest = Contest.of(target("polygonal", "L"), on_area=True)
     assert contest.on_area

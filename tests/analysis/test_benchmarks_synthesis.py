@@ -85,6 +85,7 @@ def test_pylinkage_is_scored_as_our_simplex(name: str) -> None:
     assert charged > 0 or contest.limits.turn == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["path-a", "path-b", "packaging"])
 def test_pylinkage_is_scored_as_our_simplex_on_paths(name: str) -> None:
     contest = Contest.of(PROBLEMS[name])

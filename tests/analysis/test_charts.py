@@ -240,6 +240,7 @@ def test_bad_charts_are_refused(
         stability_chart(RIG_2, DRIVE, names, ranges, points=3)
 
 
+@pytest.mark.slow
 def test_the_grid_is_shown_before_its_boundaries() -> None:
     seen: list[StabilityChart] = []
     ranges = ((550.0 * RPM, 560.0 * RPM), (50.0, 60.0))

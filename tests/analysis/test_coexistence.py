@@ -109,6 +109,7 @@ def ends(folder: Path, damping: float = 11.0) -> Basins:
     return basins(rig, Drive(speed=SPEED), points=3, position=(-0.02, 0.02), rate=(-1.0, 1.0), folder=folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("of", "work", "others"), [(motions, "_compute_motions", 1), (ends, "_ends", 3)])
 def test_rows_are_kept_and_an_interrupted_picture_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of: Callable[..., Any], work: str, others: int
@@ -277,6 +278,7 @@ def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
     assert len(np.loadtxt(chart.beside.to_csv(tmp_path / "motions.csv"), delimiter=",", skiprows=1)) == 9
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
     """At small damping near resonance: 37 of 900 such points had no motion, one of them stable with 13.8 cm."""

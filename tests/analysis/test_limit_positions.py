@@ -139,6 +139,7 @@ def solutions(task: Any, *constraints: Any) -> tuple[syn.Solution, ...]:
     return syn.synthesize(task, constraints=constraints, search=FEW).solutions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "task",
     [

@@ -74,6 +74,7 @@ def branch_of(parameters: object, low: float, high: float) -> Branch:
     return follow(family, orbit, high * RPM, low=low * RPM, high=high * RPM, direction=-1, most_points=700)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameters", "low", "high", "words"),
     [

@@ -116,6 +116,7 @@ class TestBound:
         assert syn.pin_forces(found.best.linkage, MAKE).greatest == pytest.approx(bound, rel=1e-4)
         assert found.best.error > 1.01 * free.error
 
+    @pytest.mark.slow
     def test_of_a_path(self) -> None:
         path = syn.UntimedPath(path=syn.TargetPath(points=ELLIPSE, closed=True))
         free = syn.synthesize(path, constraints=USUAL, search=FEW).best
@@ -125,6 +126,7 @@ class TestBound:
         assert syn.pin_forces(found.linkage, MAKE).of("AD") == pytest.approx(bound, rel=1e-3)
         assert syn.pin_forces(found.linkage, MAKE).of("AD") <= bound * (1.0 + 1e-6)
 
+    @pytest.mark.slow
     def test_one_that_cannot_be_kept_is_named_with_its_unit(self) -> None:
         with pytest.raises(InfeasibleError, match=r"the force on the pins by [0-9.]+ N"):
             syn.synthesize(

@@ -236,6 +236,7 @@ def test_bad_input_is_named_before_anything_is_searched(
         simplest_mechanism(task, tolerance, **options)
 
 
+@pytest.mark.slow
 def test_a_mechanism_with_a_defect_is_not_taken() -> None:
     """Seven points that a double-rocker meets within the tolerance, but on two circuits, or out of order."""
     points = [[0.0, 0.0], [0.05, 0.03], [0.1, 0.04], [0.15, 0.02], [0.16, -0.03], [0.1, -0.08], [0.05, 0.02]]
@@ -319,6 +320,7 @@ def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: i
     assert kept.chosen.value == min(step.value for step in kept.steps)
 
 
+@pytest.mark.slow
 def test_a_short_second_crank_may_be_asked_for() -> None:
     """Even one below a thousandth of the stroke."""
     found = strategy(BASE, 1e-30, harmonics=1, ratios=(1,), starts=2, second_crank=1e-5)

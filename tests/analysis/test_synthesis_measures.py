@@ -176,6 +176,7 @@ def test_an_open_corner_is_no_worse_by_area_than_by_distance() -> None:
 # What is given comes back
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 1000), timed=st.booleans())
 def test_a_guess_that_keeps_the_constraints_is_never_lost(seed: int, timed: bool) -> None:

@@ -402,6 +402,7 @@ class TestPrecisionPoints:
         assert solution.verdicts.sound
         return solution
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("n", "end", "starts"), [(3, 3.5, 12), (5, 3.5, 12), (9, 5.5, 60)])
     def test_untimed_points_of_a_known_curve_are_met_exactly(self, n: int, end: float, starts: int) -> None:
         points = known(5).path(np.linspace(0.0, end, n))

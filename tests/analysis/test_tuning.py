@@ -190,6 +190,7 @@ def test_where_no_way_leads_to_what_is_wished_one_is_begun_next_to_it():
         assert any(special.kind is Crossing.FOLD for branch in branches for special in branch.special) == jumps
 
 
+@pytest.mark.slow
 def test_resonance_under_a_motor_is_led_out_of_a_range_of_its_frequency():
     drive, span = Drive(motor=MOTOR), (25.5, 29.0)
     tuned = tune(
@@ -283,6 +284,7 @@ def test_a_jump_is_led_out_of_the_range():
 # What cannot be had
 
 
+@pytest.mark.slow
 def test_nothing_is_met_where_the_motion_is_unstable():
     """A soft spring leaves no stable motion from 184 to 237 rpm, although no resonance lies in the range."""
     lengths = {"crank_length": 0.06, "coupler_length": 0.18, "rocker_length": 0.12}
@@ -312,6 +314,7 @@ def test_an_answer_far_from_the_present_values_is_found_and_what_lies_beside_the
         assert find_orbits(tuned.parameters, speed=speed).stable
 
 
+@pytest.mark.slow
 def test_a_wish_that_cannot_be_met_is_answered_by_the_nearest():
     tuned = tune(wish(change={"slider.damping": [5.5, 6.0]}, least_margin=0.3))
     assert not tuned.met
@@ -459,6 +462,7 @@ def test_command_writes_the_changed_case(run):
     assert Path("out/case-tuned.png").exists()
 
 
+@pytest.mark.slow
 def test_command_reports_what_cannot_be_met(run):
     result = run("--no-plot", "--json", "--set", 'tune.peak.below="10 N"', margin=0.25)
     assert result.exit_code == cli.CHECK_FAILED, result.output

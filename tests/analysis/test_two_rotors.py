@@ -224,6 +224,7 @@ def test_the_chart_has_the_multiplier_of_the_free_oscillator() -> None:
     assert not chart.boundaries
 
 
+@pytest.mark.slow
 def test_the_linear_model_has_the_poles_of_the_cart() -> None:
     rest = find_equilibrium(P)
     model = linearise(P, rest.state, rest.inputs)

@@ -173,6 +173,7 @@ def path_settings(settings: dict[str, object], branch: float) -> tuple[float, tu
 
 
 class TestBruteForce:
+    @pytest.mark.slow
     @pytest.mark.parametrize("path", [True, False])
     def test_no_slider_position_does_better(self, path: bool) -> None:
         seen: dict[str, int] = {}

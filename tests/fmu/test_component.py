@@ -109,6 +109,7 @@ def test_a_saved_state_is_restored_and_a_damaged_one_refused(slave: ComponentSla
     slave.freeInstance()
 
 
+@pytest.mark.slow
 def test_memory_of_calls_and_instances_is_given_back(webs: dict[str, Path], tmp_path: Path) -> None:
     """2100 calls of 1000 values each take 17 MB in all, where 4 MiB are allowed."""
     slave = made(webs["Pendulum"], tmp_path)

@@ -70,6 +70,7 @@ def test_every_native_fmu_passes_its_own_experiments(natives: dict[str, Path]) -
         assert sum(file.compress_size for file in files) < 50_000
 
 
+@pytest.mark.slow
 def test_a_wrong_equation_is_found(model: Model, fmu: Path, build_variant: Callable[[Changes], Path]) -> None:
     assert all(row[1] for row in run_in_process(verified, ROOT, fmu))
     found = run_in_process(verified, ROOT, build_variant(MODELS[model.name].equation))

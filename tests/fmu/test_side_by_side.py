@@ -172,6 +172,7 @@ def rebuild(root: str, folder: str, name: str, values: dict[str, float], changes
     return [str(fmu), ends, modules]
 
 
+@pytest.mark.slow
 def test_rebuilt_fmu_runs_its_own_new_code(model: Model, tmp_path: Path) -> None:
     root = str(Path(build_fmu.__file__).parent)
     arguments = (model.name, model.free, model.equation)

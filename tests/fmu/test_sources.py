@@ -52,6 +52,7 @@ _USED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not this_platform().endswith("linux"), reason="the test reads ELF with nm")
 def test_all_link_into_one_program(tmp_path: Path) -> None:
     target, options = (

@@ -128,6 +128,7 @@ class TestRig1:
         within = abs(ratio - 1.0) < 0.2
         assert ratio[within][size[within].argmax()] == pytest.approx(1.0, abs=0.03)
 
+    @pytest.mark.slow
     def test_rise_over_the_next_minimum(self) -> None:
         """With spring B: 0.4189 cm at 378 rpm and 0.2890 at 426, read off runs from rest."""
         top, low = (steady_turn(rigs.rig("B"), speed).amplitude for speed in (378.1, 426.2))

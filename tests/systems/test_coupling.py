@@ -33,6 +33,7 @@ def test_each_coupling_has_its_order(name: str) -> None:
         assert found.errors[way][-1] < found.errors["hold"][-1] * (1.01 if order < 2.0 else 0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["slider-tracking", "motor-tracking"])
 def test_a_sampled_controller_is_late_by_a_step_in_every_coupling(name: str) -> None:
     found = convergence(system_of(name), [5e-4, 2.5e-4, 1.25e-4], stop_time=0.05)
@@ -41,6 +42,7 @@ def test_a_sampled_controller_is_late_by_a_step_in_every_coupling(name: str) -> 
     assert found.errors["derivatives"][-1] < 0.02
 
 
+@pytest.mark.slow
 def test_the_joined_model_is_the_motor_and_shaft_of_a_hand_written_run() -> None:
     """A stiff shaft and a light rotor: a five-bar under the torque of Kloss's formula, the rotor's inertia on its crank."""
     system = system_of("motor-crank")
