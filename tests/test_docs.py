@@ -229,9 +229,9 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
             19,
             ("out/rahman-a4-10-s1-3.5.gif", "out/slider-crank-range.png", "mechanism.png", "crank.toml"),
         ),
-        ("closed-form.md", 4, 2, ("out/poses.png",)),
+        pytest.param("closed-form.md", 4, 2, ("out/poses.png",), marks=pytest.mark.long),
         pytest.param("synthesis-cases.md", 2, 2, ("calm/solutions.csv",), marks=pytest.mark.long),
-        ("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",)),
+        pytest.param("tuning.md", 3, 7, ("out/tuning-jump-tuned.png",), marks=pytest.mark.long),
         ("workers.md", 2, 2, ()),
         (
             "linkage-library.md",
@@ -315,7 +315,7 @@ def site(tmp_path_factory):
     return folder / "site"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.fmu
 def test_pages_of_the_site_fit_their_windows_and_long_ones_have_contents(site, browser):
     """On a phone and on three desktops, light and dark."""

@@ -31,8 +31,9 @@ from .test_studio import _drag, _opened, _shown, in_browser
 
 FOLDER = Path(__file__).parents[2] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
-#: Of the FMUs those that are always probed: slots, gears, racks, friction and two cranks.
-PROBED = ("elastic-bearing", "geared-five-bar", "hybrid-press", "rack-and-pinion", "shaper")
+#: Slots, gears, racks, friction and two cranks: what takes long is tested with these, with the others by `make test-long`.
+FIRST = ("elastic-bearing", "geared-five-bar", "hybrid-press", "rack-and-pinion", "shaper")
+EVERY = [path if path.stem in FIRST else pytest.param(path, marks=pytest.mark.long) for path in FILES]
 pytestmark = pytest.mark.usefixtures("own_linkages")
 
 
@@ -335,11 +336,7 @@ def test_two_commanded_cranks_are_driven_by_the_torques_of_the_multipliers(ratio
 
 @pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize(
-    "path",
-    [path if path.stem in PROBED else pytest.param(path, marks=pytest.mark.long) for path in FILES],
-    ids=lambda path: path.stem,
-)
+@pytest.mark.parametrize("path", EVERY, ids=lambda path: path.stem)
 def test_the_fmu_of_a_linkage_probes_clean(path, tmp_path):
     assert probe(build_native(load_linkage(path), NATIVE_FMI3, tmp_path), calls=150, seconds=1.5).findings == []
 
@@ -459,7 +456,7 @@ def test_the_studio_sorts_parameters_by_their_roles():
 
 
 @in_browser
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", EVERY, ids=lambda path: path.stem)
 def test_a_linkage_moves_in_the_studio_and_is_dragged(browser, tmp_path, path):
     """Its bars keep their lengths over the motion, at first and after each joint was dragged; no number is lost."""
     # the studio has inputs that are constant

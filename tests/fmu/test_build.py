@@ -211,7 +211,7 @@ def test_a_changed_file_of_the_compilers_cache_is_made_again(
     assert capsys.readouterr().err.count("all are compiled again") == 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_processes_that_compile_at_the_same_time_wait_for_each_other(tmp_path: Path) -> None:
     """What Zig compiles for itself is there for none of them; the hash of a file that is half written would not hold."""
     (tmp_path / "a.c").write_text('#include <stdio.h>\nint main(void) { puts("here"); return 0; }\n', encoding="utf-8")

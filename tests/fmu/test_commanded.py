@@ -14,6 +14,7 @@ from .test_masters import SLOW, need
 pytestmark = [pytest.mark.slow, pytest.mark.fmu]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("master", dict.fromkeys(row.master for row in ROWS))
 def test_the_table_of_commanded_speeds_is_what_a_run_finds(tmp_path: Path, master: str) -> None:
     name = master.lower().strip("`")

@@ -23,6 +23,8 @@ LONG = {
     *(f"8.{n}" for n in (*range(7, 12), *range(13, 22))),
     *("rig-1-resonance", "rig-1-friction", "rig-2-forces", "rahman-closure", "rahman-rates"),
 }
+#: Those of them that take half a minute and more.
+LONGEST = {"8.16", "8.21", "rig-1-resonance", "rig-1-friction"}
 
 
 @cache
@@ -40,9 +42,8 @@ def statement(number: str, beginning: str) -> Statement:
 def every(*beginnings: str) -> pytest.MarkDecorator:
     """Parametrise a test over the studies whose numbers begin so; those that take long are slow tests."""
     numbers = [n for n in studies.STUDIES if n.startswith(beginnings)]
-    return pytest.mark.parametrize(
-        "number", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in numbers]
-    )
+    marks = {n: pytest.mark.long if n in LONGEST else pytest.mark.slow for n in LONG}
+    return pytest.mark.parametrize("number", [pytest.param(n, marks=marks[n]) if n in LONG else n for n in numbers])
 
 
 def expected(number: str) -> dict[str, str]:

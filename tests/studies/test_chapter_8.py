@@ -206,6 +206,7 @@ class TestFriction:
         expected = 100.0 * np.interp(rigs.GRID["A"], rigs.rpm(branch), branch.amplitude)
         np.testing.assert_allclose(rigs.over_speed("A", 0.0), expected, rtol=1e-2)
 
+    @pytest.mark.long
     @pytest.mark.parametrize("spring", ["A", "B"])
     def test_friction_lowers_the_amplitude_and_hides_the_higher_harmonics(self, spring: str) -> None:
         sizes = [rigs.over_speed(spring, c).max() for c in rig_1.COEFFICIENTS]
@@ -215,6 +216,7 @@ class TestFriction:
         assert (np.diff(rises) <= 0.0).all()
         assert rises[-1] < rigs.NOTICED < rises[0]
 
+    @pytest.mark.long
     def test_no_coefficient_moves_the_local_maximum_towards_290_rpm(self) -> None:
         half = (rigs.GRID["A"] > 250.0) & (rigs.GRID["A"] < 340.0)
         places = [rigs.GRID["A"][half][rigs.over_speed("A", c)[half].argmax()] for c in rig_1.COEFFICIENTS]
