@@ -148,7 +148,9 @@ def test_sanitizers_find_nothing_in_the_tests(sanitized: tuple[Path, dict[str, s
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("name", ["FiveBarSlider-native", "FiveBarSlider-native-fmi3"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("FiveBarSlider-native", marks=pytest.mark.long), "FiveBarSlider-native-fmi3"]
+)
 def test_sanitizers_and_probe_find_nothing_in_a_million_calls(
     sanitized: tuple[Path, dict[str, str]], name: str
 ) -> None:
