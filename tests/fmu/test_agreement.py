@@ -115,7 +115,9 @@ def files_of(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> dict[
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fmu", MECHANISMS)
+@pytest.mark.parametrize(
+    "fmu", [pytest.param(fmu, marks=[] if fmu == "FiveBarSlider" else pytest.mark.long) for fmu in MECHANISMS]
+)
 def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> None:
     files = {kind: str(path) for kind, path in files_of(fmu, fmus, natives).items()}
     found = run_in_process(run_random, ROOT, fmu, files, list(range(50)), timeout=900.0)

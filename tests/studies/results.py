@@ -24,7 +24,7 @@ LONG = {
     *("rig-1-resonance", "rig-1-friction", "rig-2-forces", "rahman-closure", "rahman-rates"),
 }
 #: Those of them that take half a minute and more.
-LONGEST = {"8.16", "8.21", "rig-1-resonance", "rig-1-friction"}
+LONGEST = {"8.16", "8.21", "rig-1-resonance", "rig-1-friction", "rahman-closure"}
 
 
 @cache
@@ -42,8 +42,12 @@ def statement(number: str, beginning: str) -> Statement:
 def every(*beginnings: str) -> pytest.MarkDecorator:
     """Parametrise a test over the studies whose numbers begin so; those that take long are slow tests."""
     numbers = [n for n in studies.STUDIES if n.startswith(beginnings)]
-    marks = {n: pytest.mark.long if n in LONGEST else pytest.mark.slow for n in LONG}
-    return pytest.mark.parametrize("number", [pytest.param(n, marks=marks[n]) if n in LONG else n for n in numbers])
+    return pytest.mark.parametrize("number", [pytest.param(n, marks=marks_of(n)) for n in numbers])
+
+
+def marks_of(number: str) -> tuple[pytest.MarkDecorator, ...]:
+    """Return the marks of a test that needs the results of a study."""
+    return (pytest.mark.long,) if number in LONGEST else (pytest.mark.slow,) if number in LONG else ()
 
 
 def expected(number: str) -> dict[str, str]:

@@ -51,7 +51,7 @@ from ..published_rahman import (
     TORQUE_LB_IN,
     TWISTS_DEG,
 )
-from .results import check, every, result, statement
+from .results import check, every, marks_of, result, statement
 
 #: For each erratum: the study, how the statement that fails begins, its case, and by how much.
 SHOWN = (
@@ -79,7 +79,7 @@ SHOWN = (
 
 @pytest.mark.parametrize(
     ("erratum", "study", "beginning", "label", "size"),
-    [row if row[1] == "rahman-forces" else pytest.param(*row, marks=pytest.mark.slow) for row in SHOWN],
+    [pytest.param(*row, marks=marks_of(row[1])) for row in SHOWN],
 )
 def test_what_fails_by_an_erratum(erratum: str, study: str, beginning: str, label: str, size: float) -> None:
     found = statement(study, beginning)

@@ -78,7 +78,7 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("watched")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="FMUs that write down what is called are for Linux")
 @pytest.mark.parametrize("master", RUNS)
 def test_the_table_of_what_masters_use_is_what_a_run_finds(watched: Path, master: str) -> None:

@@ -277,7 +277,9 @@ def test_constants_of_a_law_are_read_with_their_units_and_must_have_names_of_the
 
 @pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize("name", PARTNERS)
+@pytest.mark.parametrize(
+    "name", [*(pytest.param(name, marks=pytest.mark.long) for name in PARTNERS[:-1]), PARTNERS[-1]]
+)
 def test_the_fmu_of_a_partner_is_valid_and_probes_clean(name: str, tmp_path: Path) -> None:
     fmu = build_native(load_linkage(Path(str(HERE / "partners" / f"{name}.toml"))), NATIVE, tmp_path)
     assert validate_fmu(str(fmu)) == []
