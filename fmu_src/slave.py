@@ -28,7 +28,16 @@ from linkwork.errors import (
 from linkwork.mechanism import Mechanism
 from linkwork.plant import TOLERANCE_RANGE, Plant
 from linkwork.variables import Variable
-from linkwork.wrapper import end_library_in_order, keep_namespace, outlive_exception
+from linkwork.wrapper import (
+    INITIALISING,
+    INSTANTIATED,
+    PHASES,
+    RUNNING,
+    TERMINATED,
+    end_library_in_order,
+    keep_namespace,
+    outlive_exception,
+)
 
 STATUS_GOOD = 0
 STATUS_NOT_INITIALISED = 5
@@ -48,14 +57,6 @@ _NOT_TAKEN = {
     "local": "a local variable",
     "parameter": "a fixed parameter, set after the initialisation",
 }
-
-#: The states of a run: what is allowed in each, FMI 2.0.4 says in 4.2.4.
-INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
-    "instantiated",
-    "in initialisation",
-    "running",
-    "terminated",
-)
 
 
 def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:

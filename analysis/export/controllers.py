@@ -16,7 +16,15 @@ from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
 from pythonfmu.variables import Integer, Real
 
-from linkwork.wrapper import end_library_in_order, keep_namespace, outlive_exception
+from linkwork.wrapper import (
+    INITIALISING,
+    INSTANTIATED,
+    RUNNING,
+    TERMINATED,
+    end_library_in_order,
+    keep_namespace,
+    outlive_exception,
+)
 
 
 class Row(NamedTuple):
@@ -72,7 +80,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
     rows: ClassVar[tuple[Row, ...]]
     sample_time: float
     #: Where it is in its life, which a saved state tells, too; the times of the run (s).
-    phase = "instantiated"
+    phase = INSTANTIATED
     start_time, stop_time = 0.0, inf
 
     def __init_subclass__(cls) -> None:
@@ -133,7 +141,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set values, all of them or none; in a run the parameters must be valid, and the sample time stays."""
-        self._expect("fmi2SetReal", "instantiated", "in initialisation", "running")
+        self._expect("fmi2SetReal", INSTANTIATED, INITIALISING, RUNNING)
         for reference, value in zip(vrs, values):
             if reference not in self.vars:
                 self._refuse(f"there is no variable with the value reference {reference}")
@@ -178,39 +186,40 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
         """Take the times of the run."""
-        self._expect("fmi2SetupExperiment", "instantiated")
+        self._expect("fmi2SetupExperiment", INSTANTIATED)
         self.start_time, self.stop_time = start_time, inf if stop_time is None else stop_time
         if not start_time <= self.stop_time:
             self._refuse(f"the stop time is {stop_time} s: it must not be before the start time, {start_time} s")
 
     def enter_initialization_mode(self) -> None:
         """Begin the initialisation."""
-        self._expect("fmi2EnterInitializationMode", "instantiated")
-        self.phase = "in initialisation"
+        self._expect("fmi2EnterInitializationMode", INSTANTIATED)
+        self.phase = INITIALISING
 
     def exit_initialization_mode(self) -> None:
         """Take the sample at the start."""
-        self._expect("fmi2ExitInitializationMode", "in initialisation")
+        self._expect("fmi2ExitInitializationMode", INITIALISING)
         for name in self.parameters:
             self._check(name, getattr(self, name))
-        self.count, self.phase = 0, "running"
+        self.count, self.phase = 0, RUNNING
         self._up_to(self.start_time + 0.5 * self.sample_time)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Take the samples whose instants are in the step, the one at its end left to the next; refuse what is no step."""
         end = current_time + step_size
-        wrong = f"the controller is {self.phase}" if self.phase != "running" else ""
-        if not (isfinite(end) and step_size > 0.0 and end <= self.stop_time + 1e-6 * step_size):
+        if self.phase != RUNNING:
+            wrong = f"the controller is {self.phase}"
+        elif not (isfinite(end) and step_size > 0.0 and end <= self.stop_time + 1e-6 * step_size):
             wrong = f"it must be finite and above 0, and end by the stop time, {self.stop_time} s"
-        if wrong:
-            self.log(f"a step of {step_size} s at {current_time} s: {wrong}", Fmi2Status.discard)
-            return False
-        self._up_to(end)
-        return True
+        else:
+            self._up_to(end)
+            return True
+        self.log(f"a step of {step_size} s at {current_time} s: {wrong}", Fmi2Status.discard)
+        return False
 
     def terminate(self) -> None:
         """End the run; whatever the phase, a master that cleans up does no harm."""
-        self.phase = "terminated"
+        self.phase = TERMINATED
 
     def _get_fmu_state(self) -> dict[str, Any]:
         state: dict[str, Any] = super()._get_fmu_state()

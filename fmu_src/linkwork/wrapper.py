@@ -8,6 +8,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+#: The states of a run: what is allowed in each, FMI 2.0.4 says in 4.2.4; the wrapper passes every call on.
+INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
+    "instantiated",
+    "in initialisation",
+    "running",
+    "terminated",
+)
+
 #: Libraries of FMUs that `end_library_in_order` has seen to.
 _libraries: set[Path] = set()
 
