@@ -68,6 +68,8 @@ class MachineCode:
     lanes : int
         How many arguments each call takes at once: with more than one, arrays have so many numbers for each of theirs, and t
         is the same for all.
+    shared : bool
+        Whether all lanes have the same b, c and d, which are then arrays as for one.
     rows : sequence of str
         Names of the functions whose outputs are written one lane after the other, which readers of single lanes need: to
         gather them takes some processors longer than to compute them.
@@ -85,19 +87,21 @@ class MachineCode:
         If an operation has no counterpart here, or an output is not dense.
     """
 
-    def __init__(self, functions: Sequence[Any], lanes: int = 1, rows: Sequence[str] = ()) -> None:
+    def __init__(
+        self, functions: Sequence[Any], lanes: int = 1, rows: Sequence[str] = (), *, shared: bool = False
+    ) -> None:
         _prepare()
         triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
         features = binding.get_host_cpu_features().flatten()
         digest = hashlib.sha256(
-            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows}".encode() + _own_source()
+            f"{llvmlite.__version__} {triple} {cpu} {features} {lanes} {rows} {shared}".encode() + _own_source()
         )
         digest.update(" ".join(function.serialize() for function in functions).encode())
         self.fingerprint = digest.hexdigest()
         machine = binding.Target.from_default_triple().create_target_machine(
             opt=3, jit=True, cpu=cpu, features=features
         )
-        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, rows, triple, machine))
+        code = _kept(self.fingerprint, lambda: _compile(functions, lanes, rows, shared, triple, machine))
         engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -105,12 +109,14 @@ class MachineCode:
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
-def _compile(functions: Sequence[Any], lanes: int, rows: Sequence[str], triple: str, machine: Any) -> bytes:
+def _compile(
+    functions: Sequence[Any], lanes: int, rows: Sequence[str], shared: bool, triple: str, machine: Any
+) -> bytes:
     """Return an object file with functions."""
     module = ir.Module("linkwork")
     module.triple = triple
     for function in functions:
-        _Writer(module, function, lanes, function.name() in rows).write()
+        _Writer(module, function, lanes, function.name() in rows, shared).write()
     parsed = binding.parse_assembly(str(module))
     passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
     passes.getModulePassManager().run(parsed, passes)
@@ -181,11 +187,12 @@ def _prepare() -> None:
 class _Writer:
     """Translates one function of CasADi into a module of LLVM."""
 
-    def __init__(self, module: ir.Module, function: Any, lanes: int, in_rows: bool) -> None:
+    def __init__(self, module: ir.Module, function: Any, lanes: int, in_rows: bool, shared: bool) -> None:
         self.module = module
         self.source = function
         self.lanes = lanes
         self.in_rows = in_rows and lanes > 1
+        self.shared = shared and lanes > 1
         self.kind = vectors.vector(lanes)
         self.reciprocals: dict[int, tuple[Any, Any]] = {}
         target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
@@ -219,8 +226,7 @@ class _Writer:
         for k in range(f.n_instructions()):
             code, ins, outs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
             if code == casadi.OP_INPUT:
-                which, place = ins
-                values[outs[0]] = self._time() if which == 0 else build.load(self._place(which, place), align=8)
+                values[outs[0]] = self._input(*ins)
             elif code == casadi.OP_OUTPUT:
                 which, place = outs
                 self._store(values[ins[0]], int(first[which]) + place, int(first[-1]))
@@ -244,13 +250,17 @@ class _Writer:
             target = self.build.gep(self.arguments[5], [_index(count * lane + place)])
             self.build.store(self.build.extract_element(value, _index(lane)), target)
 
-    def _time(self) -> Any:
-        if self.lanes == 1:
-            return self.arguments[0]
-        value = ir.Constant(self.kind, ir.Undefined)
-        for lane in range(self.lanes):
-            value = self.build.insert_element(value, self.arguments[0], _index(lane))
-        return value
+    def _input(self, which: int, place: int) -> Any:
+        """Return a number of an argument in each lane."""
+        if which == 0:
+            return self._same(self.arguments[0])
+        if which > 1 and self.shared:
+            return self._same(self.build.load(self.build.gep(self.arguments[which], [_index(place)])))
+        return self.build.load(self._place(which, place), align=8)
+
+    def _same(self, number: Any) -> Any:
+        """Return a number as that of each lane."""
+        return vectors.repeated(self.build, number, self.lanes)
 
     def _constant(self, value: float) -> Any:
         return ir.Constant(self.kind, float(value) if self.lanes == 1 else [float(value)] * self.lanes)

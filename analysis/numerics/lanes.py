@@ -75,6 +75,14 @@ def vector(lanes: int, of: Any = DOUBLE) -> Any:
     return ir.VectorType(of, lanes) if lanes > 1 else of
 
 
+def repeated(build: Any, number: Any, lanes: int) -> Any:
+    """Return a vector with the same number in each lane; the number itself for one."""
+    if lanes == 1:
+        return number
+    single = build.insert_element(ir.Constant(vector(lanes), ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
+    return build.shuffle_vector(single, single, ir.Constant(vector(lanes, ir.IntType(32)), [0] * lanes))
+
+
 class Vector:
     """A value of LLVM with the operators of Python; the other operand may be a number."""
 

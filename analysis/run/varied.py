@@ -96,7 +96,7 @@ def vary(parameters: Parameters, inputs: Any, values: Mapping[str, Any]) -> tupl
     sets: Sequence[Any] = [parameters] * count
     if of_sets:
         sets = Varied(parameters, of_sets, replace)
-        _check(mechanism, sets)
+        check_sets(mechanism, sets)
     for name, column in of_inputs.items():
         for i in np.flatnonzero(~np.isfinite(column))[:1].tolist():
             raise InputError(f"set {i} of {count}: {name} is {column[i]}: it must be a finite number")
@@ -125,7 +125,7 @@ def _column(name: str, given: Any, read: Callable[[str], float]) -> NDArray[np.f
     return column.astype(float)
 
 
-def _check(mechanism: Mechanism, sets: Varied) -> None:
+def check_sets(mechanism: Mechanism, sets: Varied) -> None:
     """Check all sets against the rules of the parameters at once; the first that is wrong says what is."""
     rules: Rules = mechanism.parameters.RULES  # type: ignore[attr-defined]
     wrong = np.zeros(len(sets), dtype=bool)

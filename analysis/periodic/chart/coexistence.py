@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,8 +25,9 @@ from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, orbits_of
 from ..motion.variables import Plane
 from . import kernels
-from .grid import Keeping, grid_points, row_code, row_name, row_points, row_search
+from .grid import Keeping, grid_points, row_code, row_name
 from .kernels import LOST, MOST_ORBITS, UNSETTLED, Motions
+from .rows import PointRow, row_of
 
 FloatArray = NDArray[np.float64]
 #: Starts from which the motions of a point are sought, after those of its neighbour: a power of two.
@@ -155,24 +156,24 @@ def coexistence(
         largest=np.ma.masked_invalid(data[..., 0]),
         amplitude=np.ma.masked_invalid(data[..., 1]),
         starts=data[..., 2:],
-        swing=rows[0][0].flow.components[0],
+        swing=rows[0].flow.components[0],
         computed=computed,
     )
 
 
-def _compute_motions(guesses: FloatArray, row: Sequence[OperatingPoint]) -> FloatArray:
+def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
     """Return largest multiplier, amplitude and start of each motion of the points of a row, by amplitude; NaN after the last.
 
     The shape is (m, MOST_ORBITS, n + 2).
     """
-    m, n = len(row), guesses.shape[1]
+    m, n = row.scales.shape
     shapes = (m, MOST_ORBITS, n), (m, MOST_ORBITS, n * n), (m, MOST_ORBITS, SAMPLES)
     starts, monodromies, swings = (np.full(shape, np.nan) for shape in shapes)
     counts = np.zeros(m, dtype=np.int64)
-    section = row[0].section(guesses[0], VARIATIONAL, PLAIN, beside=[point.parameters for point in row])
-    angles = np.linspace(0.0, row[0].flow.period, SAMPLES, endpoint=False)
+    section = row.first.section(guesses[0], VARIATIONAL, PLAIN, switched=row.switched)
+    angles = np.linspace(0.0, row.flow.period, SAMPLES, endpoint=False)
     found_all = Motions(starts, monodromies, swings, counts)
-    kernels.solve_all(section, row_points(row, guesses[0]), row_search(row), angles, guesses, found_all)
+    kernels.solve_all(section, row.points(), row.search(), angles, guesses, found_all)
     largest = np.full((m, MOST_ORBITS), np.nan)
     found = np.arange(MOST_ORBITS) < counts[:, None]
     largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
@@ -308,10 +309,11 @@ def basins(
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     point, code = motions[0].point, row_code(kernels.settle_starts)
+    row = row_of([point], known[0])
     ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),
         up.tolist(),
-        [row_name([point], known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
+        [row_name(row, known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
         (points,),
     )
     met = ends.astype(np.int64)

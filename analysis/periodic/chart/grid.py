@@ -23,31 +23,20 @@ from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, interruptible, over_workers
 from ...run import shown
 from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, starts_of
-from ..motion.discretisation import INTEGRATOR_TOLERANCE, OperatingPoint, collocation_serves, operating_point
-from ..motion.flow import GAP, PLAIN, VARIATIONAL
+from ..motion.discretisation import INTEGRATOR_TOLERANCE, operating_point
+from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from ..motion.kernels import REASONS, Status
-from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE, first_guess
+from ..motion.orbit import first_guess
 from . import kernels
-from .kernels import Points, Row, Search
+from .kernels import Row
+from .rows import PointRow, row_of, rows_of
 
 FloatArray = NDArray[np.float64]
 Item = TypeVar("Item")
 #: Starts from which the orbit of a point is sought if it is not found from its neighbour: a power of two.
 STARTS = 32
-
-
-def row_points(points: Sequence[OperatingPoint], start: FloatArray) -> Points:
-    """Return the numbers of a row of operating points for the kernels, with magnitudes of y at a start."""
-    numbers = np.array([point.constants for point in points])
-    vectors = np.array([point.vector for point in points])
-    scales = np.array([point.scale(start) for point in points])
-    return Points(np.hstack([numbers, np.zeros_like(numbers)]), np.hstack([vectors, np.zeros_like(vectors)]), scales)
-
-
-def row_search(points: Sequence[OperatingPoint], turns: int = 1) -> Search:
-    """Return the settings of the search for the orbits of a row."""
-    serves = collocation_serves([point.drive for point in points], [point.parameters for point in points])
-    return Search(points[0].flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, serves)
+# Functions of the flow that find an orbit, beside GAP
+_USED = PLAIN, VARIATIONAL, IN_LANES + VARIATIONAL, IN_LANES + GAP
 
 
 def largest_multipliers(
@@ -81,25 +70,19 @@ def largest_multipliers(
         `kernels.Status`: 0 if an orbit was found.
     """
     points = [operating_point(parameters, drive) for parameters, drive in zip(rows, drives)]
-    flow = points[0].flow
-    if any(point.flow is not flow for point in points):
-        raise InputError(
-            "a row has both drives by speed and by torque, or other modes or ratios: it must have one kind"
-        )
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
-    starting = np.array([first_guess(flow, drives[0], guess) for guess in given])
-    return _solve_row(points, starting, tolerance, turns)
+    starting = np.array([first_guess(points[0].flow, drives[0], guess) for guess in given])
+    return _solve_row(row_of(points, starting[0]), starting, tolerance, turns)
 
 
 def _solve_row(
-    points: Sequence[OperatingPoint], guesses: FloatArray, tolerance: float, turns: int = 1
+    row: PointRow, guesses: FloatArray, tolerance: float, turns: int = 1
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Return multipliers, starts and status of a row: see `largest_multipliers`."""
-    n, m = guesses.shape[1], len(points)
-    beside = [point.parameters for point in points]
-    section = points[0].section(guesses[0], PLAIN, VARIATIONAL, tolerance=tolerance, beside=beside)
+    m, n = row.scales.shape
+    section = row.first.section(guesses[0], *_USED, tolerance=tolerance, switched=row.switched)
     found = Row(np.full((m, n), np.nan), np.full((m, n * n), np.nan), np.zeros(m, dtype=np.int64))
-    kernels.solve_row(section, row_points(points, guesses[0]), row_search(points, turns), guesses, found)
+    kernels.solve_row(section, row.points(), row.search(turns), guesses, found)
     values = np.full(m, np.nan)
     good = found.status == Status.DONE
     if good.any():
@@ -223,7 +206,7 @@ def grid(
     data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_row).rows(
         partial(_compute_row, guesses, tolerance),
         rows,
-        [row_name(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
+        [row_name(row, guesses, (*_USED, GAP), code, tolerance) for row in rows],
         (len(xs), guesses.shape[1] + 2),
     )
     status = data[..., -1].astype(np.int64)
@@ -237,7 +220,7 @@ def grid(
     )
 
 
-def _compute_row(guesses: FloatArray, tolerance: float, row: Sequence[OperatingPoint]) -> FloatArray:
+def _compute_row(guesses: FloatArray, tolerance: float, row: PointRow) -> FloatArray:
     """Compute a row, with the columns multiplier, start and status."""
     values, starts, status = _solve_row(row, guesses, tolerance)
     return np.column_stack([values, starts, status])
@@ -248,7 +231,7 @@ def _compute_row(guesses: FloatArray, tolerance: float, row: Sequence[OperatingP
 
 def grid_points(
     operation: Plane, x: ArrayLike, y: ArrayLike, start: ArrayLike | None, count: int
-) -> tuple[FloatArray, FloatArray, list[list[OperatingPoint]], FloatArray]:
+) -> tuple[FloatArray, FloatArray, list[PointRow], FloatArray]:
     """Return the values of the axes of a grid, its operating points by rows, and the guesses for each row, shape (k, n).
 
     Raises InputError if an axis is empty or not finite.
@@ -257,10 +240,10 @@ def grid_points(
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    rows = [[operating_point(*operation(a, b)) for a in xs.tolist()] for b in ys.tolist()]
-    first = rows[0][0]
+    first = operating_point(*operation(float(xs[0]), float(ys[0])))
     guess = first_guess(first.flow, first.drive, start)
-    return xs, ys, rows, np.vstack([guess, starts_of(first.parameters, first.drive, guess, count)])
+    starts = np.vstack([guess, starts_of(first.parameters, first.drive, guess, count)])
+    return xs, ys, rows_of(operation, xs, ys, guess), starts
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:
@@ -270,7 +253,7 @@ def row_code(*functions: Any) -> tuple[str, ...]:
 
 
 def row_name(
-    row: Sequence[OperatingPoint],
+    row: PointRow,
     guesses: FloatArray,
     functions: Sequence[int],
     code: Sequence[str],
@@ -280,7 +263,7 @@ def row_name(
 
     Parameters
     ----------
-    row : sequence of OperatingPoint
+    row : PointRow
     guesses : ndarray, shape (k, n)
         Starts; the first gives the magnitudes of y.
     functions : sequence of int
@@ -290,10 +273,9 @@ def row_name(
     *numbers : float
         Further numbers that the row depends on.
     """
-    flow, mechanism = row[0].flow, row[0].mechanism
-    switched = any(mechanism.switched(point.constants.tolist()) for point in row)
-    digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=switched), *code)).encode())
-    digest.update(np.array([(*p.constants, *p.vector, *p.scale(guesses[0])) for p in row]).tobytes())
+    flow = row.flow
+    digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=row.switched), *code)).encode())
+    digest.update(np.hstack([row.constants, row.vectors, row.scales]).tobytes())
     digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, *numbers]).tobytes())
     return digest.hexdigest()[:32]
 

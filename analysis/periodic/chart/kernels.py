@@ -14,7 +14,10 @@ from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
 from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inner, kernel, part
-from ..motion.collocation import NODES, close, make_desk, spread
+from ...numerics.references import refer
+from ...numerics.vectors import LANES
+from ...run.compiled import take
+from ..motion.collocation import NODES, close, lay_elements, make_desk, repeat_last, rows_of, spread
 from ..motion.drive import SAME
 from ..motion.kernels import (
     DIVERGED,
@@ -31,8 +34,8 @@ from ..motion.kernels import (
 )
 
 #: Elements of a turn, from few to many.
-COUNTS = np.array([6, 8, 12, 16, 24, 32, 48])
-#: Value of `collocation.tail` below which fewer elements of a turn are taken, relative to the root of the tolerance.
+COUNTS = np.array([8, 16, 24, 32, 48])
+#: Tail of `collocation.close` below which fewer elements of a turn are taken, relative to the root of the tolerance.
 IDLE = 0.7
 #: Orbits of a row that are not tried by collocation after one for which no number of elements sufficed.
 _PAUSE = 8
@@ -91,25 +94,28 @@ def point_section(section, points, row, tolerance):
 
 
 @part
-def divide(section, search, level, start, angles, path, desk, room):
+def divide(section, search, level, start, path, desk, room):
     """Find an orbit by collocation with the fewest elements that suffice, starting at a level of `COUNTS`.
 
-    Returns the level, -1 if there is none.
+    Returns the level, -1 if there is none, and the tail of the Legendre coefficients.
     """
     y, w = path
     while level < len(COUNTS):
         m = COUNTS[level] * search.turns
-        for e in range(m + 1):
-            angles[e] = search.end * e / m
-        if spread(section, angles, start, y[:m], w[:m], room) != DONE:
-            return -1
-        status = close(section, angles, y[:m], w[:m], desk, room)
+        angles = np.linspace(0.0, search.end, m + 1)
+        lay_elements(angles, desk)
+        rows = rows_of(m)
+        if spread(section, angles, 0, start.copy(), y[:rows], w[:rows], room) != DONE:
+            break
+        repeat_last(m, y[:rows])
+        repeat_last(m, w[:rows])
+        status, tail = close(section, m, y[:rows], w[:rows], desk)
         if status == DONE:
-            return level
+            return level, tail
         if status != NO_STEP:
-            return -1
+            break
         level += 1
-    return -1
+    return -1, 0.0
 
 
 @inner
@@ -129,21 +135,25 @@ def shift(size, path):
 
 
 @part
-def solve_from_left(section, points, search, guess, found):
-    """Find the orbits of a row from left to right: by collocation if it converges, otherwise by shooting."""
+def solve_from_left(section, points, search, guess, found, tables):
+    """Find the orbits of a row from left to right: by collocation if it converges, otherwise by shooting.
+
+    ``tables`` are of `make_desk`; the caller holds the arrays that are referred to here.
+    """
     starts, monodromies, status = found
     n = guess.shape[0]
     z = np.empty(n * (1 + n))
     carry = np.array([0.1, 0.0])
     report = np.zeros(3)
     start = np.empty(n)
-    most_elements = COUNTS[-1] * search.turns
-    angles = np.zeros(most_elements + 1)
-    # this orbit and those before it, the last first: all numbers of one in a row, and by elements
-    ys, ws = np.zeros((1 + PASSED, most_elements * n)), np.zeros((1 + PASSED, most_elements * NODES * (n // 2)))
-    y, w = ys.reshape((1 + PASSED, most_elements, n)), ws.reshape((1 + PASSED, most_elements, NODES, n // 2))
-    desk = make_desk(n, most_elements)
+    most_rows = rows_of(COUNTS[-1] * search.turns)
+    # this orbit and those before it, the last first: all numbers of one in a row, and by rows of elements in lanes
+    sizes = n * LANES, NODES * (n // 2) * LANES
+    ys, ws = np.zeros((1 + PASSED, most_rows * sizes[0])), np.zeros((1 + PASSED, most_rows * sizes[1]))
+    y, w = ys.reshape((1 + PASSED, most_rows, sizes[0])), ws.reshape((1 + PASSED, most_rows, sizes[1]))
+    desk = refer(tables)
     level, known, pause = 0, 0, 0
+    tail = 0.0
     passed = 0
     for row in range(status.shape[0]):
         own = point_section(section, points, row, section.tolerance)
@@ -151,13 +161,14 @@ def solve_from_left(section, points, search, guess, found):
         what = DIVERGED
         if known:
             m = COUNTS[level] * search.turns
-            predict(known, y[0, :m].size, ys)
-            predict(known, w[0, :m].size, ws)
-            what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, room)
+            rows = rows_of(m)
+            predict(known, rows * sizes[0], ys)
+            predict(known, rows * sizes[1], ws)
+            what, tail = close(own, m, y[0, :rows], w[0, :rows], desk)
             if what == NO_STEP:
                 # more elements; the start is good enough to go on from
-                copy(y[0, 0], start)
-                more = divide(own, search, level + 1, start, angles, (y[0], w[0]), desk, room)
+                take(0, LANES, y[0, 0], start)
+                more, tail = divide(own, search, level + 1, start, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
                 what = DONE if more >= 0 else NO_STEP
         by_collocation = what == DONE
@@ -184,7 +195,7 @@ def solve_from_left(section, points, search, guess, found):
             continue
         passed += 1
         if by_collocation:
-            copy(y[0, 0], starts[row])
+            take(0, LANES, y[0, 0], starts[row])
             for j in range(n):
                 for i in range(n):
                     monodromies[row, j * n + i] = desk.monodromy[i, j]
@@ -193,18 +204,17 @@ def solve_from_left(section, points, search, guess, found):
             copy(z[n:], monodromies[row])
             pause -= 1
             if search.smooth and pause < 0:
-                more = divide(own, search, level, start, angles, (y[0], w[0]), desk, room)
+                more, tail = divide(own, search, level, start, (y[0], w[0]), desk, room)
                 level, by_collocation = max(more, 0), more >= 0
                 if not by_collocation:
                     pause = _PAUSE
         if by_collocation:
-            m = COUNTS[level] * search.turns
-            shift(y[0, :m].size, ys)
-            shift(w[0, :m].size, ws)
+            rows = rows_of(COUNTS[level] * search.turns)
+            shift(rows * sizes[0], ys)
+            shift(rows * sizes[1], ws)
             known = min(known + 1, PASSED)
-            if level > 0 and desk.report[0] < IDLE * np.sqrt(section.tolerance):
+            if level > 0 and tail < IDLE * np.sqrt(section.tolerance):
                 # fewer elements for the next orbit, which is begun by shooting
-                copy(y[0, 0], start)
                 level -= 1
                 known = 0
 
@@ -266,7 +276,8 @@ def solve_row(section, points, search, guesses, found):
     found : Row
         Written.
     """
-    solve_from_left(section, points, search, guesses[0].copy(), found)
+    tables = make_desk(guesses.shape[1], COUNTS[-1] * search.turns, False)
+    solve_from_left(section, points, search, guesses[0].copy(), found, tables)
     solve_from_right(section, points, search, found)
     missing = False
     for what in found.status:

@@ -7,10 +7,14 @@ join the elements. With NODES nodes the ends of the elements are of order 2 NODE
 Ordinary Differential Equations I, section II.7). From a good guess, which neighbours give at every node, two or three
 corrections suffice, each with a sixth of the right-hand sides that an integrator of order 8 needs for a period. The decay of
 the Legendre coefficients over each element tells the error.
+
+The elements are linearised in lanes, as many at once as the processor takes doubles: element e is lane ``e % LANES`` of row
+``e // LANES`` of an array in lanes. Lanes beyond the last element repeat it.
 """
 
 from __future__ import annotations
 
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +23,11 @@ from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE
 
-from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
+from ...numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ...numerics.gauss import gauss
-from .flow import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
+from ...numerics.references import refer
+from ...numerics.vectors import LANES, fused, greater, load, size, store
+from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DIVERGED, DONE, LIMIT, NO_STEP, SECTION, advance, eliminate, make_room
 
 #: Nodes of an element.
@@ -32,364 +38,451 @@ AA = np.ascontiguousarray(A @ A)
 BA = B @ A
 #: The two highest Legendre coefficients.
 TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
-#: `tail` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
+#: Tail of the coefficients at most, relative to the root of the integrator's tolerance: the ends of the elements are good to
+#: about its square.
 DECAY = 200.0
 #: Corrections at most, and the greatest first one, relative to the scale: a motion farther away is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 
 
-class Bench(NamedTuple):
-    """Work space of an element: arguments and values of the flow; derivatives of the rates' slopes by coordinates and by
-    rates at the nodes; derivatives of the coordinates' slopes by lambda; the linear equations."""
+class Desk(NamedTuple):
+    """Work space of a period.
 
+    In lanes, a row for so many elements: angles and lengths of the elements; what `linearise` makes of y and w, which are y at
+    the ends with the slopes corrected, its derivatives by y at the beginnings, row by row, and by lambda, and the moves of the
+    slopes (the corrections, and their derivatives likewise, of the form (NODES f, 1 + n (+ 1))); changes of y at the
+    beginnings. In lanes, for one row at a time: arguments and values of the flow, the latter at each node; a number of each
+    element; the linear equations; slopes by lambda of the coordinates at the nodes. Not in lanes: the matrices and vectors of
+    n that join the elements.
+    """
+
+    angles: NDArray[np.float64]  # shape (rows, LANES)
+    lengths: NDArray[np.float64]
+    ends: NDArray[np.float64]  # (rows, n LANES)
+    matrices: NDArray[np.float64]  # (rows, n n LANES)
+    slopes: NDArray[np.float64]  # (rows, n LANES)
+    moves: NDArray[np.float64]  # (rows, NODES f (1 + n (+ 1)) LANES)
+    shifts: NDArray[np.float64]  # (rows, n LANES)
     z: NDArray[np.float64]
     out: NDArray[np.float64]
-    by_q: NDArray[np.float64]
-    by_v: NDArray[np.float64]
-    along: NDArray[np.float64]
+    single: NDArray[np.float64]
     equations: NDArray[np.float64]
+    along: NDArray[np.float64]
+    monodromy: NDArray[np.float64]
+    system: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    column: NDArray[np.float64]
 
 
-class Element(NamedTuple):
-    """A linearised element, written by `condense`; its slopes w have the shape (NODES, f)."""
-
-    end: NDArray[np.float64]  # y at its end with the slopes corrected, (n,)
-    matrix: NDArray[np.float64]  # derivatives of the end by the beginning, (n, n)
-    slope: NDArray[np.float64]  # derivatives of the end by lambda, (n,)
-    moves: NDArray[np.float64]  # corrections of w, derivatives by y and lambda, (NODES f, 1 + n (+ 1))
+@inner
+def rows_of(elements):
+    """Return the number of rows that hold so many desk."""
+    return (elements + LANES - 1) // LANES
 
 
 @part
-def make_bench(n, directional):
-    """Make work space for y of n components."""
-    f = n // 2
-    size = NODES * f
-    columns = n + 1 if directional else n
-    return Bench(
-        np.zeros(n * (1 + columns)),
-        np.zeros(n * (1 + columns)),
-        np.zeros((NODES, f, f)),
-        np.zeros((NODES, f, f)),
-        np.zeros((NODES, f)),
-        np.zeros((size, size + 1 + columns)),
+def make_desk(n, most, directional):
+    """Make work space for y of n components and at most ``most`` desk."""
+    f, columns = n // 2, n + 1 if directional else n
+    unknowns, rows = NODES * f, rows_of(most)
+    return Desk(
+        np.zeros((rows, LANES)),
+        np.zeros((rows, LANES)),
+        np.zeros((rows, n * LANES)),
+        np.zeros((rows, n * n * LANES)),
+        np.zeros((rows, n * LANES)),
+        np.zeros((rows, unknowns * (1 + columns) * LANES)),
+        np.zeros((rows, n * LANES)),
+        np.zeros((n + 1) * LANES),
+        np.zeros((NODES, n * (1 + columns) * LANES)),
+        np.zeros(LANES),
+        np.zeros(unknowns * (unknowns + 1 + columns) * LANES),
+        np.zeros(unknowns * LANES),
+        np.zeros((n, n)),
+        np.zeros((n, n + 1)),
+        np.zeros(n),
+        np.zeros(n),
     )
 
 
 @inner
-def identity(matrix):
-    """Write the identity matrix."""
+def lay_elements(angles, desk):
+    """Write the angles at which elements begin, with the end of the last, into rows."""
+    m = angles.shape[0] - 1
+    for place in range(rows_of(m) * LANES):
+        e = min(place, m - 1)
+        desk.angles[place // LANES, place % LANES] = angles[e]
+        desk.lengths[place // LANES, place % LANES] = angles[e + 1] - angles[e]
+
+
+@inner
+def _identity(matrix):
+    """Write the identity matrix, and zeros beside it."""
     for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
             matrix[i, j] = 1.0 if i == j else 0.0
 
 
 @inner
-def pace(section, y, bench):
+def _equation(section, desk):
+    """Return the address of the flow with its derivatives, by lambda if there is room for them."""
+    n = desk.shift.shape[0]
+    directional = desk.out.shape[1] > n * (1 + n) * LANES
+    return section.equations[IN_LANES + (DIRECTIONAL if directional else VARIATIONAL)]
+
+
+@inner
+def _pace(section, y, desk):
     """Return the time per radian: the derivative of a coordinate's slope by its rate."""
-    n = y.shape[0]
-    bench.z[:] = 0.0
+    n = desk.shift.shape[0]
     for i in range(n):
-        bench.z[i] = y[i]
-        bench.z[n + i * n + i] = 1.0
-    evaluate(section.equations[VARIATIONAL], 0.0, bench.z, section.modes, section.drive, section.p, bench.out)
-    return bench.out[n + n // 2 * n]
+        store(desk.z, i, load(y[0], i))
+    store(desk.z, n, load(desk.angles[0], 0))
+    out = desk.out[0]
+    evaluate(_equation(section, desk), 0.0, desk.z, section.modes, section.drive, section.p, out)
+    return out[LANES * (n + n // 2 * n)]
 
 
 @inner
-def at_node(s, h, unit, y, w, z):
-    """Write y at a node of an element into z."""
-    f = w.shape[1]
+def _at_node(s, row, unit, y, w, desk):
+    """Write y and the angle at a node of a row of elements into ``desk.z``."""
+    n = desk.shift.shape[0]
+    f = n // 2
+    h = load(desk.lengths[row], 0)
     for i in range(f):
-        q, v = C[s] * y[f + i], y[f + i]
+        rate = load(y[row], f + i)
+        twice, once = 0.0 * rate, 0.0 * rate
         for j in range(NODES):
-            q += h * AA[s, j] * w[j, i]
-            v += h * A[s, j] * w[j, i]
-        z[i] = y[i] + h * unit * q
-        z[f + i] = v
+            slope = load(w[row], j * f + i)
+            twice, once = fused(AA[s, j], slope, twice), fused(A[s, j], slope, once)
+        store(desk.z, i, load(y[row], i) + h * unit * (C[s] * rate + h * twice))
+        store(desk.z, f + i, rate + h * once)
+    store(desk.z, n, load(desk.angles[row], 0) + C[s] * h)
 
 
 @inner
-def condense(section, angle, h, unit, y, w, bench, into):
-    """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; return whether that was possible.
-
-    The result is written to ``into``, an `Element`.
-    """
-    end, matrix, slope, moves = into
-    n = y.shape[0]
+def _linearise_row(section, row, unit, y, w, desk):
+    """Linearise a row of elements about y and w, and eliminate the slopes."""
+    n = desk.shift.shape[0]
     f = n // 2
-    size = NODES * f
-    z, out, system = bench.z, bench.out, bench.equations
-    directional = z.shape[0] > n * (1 + n)
-    equation = section.equations[DIRECTIONAL if directional else VARIATIONAL]
-    z[:] = 0.0
-    for i in range(n):
-        z[n + i * n + i] = 1.0
+    system, unknowns = desk.equations, NODES * f
+    width = system.shape[0] // (unknowns * LANES)
+    directional = width > unknowns + 1 + n
+    h = load(desk.lengths[row], 0)
     for s in range(NODES):
-        at_node(s, h, unit, y, w, z)
-        evaluate(equation, angle + C[s] * h, z, section.modes, section.drive, section.p, out)
+        _at_node(s, row, unit, y, w, desk)
+        evaluate(_equation(section, desk), 0.0, desk.z, section.modes, section.drive, section.p, desk.out[s])
+        if directional:
+            for i in range(f):
+                store(desk.along, s * f + i, load(desk.out[s], n + n * n + i))
+    for s in range(NODES):
+        out = desk.out[s]
         for i in range(f):
-            system[s * f + i, size] = out[f + i] - w[s, i]
-            for j in range(f):
-                bench.by_q[s, i, j] = out[n + j * n + f + i]
-                bench.by_v[s, i, j] = out[n + (f + j) * n + f + i]
+            line = (s * f + i) * width
+            store(system, line + unknowns, load(out, f + i) - load(w[row], s * f + i))
             if directional:
-                bench.along[s, i] = out[n + n * n + i]
-                system[s * f + i, size + 1 + n] = out[n + n * n + f + i]
-    for s in range(NODES):
-        for i in range(f):
-            row = s * f + i
+                store(system, line + unknowns + 1 + n, load(out, n + n * n + f + i))
             for j in range(f):
-                by_q, by_v = h * unit * bench.by_q[s, i, j], bench.by_v[s, i, j]
+                by_coordinate, by_rate = load(out, n + j * n + f + i), load(out, n + (f + j) * n + f + i)
+                store(system, line + unknowns + 1 + j, by_coordinate)
+                store(system, line + unknowns + 1 + f + j, by_rate + C[s] * (h * unit * by_coordinate))
+                once, twice = -1.0 * h * by_rate, -1.0 * h * h * unit * by_coordinate
                 for t in range(NODES):
-                    system[row, t * f + j] = -h * (A[s, t] * by_v + AA[s, t] * by_q)
-                system[row, size + 1 + j] = bench.by_q[s, i, j]
-                system[row, size + 1 + f + j] = by_v + C[s] * by_q
+                    store(system, line + t * f + j, fused(A[s, t], once, AA[s, t] * twice))
                 if directional:
+                    total = load(system, line + unknowns + 1 + n)
                     for t in range(NODES):
-                        system[row, size + 1 + n] += h * A[s, t] * bench.by_q[s, i, j] * bench.along[t, j]
-            system[row, row] += 1.0
-    if not eliminate(system, size):
-        return False
-    for row in range(size):
-        for j in range(moves.shape[1]):
-            moves[row, j] = system[row, size + j]
-    for i in range(f):
-        end[i] = y[i] + h * unit * y[f + i]
-        end[f + i] = y[f + i]
-        for j in range(n):
-            matrix[i, j] = 0.0
-            matrix[f + i, j] = 0.0
-        matrix[i, i] = 1.0
-        matrix[i, f + i] = h * unit
-        matrix[f + i, f + i] = 1.0
-        slope[i] = 0.0
-        slope[f + i] = 0.0
-        for s in range(NODES):
-            row = s * f + i
-            far, near = h * h * unit * BA[s], h * B[s]
-            value = w[s, i] + moves[row, 0]
-            end[i] += far * value
-            end[f + i] += near * value
-            for j in range(n):
-                matrix[i, j] += far * moves[row, 1 + j]
-                matrix[f + i, j] += near * moves[row, 1 + j]
-            if directional:
-                slope[i] += far * moves[row, 1 + n] + near * bench.along[s, i]
-                slope[f + i] += near * moves[row, 1 + n]
-    return True
+                        total = fused(A[s, t] * h, by_coordinate * load(desk.along, t * f + j), total)
+                    store(system, line + unknowns + 1 + n, total)
+            store(system, line + s * f + i, 1.0 + load(system, line + s * f + i))
+    _eliminate(system, unknowns, width)
+    columns = width - unknowns
+    for line in range(unknowns):
+        for j in range(columns):
+            store(desk.moves[row], line * columns + j, load(system, line * width + unknowns + j))
+    _close_row(row, unit, y, w, desk)
 
 
 @inner
-def tail(h, scale, along, w, moves):
-    """Return the size of the last Legendre coefficients of the slopes and of their derivatives, relative to the greatest."""
-    f = w.shape[1]
-    n = 2 * f
-    worst = 0.0
-    for i in range(f):
-        for j in range(-1, moves.shape[1] - 1):
-            weight = scale[f + i] / (1.0 if j < 0 else scale[j] if j < n else along)
-            last = before = greatest = 0.0
-            for s in range(NODES):
-                value = h * (moves[s * f + i, 1 + j] if j >= 0 else w[s, i])
-                greatest = max(greatest, abs(value))
-                before += TAIL[0, s] * value
-                last += TAIL[1, s] * value
-            worst = max(worst, max(abs(before), abs(last)) / (weight + greatest))
-    return worst
+def _eliminate(system, unknowns, width):
+    """Solve linear equations in lanes: ``kernels.eliminate`` without pivots, which these need not while elements are short.
 
-
-@inner
-def correct_period(section, angles, y, w, desk):
-    """Correct beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period once; return the size of the correction.
-
-    Written on the desk are each `Element`, the monodromy matrix before the correction, and the decay of the Legendre
-    coefficients into ``report[0]``. The size is relative to the scale, and NaN if there is no correction.
+    The equations are those of the identity less a multiple of the element's length. Where they are far from it the corrections
+    do not converge.
     """
-    bench, ends, matrices, slopes, moves, monodromy, report = desk
-    m, n = y.shape
-    f = n // 2
-    scale = section.scale
-    shift, column = bench.z, bench.out
-    report[0] = 0.0
-    unit = pace(section, y[0], bench)
-    identity(monodromy)
-    for e in range(m):
-        h = angles[e + 1] - angles[e]
-        into = Element(ends[e], matrices[e], slopes[e], moves[e])
-        if not condense(section, angles[e], h, unit, y[e], w[e], bench, into):
-            return np.nan
-        report[0] = max(report[0], tail(h, scale, section.along, w[e], moves[e]))
-        after = y[(e + 1) % m]
-        for i in range(n):
-            ends[e, i] -= after[i]
-        _chain(matrices[e], monodromy, column)
-    # carry the gaps between the elements to the end of the period
-    for i in range(n):
-        shift[i] = 0.0
-    for e in range(m):
-        _carry(matrices[e], ends[e], shift, column)
-    system = bench.equations
-    for i in range(n):
-        for j in range(n):
-            system[i, j] = (1.0 if i == j else 0.0) - monodromy[i, j]
-        for j in range(n, system.shape[1]):
-            system[i, j] = shift[i]
-    if not eliminate(system, n):
-        return np.nan
-    for i in range(n):
-        shift[i] = system[i, n]
-    size = 0.0
-    for e in range(m):
-        h = angles[e + 1] - angles[e]
-        for row in range(moves.shape[1]):
-            change = moves[e, row, 0]
-            for j in range(n):
-                change += moves[e, row, 1 + j] * shift[j]
-            w[e, row // f, row % f] += change
-            size = max(size, abs(h * change) / scale[f + row % f])
-        for i in range(n):
-            y[e, i] += shift[i]
-            size = max(size, abs(shift[i]) / scale[i])
-            if not np.isfinite(shift[i]):
-                return np.nan
-        _carry(matrices[e], ends[e], shift, column)
-    return size
+    for c in range(unknowns):
+        inverse = 1.0 / load(system, c * width + c)
+        for r in range(c + 1, unknowns):
+            factor = load(system, r * width + c) * inverse
+            for j in range(c + 1, width):
+                store(system, r * width + j, load(system, r * width + j) - factor * load(system, c * width + j))
+    for c in range(unknowns - 1, -1, -1):
+        inverse = 1.0 / load(system, c * width + c)
+        for j in range(unknowns, width):
+            store(system, c * width + j, load(system, c * width + j) * inverse)
+        for r in range(c):
+            factor = load(system, r * width + c)
+            for j in range(unknowns, width):
+                store(system, r * width + j, load(system, r * width + j) - factor * load(system, c * width + j))
 
 
 @inner
-def _chain(matrix, product, column):
-    """Multiply a product of matrices by the next one from the left, in place."""
-    n = product.shape[0]
-    for j in range(n):
+def _close_row(row, unit, y, w, desk):
+    """Write the ends of a row of elements with their derivatives, from the moves of the slopes."""
+    n = desk.shift.shape[0]
+    f = n // 2
+    moves = desk.moves[row]
+    columns = moves.shape[0] // (NODES * f * LANES)
+    h = load(desk.lengths[row], 0)
+    for i in range(f):
+        for j in range(columns):
+            twice, once = 0.0 * h, 0.0 * h
+            for s in range(NODES):
+                value = load(moves, (s * f + i) * columns + j)
+                if j == 0:
+                    value = value + load(w[row], s * f + i)
+                twice, once = fused(BA[s], value, twice), fused(B[s], value, once)
+            coordinate, rate = h * h * unit * twice, h * once
+            if j == 0:
+                start = load(y[row], f + i)
+                store(desk.ends[row], i, load(y[row], i) + h * unit * start + coordinate)
+                store(desk.ends[row], f + i, start + rate)
+            elif j <= n:
+                # the columns of the free motion: the identity, and h unit from a rate to its coordinate
+                k = j - 1
+                store(desk.matrices[row], i * n + k, coordinate + (1.0 if k == i else 0.0))
+                if k == f + i:
+                    store(desk.matrices[row], i * n + k, coordinate + h * unit)
+                store(desk.matrices[row], (f + i) * n + k, rate + (1.0 if k == f + i else 0.0))
+            else:
+                for s in range(NODES):
+                    coordinate = fused(B[s] * h, load(desk.along, s * f + i), coordinate)
+                store(desk.slopes[row], i, coordinate)
+                store(desk.slopes[row], f + i, rate)
+
+
+@inner
+def linearise(section, y, w, desk):
+    """Linearise all elements about y and w, in lanes; see `Desk`."""
+    unit = _pace(section, y, desk)
+    for row in range(y.shape[0]):
+        _linearise_row(section, row, unit, y, w, desk)
+
+
+@inner
+def _carry(e, y, following, desk):
+    """Carry a change of y, ``desk.shift``, from the beginning of an element to that of the following one.
+
+    With -1 for that it is y at the end instead. The change at the beginning is noted in the lane of the element, and after the
+    last one in those that repeat it.
+    """
+    shift, column = desk.shift, desk.column
+    row, lane, n = e // LANES, e % LANES, shift.shape[0]
+    for i in range(n):
+        for other in range(lane, LANES):
+            desk.shifts[row, LANES * i + other] = shift[i]
+        column[i] = desk.ends[row, LANES * i + lane]
+        if following >= 0:
+            column[i] -= y[following // LANES, LANES * i + following % LANES]
+        for k in range(n):
+            column[i] += desk.matrices[row, LANES * (i * n + k) + lane] * shift[k]
+    copy(column, shift)
+
+
+@inner
+def _chain(e, product, desk):
+    """Multiply a product of matrices by that of an element from the left, in place."""
+    row, lane, n, column = e // LANES, e % LANES, product.shape[0], desk.column
+    for j in range(product.shape[1]):
         for i in range(n):
             column[i] = 0.0
             for k in range(n):
-                column[i] += matrix[i, k] * product[k, j]
+                column[i] += desk.matrices[row, LANES * (i * n + k) + lane] * product[k, j]
         for i in range(n):
             product[i, j] = column[i]
 
 
 @inner
-def _carry(matrix, gap, shift, column):
-    """Carry a deviation at the beginning of an element to the beginning of the next."""
-    n = gap.shape[0]
-    for i in range(n):
-        column[i] = gap[i]
-        for k in range(n):
-            column[i] += matrix[i, k] * shift[k]
-    for i in range(n):
-        shift[i] = column[i]
+def _greatest(values, so_far):
+    """Return the greatest of numbers that are not negative; NaN if one is NaN."""
+    for value in values:
+        if not value <= so_far:
+            so_far = value
+        if isnan(so_far):
+            break
+    return so_far
 
 
 @inner
-def least_gap(section, angles, y, w, bench, gap):
+def _move(section, y, w, desk):
+    """Correct y and slopes of all elements by their changes of y; return the size of the correction, relative to the scale."""
+    n = desk.shift.shape[0]
+    f = n // 2
+    columns = desk.moves.shape[1] // (NODES * f * LANES)
+    result = 0.0
+    for row in range(y.shape[0]):
+        moves, shifts, h = desk.moves[row], desk.shifts[row], load(desk.lengths[row], 0)
+        worst, valid = 0.0 * h, 0.0 * h
+        for s in range(NODES):
+            for i in range(f):
+                line = s * f + i
+                change = load(moves, line * columns)
+                for j in range(n):
+                    change = fused(load(moves, line * columns + 1 + j), load(shifts, j), change)
+                store(w[row], line, load(w[row], line) + change)
+                worst = greater(worst, size(h * change) * (1.0 / section.scale[f + i]))
+                valid = fused(0.0, change, valid)
+        for i in range(n):
+            change = load(shifts, i)
+            store(y[row], i, load(y[row], i) + change)
+            worst = greater(worst, size(change) * (1.0 / section.scale[i]))
+        # a NaN is lost in comparisons, but not here
+        store(desk.single, 0, worst + valid)
+        result = _greatest(desk.single, result)
+    return result
+
+
+@inner
+def _correct_period(section, m, y, w, desk):
+    """Correct y and w of a closed period of m elements once; return the size of the correction, NaN if there is none.
+
+    The monodromy matrix before the correction is written on the desk.
+    """
+    n = desk.shift.shape[0]
+    linearise(section, y, w, desk)
+    _identity(desk.monodromy)
+    # the gaps between the elements, carried to the end of the period
+    desk.shift[:] = 0.0
+    for e in range(m):
+        _chain(e, desk.monodromy, desk)
+        _carry(e, y, (e + 1) % m, desk)
+    for i in range(n):
+        for j in range(n):
+            desk.system[i, j] = (1.0 if i == j else 0.0) - desk.monodromy[i, j]
+        desk.system[i, n] = desk.shift[i]
+    if not eliminate(desk.system, n):
+        return np.nan
+    for i in range(n):
+        desk.shift[i] = desk.system[i, n]
+    for e in range(m):
+        _carry(e, y, (e + 1) % m, desk)
+    return _move(section, y, w, desk)
+
+
+@inner
+def _tails(section, row, w, desk):
+    """Compute the size of the last Legendre coefficients of the slopes and of their derivatives, relative to the greatest.
+
+    It is written into ``desk.single`` for each of a row of desk.
+    """
+    scale = section.scale
+    n = scale.shape[0]
+    f = n // 2
+    moves, h = desk.moves[row], load(desk.lengths[row], 0)
+    columns = moves.shape[0] // (NODES * f * LANES)
+    worst = 0.0 * h
+    for i in range(f):
+        for j in range(columns):
+            # of the slopes themselves, then of their derivatives
+            weight = scale[f + i] / (1.0 if j == 0 else scale[j - 1] if j <= n else section.along)
+            before, last, most = 0.0 * h, 0.0 * h, 0.0 * h
+            for s in range(NODES):
+                line = s * f + i
+                value = h * (load(w[row], line) if j == 0 else load(moves, line * columns + j))
+                before, last = fused(TAIL[0, s], value, before), fused(TAIL[1, s], value, last)
+                most = greater(most, size(value))
+            worst = greater(worst, greater(size(before), size(last)) / (weight + most))
+    store(desk.single, 0, worst)
+
+
+@inner
+def _least_gap(section, y, w, desk):
     """Return the least clearance to the limit of assembly at the nodes; NaN beyond it."""
     least = np.inf
-    unit = pace(section, y[0], bench)
-    for e in range(y.shape[0]):
-        h = angles[e + 1] - angles[e]
+    unit = _pace(section, y, desk)
+    for row in range(y.shape[0]):
         for s in range(NODES):
-            at_node(s, h, unit, y[e], w[e], bench.z)
+            _at_node(s, row, unit, y, w, desk)
             evaluate(
-                section.equations[GAP], angles[e] + C[s] * h, bench.z, section.modes, section.drive, section.p, gap
+                section.equations[IN_LANES + GAP], 0.0, desk.z, section.modes, section.drive, section.p, desk.single
             )
-            if not gap[0] >= least:
-                least = gap[0]
+            for gap in desk.single:
+                if not gap >= least:
+                    least = gap
     return least
 
 
-class Desk(NamedTuple):
-    """Work space of a period: for one element, for the results of `condense` on each, and for those of `correct_period`."""
-
-    bench: Bench
-    ends: NDArray[np.float64]
-    matrices: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    moves: NDArray[np.float64]
-    monodromy: NDArray[np.float64]
-    report: NDArray[np.float64]
-
-
 @part
-def make_desk(n, most):
-    """Make work space for y of n components and at most ``most`` elements."""
-    return Desk(
-        make_bench(n, False),
-        np.zeros((most, n)),
-        np.zeros((most, n, n)),
-        np.zeros((most, n)),
-        np.zeros((most, NODES * (n // 2), 1 + n)),
-        np.zeros((n, n)),
-        np.zeros(1),
-    )
+def close(section, m, y, w, desk):
+    """Solve y and slopes of a closed period of m elements, in lanes, by Newton's method; return a `Status` and the tail.
 
-
-@part
-def close(section, angles, y, w, desk, room):
-    """Solve the beginnings y and slopes w of a closed period by Newton's method; return a `Status`.
-
-    NO_STEP means that the elements are too few.
+    NO_STEP means that the elements are too few: the tail of the Legendre coefficients is long.
     """
-    before = 0.0
+    before = tail = 0.0
     for count in range(_CORRECTIONS):
-        size = correct_period(section, angles, y, w, desk)
+        size = _correct_period(section, m, y, w, desk)
         if not size <= (0.5 * before if count else _FAR):
-            return DIVERGED
+            return DIVERGED, tail
         if size <= 100.0 * section.tolerance:
-            if desk.report[0] > DECAY * np.sqrt(section.tolerance):
-                return NO_STEP
-            return DONE if least_gap(section, angles, y, w, desk.bench, room.gap) > LIMIT_SINE else LIMIT
+            for row in range(y.shape[0]):
+                _tails(section, row, w, desk)
+                tail = _greatest(desk.single, tail)
+            if tail > DECAY * np.sqrt(section.tolerance):
+                return NO_STEP, tail
+            return (DONE if _least_gap(section, y, w, desk) > LIMIT_SINE else LIMIT), tail
         before = size
-    return DIVERGED
+    return DIVERGED, tail
 
 
 @part
-def spread(section, angles, start, y, w, room):
-    """Compute beginnings y and slopes w of the elements of a period from its start by the integrator; return a `Status`."""
+def spread(section, angles, first, start, y, w, room):
+    """Compute y and slopes of elements, from number ``first`` on, by the integrator; return a `Status`.
+
+    ``start``, y at the beginning of the first, becomes y at the end of the last. ``angles`` are those at which they begin, and
+    that of the end.
+    """
     n = start.shape[0]
-    z, out = start.copy(), np.empty(n)
+    out = np.empty(n)
     carry = np.array([0.1, 0.0])
-    for e in range(y.shape[0]):
-        angle, h = angles[e], angles[e + 1] - angles[e]
-        copy(z, y[e])
+    for e in range(first, first + angles.shape[0] - 1):
+        angle, h = angles[e - first], angles[e - first + 1] - angles[e - first]
+        row, lane = e // LANES, e % LANES
+        for i in range(n):
+            y[row, LANES * i + lane] = start[i]
         for s in range(NODES + 1):
-            following = angles[e] + C[s] * h if s < NODES else angles[e + 1]
-            status = advance(section, angle, following, z, room, carry)
+            following = angles[e - first] + C[s] * h if s < NODES else angles[e - first + 1]
+            status = advance(section, angle, following, start, room, carry)
             if status != DONE:
                 return status
             angle = following
             if s < NODES:
-                evaluate(section.equations[PLAIN], angle, z, section.modes, section.drive, section.p, out)
-                copy(out[n // 2 :], w[e, s])
+                evaluate(section.equations[PLAIN], angle, start, section.modes, section.drive, section.p, out)
+                for i in range(n // 2):
+                    w[row, LANES * (s * (n // 2) + i) + lane] = out[n // 2 + i]
     return DONE
 
 
 @inner
-def solve_element(section, angle, h, unit, y, w, bench, into):
-    """Solve the slopes of an element from its beginning by Newton's method; return whether they were found."""
-    f = w.shape[1]
-    before = 0.0
-    for count in range(_CORRECTIONS):
-        if not condense(section, angle, h, unit, y, w, bench, into):
-            return False
-        size = 0.0
-        for row in range(into.moves.shape[0]):
-            w[row // f, row % f] += into.moves[row, 0]
-            size = max(size, abs(h * into.moves[row, 0]) / section.scale[f + row % f])
-        if not size <= (0.5 * before if count else _FAR):
-            return False
-        before = size
-        if size <= 100.0 * section.tolerance:
-            return True
-    return False
+def repeat_last(m, many):
+    """Repeat the last of m elements in the lanes beyond it."""
+    row, lane = (m - 1) // LANES, (m - 1) % LANES
+    for i in range(many.shape[1] // LANES):
+        for other in range(lane + 1, LANES):
+            many[row, LANES * i + other] = many[row, LANES * i + lane]
 
 
 class Neighbour(NamedTuple):
-    """A neighbouring motion: its parameter, y and slopes at the nodes of each element."""
+    """A neighbouring motion in lanes: y at the beginnings of the elements, slopes, and their moves, see `Desk`."""
 
-    y: NDArray[np.float64]  # beginnings, shape (m, n)
-    w: NDArray[np.float64]  # slopes, (m, NODES, f)
-    moves: NDArray[np.float64]  # see `Element`, (m, NODES f, 2 + n)
+    y: NDArray[np.float64]
+    w: NDArray[np.float64]
+    moves: NDArray[np.float64]
+
+
+def neighbour(m: int, n: int) -> Neighbour:
+    """Return the place of a motion of m elements and y of n components, without a motion."""
+    sizes = np.array([n, NODES * (n // 2), NODES * (n // 2) * (2 + n)]) * LANES
+    return Neighbour(*(np.zeros((-(-m // LANES), size)) for size in sizes))
 
 
 class Walked(NamedTuple):
@@ -400,6 +493,107 @@ class Walked(NamedTuple):
     clearance: NDArray[np.float64]  # least clearance to the limit of assembly, (1,)
 
 
+@inner
+def _predict(firsts, starts, change, unit, neighbour, desk):
+    """Move a neighbouring motion to other beginnings of the pieces and another lambda, to first order."""
+    y, w, moves = neighbour
+    n = desk.shift.shape[0]
+    f = n // 2
+    start = desk.shift
+    for piece in range(starts.shape[0]):
+        copy(starts[piece], start)
+        for e in range(firsts[piece], firsts[piece + 1]):
+            row, lane = e // LANES, e % LANES
+            for line in range(NODES * f):
+                for j in range(n + 1):
+                    by = change if j == n else start[j] - y[row, LANES * j + lane]
+                    w[row, LANES * line + lane] += moves[row, LANES * (line * (2 + n) + 1 + j) + lane] * by
+            h = desk.lengths[row, lane]
+            for i in range(n):
+                y[row, LANES * i + lane] = start[i]
+            for i in range(f):
+                twice = once = 0.0
+                for s in range(NODES):
+                    twice += BA[s] * w[row, LANES * (s * f + i) + lane]
+                    once += B[s] * w[row, LANES * (s * f + i) + lane]
+                start[i] += h * unit * (start[f + i] + h * twice)
+                start[f + i] += h * once
+
+
+@inner
+def _correct_pieces(section, firsts, starts, y, w, desk, rows):
+    """Correct y and w of pieces with given beginnings once; return the size of the correction.
+
+    The ends of the pieces are written into ``rows``.
+    """
+    linearise(section, y, w, desk)
+    n = desk.shift.shape[0]
+    for piece in range(starts.shape[0]):
+        first, last = firsts[piece], firsts[piece + 1]
+        for i in range(n):
+            desk.shift[i] = starts[piece, i] - y[first // LANES, LANES * i + first % LANES]
+        for e in range(first, last):
+            _carry(e, y, e + 1 if e + 1 < last else -1, desk)
+        for i in range(n):
+            rows[piece, i] = desk.shift[i]
+    return _move(section, y, w, desk)
+
+
+@inner
+def _write_derivatives(firsts, rows, desk):
+    """Write the derivatives of the ends of pieces by their beginnings and by lambda into ``rows``."""
+    n = desk.shift.shape[0]
+    whole = desk.system
+    for piece in range(rows.shape[0]):
+        _identity(whole)
+        for e in range(firsts[piece], firsts[piece + 1]):
+            _chain(e, whole, desk)
+            for i in range(n):
+                whole[i, n] += desk.slopes[e // LANES, LANES * i + e % LANES]
+        for i in range(n):
+            for j in range(n + 1):
+                rows[piece, n + j * n + i] = whole[i, j]
+
+
+@part
+def _walk(section, angles, firsts, starts, change, known, neighbour, found, tables):
+    """Do the work of `walk`, which holds the arrays that are referred to here."""
+    y, w, moves = neighbour
+    m, desk, room = angles.shape[0] - 1, refer(tables), make_room(section, 0)
+    lay_elements(angles, desk)
+    if known:
+        _predict(firsts, starts, change, _pace(section, y, desk), neighbour, desk)
+    else:
+        for piece in range(starts.shape[0]):
+            first, last = firsts[piece], firsts[piece + 1]
+            status = spread(section, angles[first : last + 1], first, starts[piece].copy(), y, w, room)
+            if status != DONE:
+                return status
+    repeat_last(m, y)
+    repeat_last(m, w)
+    size = before = np.inf
+    for count in range(_CORRECTIONS):
+        size = _correct_pieces(section, firsts, starts, y, w, desk, found.rows)
+        if not size <= (0.5 * before if count else _FAR):
+            return DIVERGED
+        if size <= 100.0 * section.tolerance:
+            break
+        before = size
+    if size > 100.0 * section.tolerance:
+        return DIVERGED
+    _write_derivatives(firsts, found.rows, desk)
+    for row in range(y.shape[0]):
+        copy(desk.moves[row], moves[row])
+        _tails(section, row, w, desk)
+        for lane in range(min(LANES, m - LANES * row)):
+            found.tails[LANES * row + lane] = desk.single[lane]
+    for tail in found.tails:
+        if tail > DECAY * np.sqrt(section.tolerance):
+            return NO_STEP
+    found.clearance[0] = _least_gap(section, y, w, desk)
+    return DONE if found.clearance[0] > LIMIT_SINE else LIMIT
+
+
 @kernel(
     int64(
         SECTION,
@@ -408,7 +602,7 @@ class Walked(NamedTuple):
         MATRIX,
         float64,
         boolean,
-        types.NamedTuple((MATRIX, CUBE, CUBE), Neighbour),
+        types.NamedUniTuple(MATRIX, 3, Neighbour),
         types.NamedTuple((MATRIX, VECTOR, VECTOR), Walked),
     ),
     purpose="the collocation of periodic motions",
@@ -438,46 +632,5 @@ def walk(section, angles, firsts, starts, change, known, neighbour, found):
     int
         A `Status`; NO_STEP if elements are too long, DIVERGED if the slopes were not found.
     """
-    (y, w, moves), (rows, tails, clearance) = neighbour, found
-    n = starts.shape[1]
-    f = n // 2
-    scale = section.scale
-    bench, room = make_bench(n, True), make_room(section, 0)
-    start, end, column = np.empty(n), np.empty(n), np.empty(n)
-    matrix, whole, slope, along = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
-    clearance[0] = np.inf
-    unit = pace(section, starts[0], bench)
-    for piece in range(starts.shape[0]):
-        first, last = firsts[piece], firsts[piece + 1]
-        copy(starts[piece], start)
-        identity(whole)
-        along[:] = 0.0
-        if not known:
-            status = spread(section, angles[first : last + 1], start, y[first:last], w[first:last], room)
-            if status != DONE:
-                return status
-            moves[first:last] = 0.0
-        for e in range(first, last):
-            h = angles[e + 1] - angles[e]
-            for row in range(moves.shape[1]):
-                ahead = moves[e, row, 1 + n] * change
-                for i in range(n):
-                    ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
-                w[e, row // f, row % f] += ahead
-            copy(start, y[e])
-            if not solve_element(section, angles[e], h, unit, y[e], w[e], bench, Element(end, matrix, slope, moves[e])):
-                return DIVERGED
-            tails[e] = tail(h, scale, section.along, w[e], moves[e])
-            _chain(matrix, whole, column)
-            _carry(matrix, slope, along, column)
-            copy(end, start)
-        for i in range(n):
-            rows[piece, i] = start[i]
-            rows[piece, n + n * n + i] = along[i]
-            for j in range(n):
-                rows[piece, n + j * n + i] = whole[i, j]
-    for e in range(tails.shape[0]):
-        if tails[e] > DECAY * np.sqrt(section.tolerance):
-            return NO_STEP
-    clearance[0] = least_gap(section, angles, y, w, bench, room.gap)
-    return DONE if clearance[0] > LIMIT_SINE else LIMIT
+    m, n = angles.shape[0] - 1, starts.shape[1]
+    return _walk(section, angles, firsts, starts, change, known, neighbour, found, make_desk(n, m, True))

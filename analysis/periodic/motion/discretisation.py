@@ -17,7 +17,7 @@ deviations grow about `AIM` times over each piece (`choose_pieces`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ from ...mechanisms import MECHANISMS, Parameters, mechanism_of
 from ...run import takes_published
 from . import collocation, kernels
 from .drive import Direction, Drive, is_smooth, scale_in
-from .flow import DIRECTIONAL, GAP, PLAIN, VARIATIONAL, Flow
+from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, Flow
 from .kernels import Section, Status
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +44,7 @@ GROWTH, AIM, PLACES = 1e3, 10.0, 64
 _FEWEST = 8
 #: Collocation: calls left to shooting after one in which no number of elements sufficed; elements of a turn to begin with;
 #: elements at most, for each piece and beside eight times as many as that; calls after which they are chosen anew.
-_PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 6, 8, 64
+_PAUSE, _ELEMENTS, _MOST, _RENEWED = 16, 8, 8, 64
 #: Clearance to the limit of assembly below which shooting takes over: between the nodes the links may come nearer.
 _NEAR = 1e-2
 
@@ -139,7 +139,7 @@ class OperatingPoint:
         tolerance: float = INTEGRATOR_TOLERANCE,
         direction: Direction | None = None,
         along: float = 1.0,
-        beside: Sequence[Parameters] = (),
+        switched: bool = False,
     ) -> Section:
         """Return the flow and its numbers in the form that the kernels take.
 
@@ -153,14 +153,12 @@ class OperatingPoint:
             Derivatives by a parameter lambda; zero without it.
         along : float
             Magnitude of lambda.
-        beside : sequence of parameters
-            Parameters whose constants will be used with the same section: an equation that one of them switches on is
-            computed for all.
+        switched : bool
+            Whether to compute the equation that some mechanisms switch on even if this one does not.
         """
         d_drive, d_p = direction or (np.zeros_like(self.vector), np.zeros_like(self.constants))
         # a change of lambda may set the switch
-        numbers = (self.constants.tolist(), d_p.tolist(), *(other.constants() for other in beside))
-        switched = any(map(self.mechanism.switched, numbers))
+        switched = switched or any(map(self.mechanism.switched, (self.constants.tolist(), d_p.tolist())))
         return Section(
             self.flow.addresses(GAP, *functions, switched=switched),
             np.array(self.flow.modes, dtype=float),
@@ -332,7 +330,7 @@ class Discretisation:
         """
         self._pause -= 1
         if self.collocated and self._pause < 0:
-            functions = (PLAIN, VARIATIONAL, DIRECTIONAL)
+            functions = (PLAIN, IN_LANES + DIRECTIONAL, IN_LANES + GAP)
             section = point.section(starts[0], *functions, direction=direction, along=along)
             ends = self._collocate(section, point.flow, starts, value)
             if ends is not None:
@@ -382,9 +380,7 @@ class Discretisation:
         self._value = None
         self._mesh = mesh
         self._firsts = np.searchsorted(mesh, self.angles).astype(np.int64)
-        m, f = len(mesh) - 1, n // 2
-        shapes = (m, n), (m, collocation.NODES, f), (m, collocation.NODES * f, 2 + n)
-        self._known = collocation.Neighbour(*map(np.zeros, shapes))
+        self._known = collocation.neighbour(len(mesh) - 1, n)
 
 
 def _ends(rows: FloatArray, n: int) -> Ends:

@@ -14,11 +14,13 @@ from linkwork.variables import Variable
 
 from ...numerics import symbolic
 from ...numerics.codegen import MAKING, MachineCode
+from ...numerics.vectors import LANES
 from ...run import MOTOR, constants, kloss, traced
 
-# Functions of a flow, by their numbers among its addresses
+# Functions of a flow, by their numbers among its addresses; those in lanes begin at IN_LANES, in the same order
 PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
 _NAMES = ("plain", "variational", "directional", "gap", "state")
+IN_LANES = len(_NAMES)
 
 
 class Crank(NamedTuple):
@@ -147,7 +149,7 @@ class Flow:
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
         self.drive_size = self.held + rates + len(self.others)
         self._code: dict[tuple[bool, int], MachineCode] = {}
-        self._addresses: NDArray[np.int64] = np.zeros((2, len(_NAMES)), dtype=np.int64)
+        self._addresses: NDArray[np.int64] = np.zeros((2, 2 * IN_LANES), dtype=np.int64)
 
     @property
     def period(self) -> float:
@@ -159,8 +161,11 @@ class Flow:
         with MAKING:
             for n in which:
                 if (switched, n) not in self._code:
-                    code = MachineCode([self.function(n, switched)])
-                    self._addresses[int(switched), n] = code.addresses[_NAMES[n]]
+                    if n < IN_LANES:
+                        code = MachineCode([self.function(n, switched)])
+                    else:
+                        code = MachineCode([self.function_in_lanes(n - IN_LANES, switched)], LANES, shared=True)
+                    self._addresses[int(switched), n] = code.addresses[_NAMES[n % IN_LANES]]
                     self._code[switched, n] = code
         addresses: NDArray[np.int64] = self._addresses[int(switched)]
         return addresses
@@ -170,15 +175,19 @@ class Flow:
         self.addresses(*which, switched=switched)
         return " ".join(self._code[switched, n].fingerprint for n in which)
 
-    def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[float, ...]:
-        """Return the state of a run at the crank angle 0, from y and the numbers of the drive."""
+    def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[Any, ...]:
+        """Return the state of a run at the crank angle 0, from y and the numbers of the drive.
+
+        With an array for each number of the drive, shape (drive, m), the state has arrays too.
+        """
         rates = len(self.mechanism.freedoms)
-        x = [*drive[self.held : self.held + rates].tolist(), *[0.0] * (rates + 2)]
+        numbers = drive.tolist() if drive.ndim == 1 else list(drive)
+        x = [*numbers[self.held : self.held + rates], *[0.0] * (rates + 2)]
         x[self.crank] = 0.0
         if self.command is not None:
-            x[rates + self.crank] = float(drive[self.command])
+            x[rates + self.crank] = numbers[self.command]
         for number, channel in self.commanded.items():
-            x[rates + number] = float(drive[channel])
+            x[rates + number] = numbers[channel]
         for place, value in zip(self.places, y.tolist()):
             x[place] = value
         return tuple(x)
@@ -240,6 +249,21 @@ class Flow:
             if which == DIRECTIONAL:
                 along = casadi.jtimes(f, drive, d_drive) + casadi.jtimes(f, p, d_p)
                 results.append(jacobian @ columns[:, n] + along)
+        return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
+
+    def function_in_lanes(self, which: int, switched: bool = False) -> Any:
+        """Return one of the functions for several angles at once: (y, angle) is in the place of z, and time in that of angle.
+
+        The columns of dy/dy0 are the identity and that of dy/dlambda is zero, so that those of the result are the derivatives
+        of the rates.
+        """
+        casadi = symbolic.library()
+        function = self.function(which, switched)
+        modes, drive, p = function.sx_in()[2:]
+        time, y, angle = casadi.SX.sym("time"), casadi.SX.sym("y", self.size), casadi.SX.sym("angle")
+        columns = casadi.horzcat(casadi.SX.eye(self.size), casadi.SX.zeros(self.size))
+        results = function.call([angle, casadi.vertcat(y, casadi.vec(columns)), modes, drive, p])
+        arguments = [time, casadi.vertcat(y, angle), modes, drive, p]
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
     def jacobian_trace(self, switched: bool = False) -> Any:

@@ -212,6 +212,20 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
     )
 
 
+@dataclass(frozen=True, slots=True)
+class NamedPlane:
+    """The plane of two parameters, by name: see `plane`."""
+
+    parameters: Parameters
+    drive: Drive
+    x: str
+    y: str
+
+    def __call__(self, first: float, second: float) -> Operation:
+        """Return the mechanism and drive at a point."""
+        return with_values(self.parameters, self.drive, {self.x: first, self.y: second})
+
+
 @takes_published()
 def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     """Return the plane of two parameters, with all others fixed.
@@ -235,11 +249,7 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")
     for name in (x, y):
         require_variable(parameters, drive, name)
-
-    def operation(first: float, second: float) -> Operation:
-        return with_values(parameters, drive, {x: first, y: second})
-
-    return operation
+    return NamedPlane(parameters, drive, x, y)
 
 
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
@@ -353,21 +363,27 @@ def along_parameters(parameters: Parameters, names: Sequence[str], along: str = 
     return Along(*chosen)
 
 
+def places_of(flow: Flow, drive: Drive, name: str) -> dict[int, float] | None:
+    """Return the numbers of the drive that are multiples of a parameter, by their places in `Drive.vector`, with the factors.
+
+    None for a parameter of the mechanism.
+    """
+    mechanism = flow.mechanism
+    places = (*mechanism.input_names, *of_the_motor(mechanism))
+    what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
+    if what == "speed":
+        own = _ratio_of(mechanism, drive, freedom)
+        channels = ({flow.crank: flow.command} | flow.commanded).items()
+        return {c: _ratio_of(mechanism, drive, number) / own for number, c in channels if c is not None}
+    return {places.index(name): 1.0} if name in places else None
+
+
 def stacked(drive: Drive, flow: Flow, names: Sequence[str], p: FloatArray) -> FloatArray:
     """Stack the derivatives of the numbers of the drive on those of the constants, ``p``; shape (c, m)."""
-    mechanism = flow.mechanism
     found = np.zeros((flow.drive_size, p.shape[1]))
-    # in the order of `Drive.vector`
-    places = (*mechanism.input_names, *of_the_motor(mechanism))
     for column, name in enumerate(names):
-        what, freedom = _crank_inputs(mechanism).get(name, ("", -1))
-        if what == "speed":
-            own = _ratio_of(mechanism, drive, freedom)
-            for number, channel in ({flow.crank: flow.command} | flow.commanded).items():
-                if channel is not None:
-                    found[channel, column] = _ratio_of(mechanism, drive, number) / own
-        elif name in places:
-            found[places.index(name), column] = 1.0
+        for place, factor in (places_of(flow, drive, name) or {}).items():
+            found[place, column] = factor
     return np.vstack([found, p])
 
 

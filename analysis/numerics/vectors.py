@@ -1,0 +1,127 @@
+"""Vectors of doubles as values in kernels: one number of each lane of the processor, with the operators of Python.
+
+Numba makes vectors only of loops whose arrays it can tell apart, and seldom of a loop over the few lanes. Here each operation
+is one instruction for all lanes. An array in lanes is flat: number i of lane l is at ``LANES * i + l``.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any, ClassVar
+
+from llvmlite import ir
+from numba import float64, int64, types
+from numba.core.datamodel.models import PrimitiveModel
+from numba.core.datamodel.registry import register_default
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin
+
+from .lanes import declared, repeated, vector, width
+
+#: Numbers in a vector: as many as the processor takes at once.
+LANES = width()
+
+
+class Lanes(types.Type):  # type: ignore[misc]
+    """Type of a number in each lane."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"Lanes({LANES})")
+
+
+LANE = Lanes()
+_KIND = vector(LANES)
+
+
+@register_default(Lanes)
+class _Model(PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, models: Any, kind: Lanes) -> None:
+        super().__init__(models, kind, _KIND)
+
+
+def _wide(builder: Any, kind: Any, value: Any) -> Any:
+    """Return a value as a vector: a number becomes the same in all lanes."""
+    return value if isinstance(kind, Lanes) else repeated(builder, value, LANES)
+
+
+def _operator(function: Any, instruction: str) -> None:
+    """Give an operator its meaning for vectors, and for a vector and a number."""
+    pairs = ((LANE, LANE), (float64, LANE), (LANE, float64))
+
+    @infer_global(function)
+    class _Types(ConcreteTemplate):  # type: ignore[misc]
+        cases: ClassVar = [signature(LANE, *pair) for pair in pairs]
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return getattr(builder, instruction)(*map(_wide, [builder] * 2, signature.args, arguments))
+
+    for pair in pairs:
+        lower_builtin(function, *pair)(lower)
+
+
+_operator(operator.add, "fadd")
+_operator(operator.sub, "fsub")
+_operator(operator.mul, "fmul")
+_operator(operator.truediv, "fdiv")
+
+
+def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    """Return a pointer to a vector of an array."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [builder.mul(index, ir.Constant(index.type, LANES))]), _KIND.as_pointer())
+
+
+@intrinsic
+def load(typing_context, array, index):
+    """Return number ``index`` of each lane from an array in lanes."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
+
+    return LANE(array, int64), generate
+
+
+@intrinsic
+def store(typing_context, array, index, value):
+    """Write number ``index`` of each lane into an array in lanes."""
+
+    def generate(context, builder, signature, arguments):
+        value = _wide(builder, signature.args[2], arguments[2])
+        builder.store(value, _place(context, builder, signature.args[0], *arguments[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, int64, value), generate
+
+
+@intrinsic
+def fused(typing_context, a, b, c):
+    """Return a b + c of vectors or numbers, rounded once."""
+
+    def generate(context, builder, signature, arguments):
+        name = f"llvm.fma.v{LANES}f64" if LANES > 1 else "llvm.fma.f64"
+        values = map(_wide, [builder] * 3, signature.args, arguments)
+        return builder.call(declared(builder.module, name, _KIND, 3), [*values])
+
+    return LANE(a, b, c), generate
+
+
+@intrinsic
+def size(typing_context, a):
+    """Return the absolute values."""
+
+    def generate(context, builder, signature, arguments):
+        name = f"llvm.fabs.v{LANES}f64" if LANES > 1 else "llvm.fabs.f64"
+        return builder.call(declared(builder.module, name, _KIND, 1), arguments)
+
+    return LANE(LANE), generate
+
+
+@intrinsic
+def greater(typing_context, a, b):
+    """Return the greater of two in each lane; the second where they do not compare."""
+
+    def generate(context, builder, signature, arguments):
+        a, b = arguments
+        return builder.select(builder.fcmp_ordered(">", a, b), a, b)
+
+    return LANE(LANE, LANE), generate

@@ -1,0 +1,117 @@
+"""The operating points of a row of a chart as arrays, for the kernels that solve the row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.parameters import field_name
+
+from ...mechanisms import Parameters
+from ...run.varied import Varied, check_sets, constants_of, over_arrays
+from ..motion.discretisation import OperatingPoint, collocation_serves, operating_point
+from ..motion.flow import Flow
+from ..motion.orbit import MOST_ITERATIONS, SEARCH_TOLERANCE
+from ..motion.variables import NamedPlane, Plane, places_of
+from .kernels import Points, Search
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointRow:
+    """Operating points of a row that share a flow.
+
+    Attributes
+    ----------
+    first : OperatingPoint
+        The first point.
+    constants, vectors, scales : ndarray, shapes (m, constants), (m, drive) and (m, n)
+        Constants of the equations, numbers of the drive, and magnitudes of y.
+    smooth : bool
+        Whether collocation serves at all points.
+    """
+
+    first: OperatingPoint
+    constants: FloatArray
+    vectors: FloatArray
+    scales: FloatArray
+    smooth: bool
+
+    @property
+    def flow(self) -> Flow:
+        """The mechanism with these drives, as a flow."""
+        return self.first.flow
+
+    @property
+    def switched(self) -> bool:
+        """Whether any point switches on the equation that some mechanisms need."""
+        place = self.first.mechanism.switch_place
+        return place >= 0 and bool(self.constants[:, place].any())
+
+    def points(self) -> Points:
+        """Return the numbers of the points for the kernels."""
+        numbers, vectors = self.constants, self.vectors
+        return Points(
+            np.hstack([numbers, np.zeros_like(numbers)]), np.hstack([vectors, np.zeros_like(vectors)]), self.scales
+        )
+
+    def search(self, turns: int = 1) -> Search:
+        """Return the settings of the search for the orbits."""
+        return Search(self.flow.period * turns, turns, MOST_ITERATIONS, SEARCH_TOLERANCE, self.smooth)
+
+
+def row_of(points: Sequence[OperatingPoint], start: FloatArray) -> PointRow:
+    """Return points as a row, with magnitudes of y at a start.
+
+    Raises InputError if they are not driven in the same way.
+    """
+    if any(point.flow is not points[0].flow for point in points):
+        raise InputError(
+            "a row has both drives by speed and by torque, or other modes or ratios: it must have one kind"
+        )
+    return PointRow(
+        points[0],
+        np.array([point.constants for point in points]),
+        np.array([point.vector for point in points]),
+        np.array([point.scale(start) for point in points]),
+        collocation_serves([point.drive for point in points], [point.parameters for point in points]),
+    )
+
+
+def rows_of(operation: Plane, xs: FloatArray, ys: FloatArray, start: FloatArray) -> list[PointRow]:
+    """Return the operating points of a grid by rows: those of named parameters at once, others one by one."""
+    if isinstance(operation, NamedPlane):
+        return [_row_at(operation, xs, y, start) for y in ys.tolist()]
+    return [row_of([operating_point(*operation(x, y)) for x in xs.tolist()], start) for y in ys.tolist()]
+
+
+def _row_at(operation: NamedPlane, xs: FloatArray, y: float, start: FloatArray) -> PointRow:
+    """Return a row of a plane of named parameters."""
+    first = operating_point(*operation(float(xs[0]), y))
+    flow, mechanism = first.flow, first.mechanism
+    vectors = np.tile(first.vector, (len(xs), 1))
+    sets: Sequence[Parameters] = [first.parameters]
+    # both ends: a value that the drive refuses is one of them, and a friction that is not zero
+    ends = [operating_point(*operation(x, y)) for x in (float(xs.min()), float(xs.max()))]
+    factors = places_of(flow, first.drive, operation.x)
+    if factors is None:
+        sets = Varied(first.parameters, {field_name(operation.x): xs}, replace)
+        check_sets(mechanism, sets)
+    else:
+        for place, factor in factors.items():
+            vectors[:, place] = factor * xs
+    parameters, columns = constants_of(mechanism, sets)
+    states = flow.state(start, vectors.T)
+    scale = over_arrays(mechanism)[0].of(mechanism.error_scale)(parameters, states)
+    constants, scales = np.empty((len(xs), len(columns))), np.empty((len(xs), flow.size))
+    for n, column in enumerate(columns):
+        constants[:, n] = column
+    for n, place in enumerate(flow.places):
+        scales[:, n] = scale[place]
+    serves = collocation_serves([end.drive for end in ends], [end.parameters for end in ends])
+    return PointRow(first, constants, vectors, scales, serves)
