@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import figures
+from analysis import InductionMotor, figures
 from analysis.periodic import (
     OTHER_ORBIT,
     Crossing,
@@ -21,16 +21,21 @@ from analysis.periodic import (
     follow,
     natural_frequency,
     orbit_of,
+    plane,
     points_to_confirm,
     stability_chart,
 )
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart import grid as grids
 from analysis.periodic.chart.grid import Grid
+from analysis.periodic.chart.rows import rows_of
+from analysis.periodic.motion.discretisation import operating_point
+from analysis.periodic.motion.orbit import first_guess
+from analysis.periodic.motion.variables import value_of
 from analysis.run import heard_by
 from analysis.units import RAD_S_PER_RPM
 from analysis.youssef import linear_motion
-from linkwork.errors import InputError, LinkworkError, UnknownNameError
+from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 RPM = RAD_S_PER_RPM
@@ -261,3 +266,38 @@ def test_progress_advances_within_a_line() -> None:
     assert shares == sorted(shares)
     assert len(set(shares)) > 10
     assert shares[-1] == 1.0
+
+
+MOTOR = Drive(motor=InductionMotor(breakdown_torque=0.06, breakdown_slip=0.3, synchronous_speed=60.0))
+
+
+@pytest.mark.parametrize(
+    ("drive", "x", "y", "across"),
+    [
+        (DRIVE, "drive.speed", "slider.damping", (40.0, 90.0)),
+        (DRIVE, "slider.damping", "drive.speed", (0.5, 3.0)),
+        (DRIVE, "slider.force", "slider.mass", (-2.0, 1.0)),
+        (DRIVE, "coupler.length", "slider.force", (0.2, 0.21)),
+        (DRIVE, "slider.coulomb_friction", "drive.speed", (0.0, 0.2)),
+        (MOTOR, "drive.torque.synchronous_speed", "slider.damping", (50.0, 70.0)),
+    ],
+)
+def test_a_row_of_named_parameters_has_the_numbers_of_its_points(
+    drive: Drive, x: str, y: str, across: tuple[float, float]
+) -> None:
+    operation = plane(RIG_2, drive, x, y)
+    xs, ys = np.linspace(*across, 5), np.array([value_of(RIG_2, drive, y) or 1.0])
+    start = first_guess(operating_point(RIG_2, drive).flow, drive, None)
+    (at_once,) = rows_of(operation, xs, ys, start)
+    (alone,) = rows_of(lambda a, b: operation(a, b), xs, ys, start)
+    for name in ("constants", "vectors", "scales"):
+        assert (getattr(at_once, name) == getattr(alone, name)).all(), name
+    assert (at_once.smooth, at_once.switched) == (alone.smooth, alone.switched)
+
+
+def test_a_row_of_named_parameters_refuses_what_its_points_refuse() -> None:
+    start = np.zeros(2)
+    with pytest.raises(InputError, match="speed"):
+        rows_of(plane(RIG_2, DRIVE, "drive.speed", "slider.damping"), np.array([10.0, -1.0]), np.array([1.0]), start)
+    with pytest.raises(ParameterError, match=r"mass.*-0\.1"):
+        rows_of(plane(RIG_2, DRIVE, "slider.mass", "drive.speed"), np.array([1.0, -0.1]), np.array([50.0]), start)

@@ -20,7 +20,7 @@ from ...run import takes_published
 from ..motion.discretisation import OperatingPoint
 from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
-from ..motion.flow import GAP, PLAIN, VARIATIONAL
+from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, orbits_of
 from ..motion.variables import Plane
@@ -37,6 +37,9 @@ SAMPLES = 64
 #: Bound of the integrator's local error of a basin, distance from a motion, relative to the scale, at which a start has
 #: arrived, and turns at most.
 _TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000
+# Functions of the flow for a search and for a basin, beside GAP
+_SEARCHED = PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
+_FOLLOWED = IN_LANES + PLAIN, IN_LANES + GAP
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -147,7 +150,7 @@ def coexistence(
     data, computed = Keeping(folder, n_jobs, progress, what, kernels.solve_all).rows(
         partial(_compute_motions, guesses),
         rows,
-        [row_name(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
+        [row_name(row, guesses, (*_SEARCHED, GAP), code) for row in rows],
         (len(xs), MOST_ORBITS, guesses.shape[1] + 2),
     )
     return Coexistence(
@@ -170,7 +173,7 @@ def _compute_motions(guesses: FloatArray, row: PointRow) -> FloatArray:
     shapes = (m, MOST_ORBITS, n), (m, MOST_ORBITS, n * n), (m, MOST_ORBITS, SAMPLES)
     starts, monodromies, swings = (np.full(shape, np.nan) for shape in shapes)
     counts = np.zeros(m, dtype=np.int64)
-    section = row.first.section(guesses[0], VARIATIONAL, PLAIN, switched=row.switched)
+    section = row.first.section(guesses[0], *_SEARCHED, switched=row.switched)
     angles = np.linspace(0.0, row.flow.period, SAMPLES, endpoint=False)
     found_all = Motions(starts, monodromies, swings, counts)
     kernels.solve_all(section, row.points(), row.search(), angles, guesses, found_all)
@@ -313,7 +316,7 @@ def basins(
     ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),
         up.tolist(),
-        [row_name(row, known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
+        [row_name(row, known, (*_FOLLOWED, GAP), code, *across, value) for value in up.tolist()],
         (points,),
     )
     met = ends.astype(np.int64)
@@ -331,6 +334,6 @@ def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: fl
     starts = np.tile(known[0], (len(across), 1))
     starts[:, 0], starts[:, point.flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
-    section = point.section(known[0], PLAIN, tolerance=_TOLERANCE)
+    section = point.section(known[0], *_FOLLOWED, tolerance=_TOLERANCE)
     kernels.settle_starts(section, point.flow.period, _NEAR, _TURNS, starts, known, ends)
     return ends.astype(float)

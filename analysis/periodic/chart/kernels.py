@@ -7,13 +7,13 @@ neighbour on the left, from the one on the right, or from other starts.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
-from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inner, kernel, part
+from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inline, inner, kernel, part
 from ...numerics.references import refer
 from ...numerics.vectors import LANES
 from ...run.compiled import take
@@ -22,21 +22,27 @@ from ..motion.drive import SAME
 from ..motion.kernels import (
     DIVERGED,
     DONE,
+    GOING,
     NO_STEP,
     SECTION,
+    Hunt,
     advance,
+    begin_hunt,
     deflated,
+    deflated_next,
     difference,
     magnitude,
     make_room,
     newton,
+    newton_next,
     numbered,
 )
+from ..motion.tracks import IDLE, RUNNING, advance_tracks, begin, make_tracks, set_scale
 
 #: Elements of a turn, from few to many.
 COUNTS = np.array([8, 16, 24, 32, 48])
 #: Tail of `collocation.close` below which fewer elements of a turn are taken, relative to the root of the tolerance.
-IDLE = 0.7
+FEWER = 0.7
 #: Orbits of a row that are not tried by collocation after one for which no number of elements sufficed.
 _PAUSE = 8
 #: Extrapolation by a polynomial through one to four equally spaced values: weights, the last value first.
@@ -213,7 +219,7 @@ def solve_from_left(section, points, search, guess, found, tables):
             shift(rows * sizes[0], ys)
             shift(rows * sizes[1], ws)
             known = min(known + 1, PASSED)
-            if level > 0 and tail < IDLE * np.sqrt(section.tolerance):
+            if level > 0 and tail < FEWER * np.sqrt(section.tolerance):
                 # fewer elements for the next orbit, which is begun by shooting
                 level -= 1
                 known = 0
@@ -297,6 +303,129 @@ def _is_known(start, known, scale, away):
     return found
 
 
+class Seekers(NamedTuple):
+    """Searches in lanes: of each its place in the queue, -1 without one, whether it polishes what it found, and its state."""
+
+    place: NDArray[np.int64]
+    polishing: NDArray[np.bool_]
+    starts: NDArray[np.float64]
+    trials: NDArray[np.float64]
+    corrections: NDArray[np.float64]
+    followings: NDArray[np.float64]
+    systems: NDArray[np.float64]
+    lasts: NDArray[np.float64]
+    numbers: NDArray[np.float64]
+
+
+@part
+def _make_seekers(n):
+    return Seekers(
+        np.full(LANES, -1), np.zeros(LANES, np.bool_), np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)),
+        np.zeros((LANES, n)), np.zeros((LANES, n, n + 1)), np.zeros((LANES, n * (1 + n))), np.zeros((LANES, 4)),
+    )  # fmt: skip
+
+
+@inline
+def _hunt(lane, seekers):
+    """Return the state of the search in a lane."""
+    return Hunt(
+        seekers.starts[lane], seekers.trials[lane], seekers.corrections[lane], seekers.followings[lane],
+        seekers.systems[lane], seekers.lasts[lane], seekers.numbers[lane],
+    )  # fmt: skip
+
+
+class Point(NamedTuple):
+    """A point whose motions are sought: the sections to the full and to a looser tolerance, and what is known of it."""
+
+    own: Any
+    wide: Any
+    search: Search
+    before: NDArray[np.float64]  # starts of the motions of the point before, (b, n)
+    guesses: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    starts: NDArray[np.float64]  # of its motions, written, (MOST_ORBITS, n)
+    monodromies: NDArray[np.float64]
+    swings: NDArray[np.float64]
+    count: NDArray[np.int64]  # their number, (1,)
+
+
+@inner
+def _begin_search(lane, point, seekers, v):
+    """Begin the search of a lane at its place: from a motion of the point before, or with the known ones divided out."""
+    place, before = seekers.place[lane], point.before.shape[0]
+    seekers.polishing[lane] = place < before
+    v.step[lane] = 0.1
+    begin_hunt(point.before[place] if place < before else point.guesses[place - before], _hunt(lane, seekers))
+
+
+@inner
+def _record(lane, point, seekers, v, room, carry):
+    """Add the motion that a lane has found; return whether it is a new one."""
+    count, start = point.count[0], seekers.starts[lane]
+    single = v.z[: start.shape[0]]
+    if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own.scale, single):
+        return False
+    copy(start, point.starts[count])
+    copy(v.z[start.shape[0] :], point.monodromies[count])
+    copy(start, single)
+    angle, carry[0] = 0.0, 0.1
+    for i in range(point.angles.shape[0]):
+        if point.angles[i] > angle:
+            advance(point.own, angle, point.angles[i], single, room, carry)
+            angle = point.angles[i]
+        point.swings[count, i] = single[0]
+    point.count[0] += 1
+    return True
+
+
+@inner
+def _go_on(lane, point, seekers, v, room, carry):
+    """Go on with the search of a lane whose integration has ended; it has no place afterwards if it is over."""
+    hunt, most, status = _hunt(lane, seekers), point.search.most, v.status[lane]
+    take(lane, LANES, v.x, v.z)
+    if seekers.polishing[lane]:
+        what = newton_next(point.own, most, status, v.z, hunt)
+    else:
+        what = deflated_next(point.wide, most, 1.0, status, point.starts[: point.count[0]], v.z, hunt)
+    if what == GOING:
+        return
+    if what != DONE:
+        seekers.place[lane] = -1
+    elif not seekers.polishing[lane]:
+        seekers.polishing[lane] = True
+        begin_hunt(hunt.start, hunt)
+    elif _record(lane, point, seekers, v, room, carry) and seekers.place[lane] >= point.before.shape[0]:
+        # from the same guess to another motion
+        _begin_search(lane, point, seekers, v)
+    else:
+        seekers.place[lane] = -1
+
+
+@part
+def _search_point(point, seekers, tables, room, carry):
+    """Find the motions of a point: from those of the point before, then from all guesses, in lanes."""
+    v, before = refer(tables), point.before.shape[0]
+    place = 0
+    for bound in (before, before + point.guesses.shape[0]):
+        running = True
+        while running:
+            for lane in range(LANES):
+                while v.status[lane] != RUNNING:
+                    if seekers.place[lane] >= 0:
+                        _go_on(lane, point, seekers, v, room, carry)
+                    elif place < bound:
+                        seekers.place[lane] = place
+                        place += 1
+                        _begin_search(lane, point, seekers, v)
+                    else:
+                        v.status[lane] = IDLE
+                        break
+                    if seekers.place[lane] >= 0:
+                        tolerance = (point.own if seekers.polishing[lane] else point.wide).tolerance
+                        begin(lane, point.own, seekers.trials[lane], point.search.end, tolerance, v)
+            running = advance_tracks(point.own, v)
+
+
 @kernel(types.void(SECTION, POINTS, SEARCH, VECTOR, MATRIX, MOTIONS), purpose="grids of coexisting motions")
 def solve_all(section, points, search, angles, guesses, found):
     """Find all orbits of each of a row of mechanisms.
@@ -312,47 +441,62 @@ def solve_all(section, points, search, angles, guesses, found):
 
     The other parameters are those of `solve_row`.
     """
-    starts, monodromies, swings, counts = found
     n = guesses.shape[1]
-    z, single = np.empty(n * (1 + n)), np.empty(n)
-    report, carry = np.zeros(3), np.array([0.1, 0.0])
-    start = np.empty(n)
-    for row in range(counts.shape[0]):
+    seekers, tables = _make_seekers(n), make_tracks(n, n)
+    carry, none = np.array([0.1, 0.0]), np.empty((0, n))
+    for row in range(found.counts.shape[0]):
         own = point_section(section, points, row, section.tolerance)
         wide = point_section(section, points, row, search.loose)
-        room, plain = make_room(own, n), make_room(own, 0)
-        count = 0
-        before = counts[row - 1] if row > 0 else 0
-        for place in range(before + guesses.shape[0]):
-            while count < MOST_ORBITS:
-                if place < before:
-                    copy(starts[row - 1, place], start)
-                else:
-                    copy(guesses[place - before], start)
-                    known = starts[row, :count]
-                    if deflated(wide, search.end, search.most, 1.0, start, known, z, room, carry) != DONE:
-                        break
-                if newton(own, search.end, search.most, start, z, room, carry, report) != DONE:
-                    break
-                if _is_known(start, starts[row, :count], own.scale, single):
-                    break
-                copy(start, starts[row, count])
-                copy(z[n:], monodromies[row, count])
-                copy(start, single)
-                angle, carry[0] = 0.0, 0.1
-                for i in range(angles.shape[0]):
-                    if angles[i] > angle:
-                        advance(own, angle, angles[i], single, plain, carry)
-                        angle = angles[i]
-                    swings[row, count, i] = single[0]
-                count += 1
-                if place < before:
-                    break
-        counts[row] = count
+        set_scale(own.scale, tables)
+        before = found.starts[row - 1, : found.counts[row - 1]] if row > 0 else none
+        point = Point(
+            own, wide, search, before, guesses, angles, found.starts[row], found.monodromies[row], found.swings[row],
+            found.counts[row : row + 1],
+        )  # fmt: skip
+        _search_point(point, seekers, tables, make_room(own, 0), carry)
 
 
 #: Ends of a start that settles on no known motion: at the limit of assembly, or not within the turns.
 LOST, UNSETTLED = -1, -2
+
+
+@inner
+def _arrived(z, known, near, scale, away):
+    """Return the number of the known motion that a state is near to; UNSETTLED if there is none."""
+    end = UNSETTLED
+    for k in range(known.shape[0]):
+        difference(z, known[k], away)
+        if magnitude(away, scale) < near:
+            end = k
+    return end
+
+
+@part
+def _settle(section, turn, near, most, starts, known, ends, tables, rows, turns, away):
+    """Do the work of `settle_starts`, which holds the arrays that are referred to here; in each lane a row, or -1."""
+    v = refer(tables)
+    following, running = 0, True
+    while running:
+        for lane in range(LANES):
+            while v.status[lane] != RUNNING:
+                if rows[lane] >= 0:
+                    take(lane, LANES, v.x, v.z)
+                elif following < starts.shape[0]:
+                    rows[lane], turns[lane] = following, 0
+                    following += 1
+                    copy(starts[rows[lane]], v.z)
+                    v.status[lane], v.step[lane] = DONE, 0.1
+                else:
+                    break
+                row = rows[lane]
+                ends[row] = _arrived(v.z, known, near, section.scale, away) if v.status[lane] == DONE else LOST
+                if ends[row] != UNSETTLED or turns[lane] == most:
+                    rows[lane], v.status[lane] = -1, IDLE
+                else:
+                    turns[lane] += 1
+                    copy(v.z, away)
+                    begin(lane, section, away, turn, section.tolerance, v)
+        running = advance_tracks(section, v)
 
 
 @kernel(types.void(SECTION, float64, float64, int64, MATRIX, MATRIX, int64[::1]), purpose="basins of attraction")
@@ -371,19 +515,18 @@ def settle_starts(section, turn, near, most, starts, known, ends):
     ends : ndarray of int64, shape (m,)
         Written: number of the known motion, or `LOST` or `UNSETTLED`.
     """
-    room = make_room(section, 0)
-    z, away, carry = np.empty(starts.shape[1]), np.empty(starts.shape[1]), np.array([0.1, 0.0])
-    for row in range(starts.shape[0]):
-        copy(starts[row], z)
-        carry[0] = 0.1
-        ends[row] = UNSETTLED
-        for _ in range(most):
-            for k in range(known.shape[0]):
-                difference(z, known[k], away)
-                if magnitude(away, section.scale) < near:
-                    ends[row] = k
-            if ends[row] >= 0:
-                break
-            if advance(section, 0.0, turn, z, room, carry) != DONE:
-                ends[row] = LOST
-                break
+    tables, n = make_tracks(starts.shape[1], 0), starts.shape[1]
+    set_scale(section.scale, tables)
+    _settle(
+        section,
+        turn,
+        near,
+        most,
+        starts,
+        known,
+        ends,
+        tables,
+        np.full(LANES, -1),
+        np.zeros(LANES, np.int64),
+        np.empty(n),
+    )

@@ -44,9 +44,9 @@ REASONS = {
     Status.DIVERGED: "Newton's method does not converge",
 }
 #: Least step of the integrator (rad).
-_LEAST_STEP = 1e-9
+LEAST_STEP = 1e-9
 #: Crank speed below which the crank counts as stalled, relative to its speed at the start.
-_STALL = 1e-3
+STALL = 1e-3
 #: Least fraction of a Newton correction that is tried: in Newton's method, and in the search for other motions.
 _LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
@@ -119,7 +119,7 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
             break
         # beyond the limit of assembly the error is NaN
         proposed = shorter(h, error)
-        if proposed < _LEAST_STEP:
+        if proposed < LEAST_STEP:
             return (LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP), angle
     carry[0] = following(h, proposed, error)
     angle = end if last else angle + h
@@ -134,7 +134,7 @@ def _take(section, equation, angle, end, slowest, z, room, carry):
 def _enter(section, equation, angle, z, room):
     """Write the rates of z at an angle into room.k[0]; return the status and the speed below which the crank stalls."""
     n = section.scale.shape[0]
-    slowest = _STALL * z[n - 1] if section.torque else 0.0
+    slowest = STALL * z[n - 1] if section.torque else 0.0
     if section.torque and not slowest > 0.0:
         return STALLED, slowest
     # a NaN, beyond the limit of assembly, compares as not positive
@@ -250,59 +250,144 @@ def correct_start(start, end, z, system, correction):
     return solved
 
 
+#: Result of a step of a search that needs another integration.
+GOING = -1
+# Numbers of a search: iterations, fraction of the correction that is tried, its size, the residual
+_ITERATION, _FRACTION, _SIZE, _RESIDUAL = range(4)
+
+
+class Hunt(NamedTuple):
+    """The state of Newton's method between integrations: last start, the one to integrate from, correction from the last to
+    it, work space; z at the end from the last; see the numbers above."""
+
+    start: NDArray[np.float64]
+    trial: NDArray[np.float64]
+    correction: NDArray[np.float64]
+    following: NDArray[np.float64]
+    system: NDArray[np.float64]
+    last: NDArray[np.float64]
+    numbers: NDArray[np.float64]
+
+
 @part
-def newton(section, end, most, start, z, room, carry, report):
-    """Solve y(end) = y(0) by Newton's method; see `solve`.
+def make_hunt(n):
+    """Make room for the state of a search."""
+    return Hunt(
+        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, n + 1)), np.zeros(n * (1 + n)), np.zeros(4)
+    )
+
+
+@inner
+def begin_hunt(start, hunt):
+    """Begin a search at a start."""
+    copy(start, hunt.start)
+    copy(start, hunt.trial)
+    hunt.numbers[_ITERATION], hunt.numbers[_FRACTION] = 0.0, 1.0
+    hunt.numbers[_SIZE], hunt.numbers[_RESIDUAL] = 0.0, np.inf
+
+
+@inner
+def newton_next(section, most, status, z, hunt):
+    """Go on with Newton's method after an integration from ``hunt.trial`` to z; return GOING or a `Status`.
 
     A correction is taken in part if the next one, found with the same matrix, would not be smaller (Deuflhard's natural
     monotonicity test), or if it leads out of the domain.
     """
-    scale, tolerance = section.scale, section.tolerance
-    n = scale.shape[0]
-    trial, last = start.copy(), z.copy()
-    correction, following = np.zeros(n), np.empty(n)
-    system = np.empty((n, n + 1))
-    size = 0.0
-    fraction = 1.0
-    report[0] = np.inf
-    report[1] = 0.0
-    for iteration in range(most):
-        while True:
-            start_piece(n, trial, z)
-            status = advance(section, 0.0, end, z, room, carry)
-            if iteration == 0 and status != DONE:
-                return status
-            if status == DONE:
-                if iteration == 0:
-                    break
-                correct_start(trial, z, last, system, following)
-                next_size = magnitude(following, scale)
-                # near the solution corrections stop falling at the integrator's error
-                if next_size <= (1.0 - 0.25 * fraction) * size or next_size <= 100.0 * tolerance:
-                    break
-            fraction *= 0.5
-            if fraction < _LEAST_FRACTION:
-                return status if status != DONE else DIVERGED
-            move(start, fraction, correction, trial)
-        report[1] = iteration + 1.0
-        copy(trial, start)
-        copy(z, last)
-        difference(z, trial, correction)
-        report[0] = magnitude(correction, scale)
-        if not correct_start(trial, z, z, system, correction):
-            return DIVERGED
-        size = magnitude(correction, scale)
-        if not isfinite(size):
-            return DIVERGED
-        # after a correction taken in part the next one is tried less cautiously
-        fraction = min(1.0, 4.0 * fraction)
-        if size <= 100.0 * tolerance:
-            fraction = 1.0
-        move(start, fraction, correction, trial)
-        if size <= 100.0 * tolerance:
-            copy(trial, start)
-            return DONE
-    return DIVERGED
+    scale, close = section.scale, 100.0 * section.tolerance
+    start, trial, correction, following, system, last, numbers = hunt
+    first = numbers[_ITERATION] == 0.0
+    if first and status != DONE:
+        return status
+    taken = first
+    if status == DONE and not first:
+        correct_start(trial, z, last, system, following)
+        next_size = magnitude(following, scale)
+        # near the solution corrections stop falling at the integrator's error
+        taken = next_size <= (1.0 - 0.25 * numbers[_FRACTION]) * numbers[_SIZE] or next_size <= close
+    if not taken:
+        numbers[_FRACTION] *= 0.5
+        if numbers[_FRACTION] < _LEAST_FRACTION:
+            return status if status != DONE else DIVERGED
+        move(start, numbers[_FRACTION], correction, trial)
+        return GOING
+    numbers[_ITERATION] += 1.0
+    copy(trial, start)
+    copy(z, last)
+    difference(z, trial, correction)
+    numbers[_RESIDUAL] = magnitude(correction, scale)
+    if not correct_start(trial, z, z, system, correction):
+        return DIVERGED
+    numbers[_SIZE] = magnitude(correction, scale)
+    if not isfinite(numbers[_SIZE]):
+        return DIVERGED
+    if numbers[_SIZE] <= close:
+        move(start, 1.0, correction, start)
+        return DONE
+    # after a correction taken in part the next one is tried less cautiously
+    numbers[_FRACTION] = min(1.0, 4.0 * numbers[_FRACTION])
+    move(start, numbers[_FRACTION], correction, trial)
+    return GOING if numbers[_ITERATION] < most else DIVERGED
+
+
+@inner
+def deflated_next(section, most, reach, status, known, z, hunt):
+    """Go on as `newton_next` with the known orbits divided out; see `search`."""
+    scale, n = section.scale, section.scale.shape[0]
+    start, trial, correction, _, system, _, numbers = hunt
+    if status != DONE:
+        numbers[_FRACTION] *= 0.5
+        if numbers[_ITERATION] == 0.0 or numbers[_FRACTION] < _LEAST_SEARCHED:
+            return status
+        move(start, numbers[_FRACTION], correction, trial)
+        return GOING
+    copy(trial, start)
+    if not correct_start(trial, z, z, system, correction):
+        return DIVERGED
+    size = magnitude(correction, scale)
+    if not isfinite(size):
+        return DIVERGED
+    # derivative of the logarithm of the factor along the correction
+    slope = 0.0
+    nearest = np.inf
+    for k in range(known.shape[0]):
+        square = along = 0.0
+        for i in range(n):
+            away = (start[i] - known[k, i]) / scale[i]
+            square += away * away
+            along += away * correction[i] / scale[i]
+        nearest = min(nearest, square)
+        if square > 0.0:
+            slope -= 2.0 * along / (square * (1.0 + square))
+    if size <= 100.0 * section.tolerance and nearest > 1e-6:
+        move(start, 1.0, correction, start)
+        return DONE
+    if nearest == 0.0 or slope == 1.0:
+        return DIVERGED
+    for i in range(n):
+        correction[i] /= 1.0 - slope
+    size = magnitude(correction, scale)
+    if size > reach:
+        for i in range(n):
+            correction[i] *= reach / size
+    numbers[_FRACTION] = 1.0
+    numbers[_ITERATION] += 1.0
+    move(start, 1.0, correction, trial)
+    return GOING if numbers[_ITERATION] < most else DIVERGED
+
+
+@part
+def newton(section, end, most, start, z, room, carry, report):
+    """Solve y(end) = y(0) by Newton's method; see `solve`."""
+    n = section.scale.shape[0]
+    hunt = make_hunt(n)
+    begin_hunt(start, hunt)
+    what = GOING
+    while what == GOING:
+        start_piece(n, hunt.trial, z)
+        what = newton_next(section, most, advance(section, 0.0, end, z, room, carry), z, hunt)
+    copy(hunt.start, start)
+    report[0], report[1] = hunt.numbers[_RESIDUAL], hunt.numbers[_ITERATION]
+    return what
 
 
 @kernel(int64(SECTION, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
@@ -338,53 +423,16 @@ def solve(section, end, most, start, z, report):
 @part
 def deflated(section, end, most, reach, start, known, z, room, carry):
     """Run Newton's method with the known orbits divided out; see `search`."""
-    scale = section.scale
-    n = scale.shape[0]
-    trial = start.copy()
-    correction = np.zeros(n)
-    system = np.empty((n, n + 1))
-    for iteration in range(most):
-        fraction = 1.0
-        while True:
-            start_piece(n, trial, z)
-            status = advance(section, 0.0, end, z, room, carry)
-            if status == DONE:
-                break
-            fraction *= 0.5
-            if iteration == 0 or fraction < _LEAST_SEARCHED:
-                return status
-            move(start, fraction, correction, trial)
-        copy(trial, start)
-        if not correct_start(trial, z, z, system, correction):
-            return DIVERGED
-        size = magnitude(correction, scale)
-        if not isfinite(size):
-            return DIVERGED
-        # derivative of the logarithm of the factor along the correction
-        slope = 0.0
-        nearest = np.inf
-        for k in range(known.shape[0]):
-            square = along = 0.0
-            for i in range(n):
-                away = (start[i] - known[k, i]) / scale[i]
-                square += away * away
-                along += away * correction[i] / scale[i]
-            nearest = min(nearest, square)
-            if square > 0.0:
-                slope -= 2.0 * along / (square * (1.0 + square))
-        if size <= 100.0 * section.tolerance and nearest > 1e-6:
-            move(start, 1.0, correction, start)
-            return DONE
-        if nearest == 0.0 or slope == 1.0:
-            return DIVERGED
-        for i in range(n):
-            correction[i] /= 1.0 - slope
-        size = magnitude(correction, scale)
-        if size > reach:
-            for i in range(n):
-                correction[i] *= reach / size
-        move(start, 1.0, correction, trial)
-    return DIVERGED
+    n = section.scale.shape[0]
+    hunt = make_hunt(n)
+    begin_hunt(start, hunt)
+    what = GOING
+    while what == GOING:
+        start_piece(n, hunt.trial, z)
+        status = advance(section, 0.0, end, z, room, carry)
+        what = deflated_next(section, most, reach, status, known, z, hunt)
+    copy(hunt.start, start)
+    return what
 
 
 @kernel(

@@ -1,0 +1,195 @@
+"""Integrate several motions of one mechanism at once, each in its own lane: functions of compiled kernels.
+
+Each lane has its own start, tolerance, step size and end; mechanism and drive are the same. A kernel begins lanes, steps all
+until one ends, and gives that another start. The steps are those of `kernels.advance`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
+
+from ...numerics.codegen import evaluate, inner, part
+from ...numerics.vectors import LANES, fused, greater, load, size, store
+from ...run.compiled import put, take
+from ...run.stepping import E3, E5, FROM, NODES, ROW, STAGES, WEIGHT, following, shorter
+from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
+from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, start_piece
+
+#: Further states of a lane, beside a `Status`, with which a motion has ended.
+RUNNING, IDLE = -1, -2
+
+
+class Tracks(NamedTuple):
+    """Work space of the lanes. In lanes: z, which is y and the columns of its derivatives, at the beginning of a step and at a
+    stage; arguments and values of the flow; stages; sums of the error. A number of each lane: angle, its end, step and the next
+    one, tolerance, least speed, clearance; status. Not in lanes: z of one lane, and the magnitudes of z."""
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    argument: NDArray[np.float64]
+    out: NDArray[np.float64]
+    k: NDArray[np.float64]
+    sum3: NDArray[np.float64]
+    sum5: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    end: NDArray[np.float64]
+    h: NDArray[np.float64]
+    step: NDArray[np.float64]
+    tolerance: NDArray[np.float64]
+    slowest: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    status: NDArray[np.int64]
+    z: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+
+
+@part
+def make_tracks(n, columns):
+    """Make work space for y of n components and a number of columns of derivatives, with idle lanes."""
+    width = n * (1 + columns)
+    lanes = width * LANES
+    return Tracks(
+        np.zeros(lanes), np.zeros(lanes), np.zeros((n + 1) * LANES), np.zeros(n * (1 + n) * LANES), np.zeros((STAGES, lanes)),
+        np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.ones(LANES),
+        np.zeros(LANES), np.zeros(LANES), np.full(LANES, IDLE), np.zeros(width), np.zeros(width),
+    )  # fmt: skip
+
+
+@inner
+def set_scale(scale, v):
+    """Set the magnitudes of z from those of y."""
+    n = scale.shape[0]
+    for i in range(n):
+        v.sizes[i] = scale[i]
+        for j in range(v.sizes.shape[0] // n - 1):
+            v.sizes[n + j * n + i] = scale[i] / scale[j]
+
+
+@inner
+def _clearance(section, z, angle, v):
+    evaluate(section.equations[GAP], angle, z, section.modes, section.drive, section.p, v.out)
+    return v.out[0]
+
+
+@inner
+def begin(lane, section, start, end, tolerance, v):
+    """Begin a motion in a lane, from the angle 0 to an end; its status tells if it ends at once."""
+    n = start.shape[0]
+    start_piece(n, start, v.z)
+    put(lane, LANES, v.z, v.x)
+    v.angle[lane], v.end[lane], v.tolerance[lane] = 0.0, end, tolerance
+    v.slowest[lane] = STALL * start[n - 1] if section.torque else 0.0
+    if section.torque and not v.slowest[lane] > 0.0:
+        v.status[lane] = STALLED
+    elif not _clearance(section, v.z, 0.0, v) > LIMIT_SINE:
+        v.status[lane] = LIMIT
+    else:
+        v.status[lane] = RUNNING
+
+
+@inner
+def _set_argument(node, n, z, v):
+    for i in range(n):
+        store(v.argument, i, load(z, i))
+    store(v.argument, n, load(v.angle, 0) + node * load(v.h, 0))
+
+
+@inner
+def _rates(section, s, z, v):
+    """Compute the rates of z at a stage."""
+    n = section.scale.shape[0]
+    columns = z.shape[0] // (n * LANES) - 1
+    equation = section.equations[IN_LANES + (VARIATIONAL if columns else PLAIN)]
+    _set_argument(NODES[s], n, z, v)
+    evaluate(equation, 0.0, v.argument, section.modes, section.drive, section.p, v.out)
+    for i in range(n):
+        store(v.k[s], i, load(v.out, i))
+        for j in range(columns):
+            total = load(v.out, n + i) * load(z, n + j * n)
+            for q in range(1, n):
+                total = fused(load(v.out, n + q * n + i), load(z, n + j * n + q), total)
+            store(v.k[s], n + j * n + i, total)
+
+
+@inner
+def _attempt(section, v):
+    """Take a step in all lanes into ``v.y``, with the sums of `stepping.attempt` for its error, and the clearance after it."""
+    h = load(v.h, 0)
+    _rates(section, 0, v.x, v)
+    for s in range(1, STAGES + 1):
+        for i in range(v.sizes.shape[0]):
+            total = 0.0 * h
+            for j in range(ROW[s], ROW[s + 1]):
+                total = fused(WEIGHT[j], load(v.k[FROM[j]], i), total)
+            store(v.y, i, fused(h, total, load(v.x, i)))
+        if s < STAGES:
+            _rates(section, s, v.y, v)
+    sum3, sum5, valid = 0.0 * h, 0.0 * h, 0.0 * h
+    for i in range(v.sizes.shape[0]):
+        e3, e5, end = 0.0 * h, 0.0 * h, load(v.y, i)
+        for j in range(STAGES):
+            e3, e5 = fused(E3[j], load(v.k[j], i), e3), fused(E5[j], load(v.k[j], i), e5)
+        weight = 1.0 / (v.sizes[i] + greater(size(load(v.x, i)), size(end)))
+        e3, e5, valid = e3 * weight, e5 * weight, fused(0.0, end, valid)
+        sum3, sum5 = fused(e3, e3, sum3), fused(e5, e5, sum5)
+    store(v.sum3, 0, sum3 + valid)
+    store(v.sum5, 0, sum5 + valid)
+    _set_argument(1.0, section.scale.shape[0], v.y, v)
+    evaluate(section.equations[IN_LANES + GAP], 0.0, v.argument, section.modes, section.drive, section.p, v.gap)
+
+
+@inner
+def _judge(lane, section, last, v):
+    """Accept the step of a lane or make it shorter; return whether its motion has ended."""
+    h, n = v.h[lane], section.scale.shape[0]
+    bottom = v.sum5[lane] + 0.01 * v.sum3[lane]
+    error = 0.0 if bottom == 0.0 else h * v.sum5[lane] / np.sqrt(bottom * v.sizes.shape[0]) / v.tolerance[lane]
+    if not error <= 1.0:
+        # beyond the limit of assembly the error is NaN
+        v.step[lane] = shorter(h, error)
+        if v.step[lane] < LEAST_STEP:
+            take(lane, LANES, v.x, v.z)
+            near = _clearance(section, v.z, v.angle[lane], v) < NEAR_LIMIT
+            v.status[lane] = LIMIT if near else NO_STEP
+        return v.status[lane] != RUNNING
+    v.step[lane] = following(h, v.step[lane], error)
+    v.angle[lane] = v.end[lane] if last else v.angle[lane] + h
+    for i in range(lane, v.x.shape[0], LANES):
+        v.x[i] = v.y[i]
+    if not v.gap[lane] > LIMIT_SINE:
+        v.status[lane] = LIMIT
+    elif section.torque and not v.y[LANES * (n - 1) + lane] > v.slowest[lane]:
+        v.status[lane] = STALLED
+    elif v.angle[lane] >= v.end[lane]:
+        v.status[lane] = DONE
+    return v.status[lane] != RUNNING
+
+
+@inner
+def advance_tracks(section, v):
+    """Step all lanes until the motion of one has ended; return False at once if none runs.
+
+    Of a motion whose status is DONE, z at its end is in ``v.x``.
+    """
+    ended = running = False
+    while not ended:
+        running = False
+        for lane in range(LANES):
+            v.h[lane] = 0.0
+            if v.status[lane] == RUNNING:
+                running = True
+                # no sliver of a step before the end
+                rest = v.end[lane] - v.angle[lane]
+                v.h[lane] = rest if 1.001 * v.step[lane] >= rest else v.step[lane]
+        if not running:
+            return False
+        _attempt(section, v)
+        for lane in range(LANES):
+            if v.status[lane] == RUNNING:
+                ended |= _judge(lane, section, v.h[lane] == v.end[lane] - v.angle[lane], v)
+    return True

@@ -1,0 +1,133 @@
+"""Periods integrated in lanes against the same one by one, and vectors in kernels against NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import float64, int64, types
+
+from analysis import InductionMotor
+from analysis.numerics.codegen import MATRIX, VECTOR, kernel
+from analysis.numerics.vectors import LANES, fused, greater, load, size, store
+from analysis.periodic import Drive, coexistence, plane
+from analysis.periodic.motion import kernels
+from analysis.periodic.motion.discretisation import operating_point
+from analysis.periodic.motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
+from analysis.periodic.motion.kernels import SECTION, Status
+from analysis.periodic.motion.tracks import (
+    DONE,
+    IDLE,
+    RUNNING,
+    advance_tracks,
+    begin,
+    make_tracks,
+    set_scale,
+)
+from analysis.run.compiled import take
+from linkwork.five_bar.published import SETS
+
+RIG = SETS["rig-2-spring-c"].parameters
+USED = PLAIN, VARIATIONAL, IN_LANES + PLAIN, IN_LANES + VARIATIONAL, IN_LANES + GAP
+
+
+@kernel(types.void(SECTION, int64, float64, VECTOR, MATRIX, MATRIX, int64[::1]), purpose="a test")
+def follow_all(section: Any, columns: int, end: float, tolerances: Any, starts: Any, rows: Any, statuses: Any) -> None:
+    """Integrate from all starts in lanes, each to its own tolerance."""
+    v, owner, place = make_tracks(starts.shape[1], columns), np.full(LANES, -1), 0
+    set_scale(section.scale, v)
+    running = True
+    while running:
+        for lane in range(LANES):
+            while v.status[lane] != RUNNING:
+                if owner[lane] >= 0:
+                    statuses[owner[lane]] = v.status[lane]
+                    if v.status[lane] == DONE:
+                        take(lane, LANES, v.x, rows[owner[lane]])
+                owner[lane], v.status[lane] = -1, IDLE
+                if place == starts.shape[0]:
+                    break
+                owner[lane], v.step[lane] = place, 0.1
+                begin(lane, section, starts[place], end, tolerances[place], v)
+                place += 1
+        running = advance_tracks(section, v)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [Drive(speed=30.0), Drive(motor=InductionMotor(breakdown_torque=0.06, breakdown_slip=0.3, synchronous_speed=60.0))],
+    ids=["speed", "motor"],
+)
+@pytest.mark.parametrize("columns", [0, 1], ids=["plain", "derivatives"])
+def test_lanes_take_the_steps_of_one_motion_alone(drive: Drive, columns: int) -> None:
+    """More starts than lanes, some beyond the limit of assembly, to several tolerances."""
+    point = operating_point(RIG, drive)
+    n = point.flow.size
+    generator = np.random.default_rng(5)
+    starts = np.zeros((21, n))
+    starts[:, 0] = generator.uniform(-0.3, 0.3, 21)
+    starts[:, 1] = generator.uniform(-1.0, 1.0, 21)
+    starts[:, 2:] = 40.0
+    tolerances = 10.0 ** generator.uniform(-12.0, -6.0, 21)
+    rows, statuses = np.zeros((21, n * (1 + n * columns))), np.zeros(21, dtype=np.int64)
+    section = point.section(starts[0], *USED)
+    follow_all(section, n * columns, 2.0 * pi, tolerances, starts, rows, statuses)
+    for start, tolerance, row, status in zip(starts, tolerances, rows, statuses):
+        alone = np.zeros((1, row.size))
+        own = section._replace(tolerance=tolerance)
+        assert status == kernels.segments(own, np.array([0.0, 2.0 * pi]), start[None, :], alone)
+        if status == Status.DONE:
+            assert row == pytest.approx(alone[0], rel=1e-10, abs=1e-11 * np.abs(alone).max())
+    assert len(set(statuses.tolist())) > 1
+
+
+def test_the_motions_of_a_grid_close_and_differ() -> None:
+    """Each closes after a turn, and no two are the same."""
+    rig = SETS["rig-1-spring-b"].parameters
+    speeds = np.linspace(95.0, 110.0, 7)
+    found = coexistence(plane(rig, Drive(speed=100.0), "drive.speed", "slider.damping"), speeds, [8.0, 14.0])
+    assert found.count.max() > 1
+    for column, speed in enumerate(speeds.tolist()):
+        point = operating_point(replace(rig, slider_damping=8.0), Drive(speed=speed))
+        for start in found.starts[0, column, : found.count[0, column]]:
+            assert point.period(start, 1).shift == pytest.approx(0.0, abs=1e-9)
+        own = found.starts[0, column, : found.count[0, column], 0]
+        assert np.diff(np.sort(own)).min(initial=1.0) > 1e-6
+
+
+@kernel(types.void(VECTOR, VECTOR, VECTOR), purpose="a test")
+def combine(a: Any, b: Any, out: Any) -> None:
+    """Apply each operation to two numbers of each lane, and to a vector and a number."""
+    x, y = load(a, 0), load(b, 0)
+    store(out, 0, x + y)
+    store(out, 1, x - y)
+    store(out, 2, x * y)
+    store(out, 3, x / y)
+    store(out, 4, 2.0 - x)
+    store(out, 5, x / 3.0)
+    store(out, 6, fused(x, y, 1.0))
+    store(out, 7, size(x))
+    store(out, 8, greater(x, y))
+    store(out, 9, 7.0)
+
+
+def test_vectors_compute_lane_by_lane() -> None:
+    generator = np.random.default_rng(2)
+    a, b, out = generator.normal(size=LANES), generator.normal(size=LANES), np.zeros(10 * LANES)
+    combine(a, b, out)
+    expected = [
+        a + b,
+        a - b,
+        a * b,
+        a / b,
+        2.0 - a,
+        a / 3.0,
+        a * b + 1.0,
+        np.abs(a),
+        np.maximum(a, b),
+        np.full(LANES, 7.0),
+    ]
+    np.testing.assert_allclose(out.reshape(10, LANES), expected, rtol=1e-15, atol=1e-16)
