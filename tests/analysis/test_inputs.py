@@ -194,6 +194,10 @@ def test_breaks_that_miss_a_sample_by_rounding_are_moved_onto_it() -> None:
     moved = align(encode(Inputs(force=steps([0.0, 0.3, 0.55], [0.0, 1.0, 2.0])), FIVE_BAR), times)
     assert moved.source.breaks[1] == times[3]
     assert moved.source.breaks[2] == 0.55
+    # the last sample too
+    beside = np.nextafter(times[-1], 0.0)
+    moved = align(encode(Inputs(force=steps([0.0, 0.3, beside], [0.0, 1.0, 2.0])), FIVE_BAR), times)
+    assert moved.source.breaks[2] == times[-1] != beside
     # late in the day a float misses by more than a billionth of a step
     late = 1e6 + 1e-3 * np.arange(101)
     breaks = np.nextafter(late[[20, 50, 70]], np.inf)

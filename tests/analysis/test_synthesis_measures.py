@@ -21,7 +21,7 @@ from analysis.numerics.overlap import symmetric_difference
 from analysis.slider import slider_motion
 from analysis.synthesis.search.polish import violated
 from analysis.synthesis.search.program import Program
-from analysis.synthesis.search.refine import Refinement
+from analysis.synthesis.search.refine import Refinement, _Descent
 from analysis.synthesis.search.start import make_start
 from analysis.synthesis.task.limits import make_limits
 from analysis.synthesis.task.target import even_odd_area
@@ -109,6 +109,29 @@ def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:
         ends = [refinement.area(refinement.traced(z + s * step, parameters)[0])[0] for s in (1.0, -1.0)]
         slope = float((gradient * slopes[:, :, k]).sum())
         assert slope == pytest.approx(0.5e6 * (ends[0] - ends[1]), rel=1e-3, abs=1e-6)
+
+
+def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
+    """By the unknowns, the last of which is the bound."""
+    known = drawn(np.random.default_rng(2), least=0.7)
+    points = known.path(np.linspace(0.0, 2.0 * pi, 60, endpoint=False)) * 1.05
+    path = syn.TargetPath(points=points, closed=True)
+    task = syn.UntimedPath(path=path, objective="worst")
+    normal = syn.normal_form(task)
+    program = Program(normal, make_limits(task, normal, None, syn.USUAL), objective="curve")
+    refinement = Refinement(program)
+    z, parameters = program.at(make_start(known, normal, rotation=np.linspace(0.0, 2.0 * pi, normal.n)))
+    curve, slopes = refinement.traced(z, parameters)
+    some = [np.arange(len(near.distance)) for near in refinement.apart(curve)]
+    down = _Descent(refinement, z, parameters, refinement._stretched(curve, slopes), refinement.measure(curve), some)
+    (held,) = (c for c in down.constraints() if c["type"] == "ineq")
+    y = down.begin() + 1e-3 * np.random.default_rng(1).normal(size=len(down.begin()))
+    exact = held["jac"](y)
+    for k, step in enumerate(1e-6 * np.eye(len(y))):
+        differences = (held["fun"](y + step) - held["fun"](y - step)) / 2e-6
+        # the nearest point of a corner changes with the step in a few places
+        assert np.median(np.abs(exact[:, k] - differences)) < 1e-4 * (1.0 + np.abs(differences).max())
+        assert np.abs(exact[:, k]).max() == pytest.approx(np.abs(differences).max(), rel=1e-2, abs=1e-4)
 
 
 # Corners
