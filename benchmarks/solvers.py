@@ -100,15 +100,17 @@ def with_scipy(case: Case) -> Timing:
 
 def with_multipliers(case: Case) -> Timing:
     """Time the redundant form under SciPy's DOP853, which gets the torsion bar's time of release for free."""
-    rtol, error, reached = loosest(lambda rtol: relative_error(case, _multipliers(case, rtol)), TOLERANCES[::5])
+    rtol, error, reached = loosest(lambda rtol: relative_error(case, by_multipliers(case, rtol)), TOLERANCES[::5])
     assert reached, "the multiplier form does not reach the accuracy"
-    seconds = best_time(lambda: _multipliers(case, rtol), 2)
+    seconds = best_time(lambda: by_multipliers(case, rtol), 2)
     return Timing(
         solver="multiplier form under SciPy", seconds=seconds, error=error, note=f"DOP853, rtol {rtol:.1e}, 8 states"
     )
 
 
-def _multipliers(case: Case, rtol: float) -> np.ndarray:
+def by_multipliers(case: Case, rtol: float) -> np.ndarray:
+    """Compute the slider position (m) by the multiplier form under SciPy's DOP853."""
+
     def run(start: InitialState, torque: float, times: np.ndarray, **drive: Any) -> Any:
         def applied(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, ...]:
             return (torque * (1.0 - q[0] / case.switch_angle), 0.0, 0.0, 0.0)

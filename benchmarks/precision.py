@@ -1,0 +1,197 @@
+"""Work and precision of all solvers and engines on the same runs, and the cost of a run in ensembles of 1 to a million.
+
+    python -m benchmarks.precision docs
+    python -m benchmarks.precision docs --runs 10000
+
+writes ``work-precision.png`` and ``cost-of-runs.png`` into a folder, and prints the second as a table. Times are ratios: to the
+integration in process at the accuracy of `benchmarks.accuracy`, and to one run alone. Each is the least of several, measured in
+one process. Engines that are not installed (extra ``bench``) are left out and named.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from collections.abc import Callable, Iterable
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from analysis import Inputs, TorsionBar, simulate, simulate_many
+from analysis.figures import Curve, Panel, plot_curves
+from analysis.figures.style import COLOURS
+from benchmarks import engines
+from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, best_time
+from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
+from benchmarks.ensembles import without_lanes
+from benchmarks.solvers import by_multipliers
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import SETS, TABLE_3_1
+
+#: Tolerances of the solvers; powers of two between the first and last step of an engine.
+TOLERANCES = 10.0 ** np.arange(-3.0, -12.5, -0.5)
+#: Numbers of runs, and how many more times the shortest are repeated.
+COUNTS = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
+OURS = "Linkwork, integration"
+_TITLES = {"constant-speed": "Table 3.1, 420 rpm, three turns", "torsion-bar": "under a torsion bar, 0.5 s"}
+
+
+class Point(NamedTuple):
+    """Error of a run, relative to the largest slider position, and its time (s)."""
+
+    error: float
+    seconds: float
+
+
+def in_process(case: Case, of: str) -> list[Point]:
+    """Measure the compiled solver at all tolerances: the "integration" alone, or the "whole" call with all outputs."""
+    inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
+    start = InitialState(crank_speed=case.start_speed)
+
+    def run(tolerance: float) -> Any:
+        return simulate(case.parameters, inputs, initial=start, samples=case.times, tolerance=tolerance)
+
+    points = []
+    for tolerance in TOLERANCES.tolist():
+        error = relative_error(case, run(tolerance)["slider.position"])
+        if of == "whole":
+            seconds = best_time(partial(run, tolerance), 40, process_time)
+        else:
+            seconds = min(run(tolerance).statistics["seconds_integrating"] for _ in range(40))
+        points.append(Point(error, seconds))
+    return points
+
+
+def at_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int = 2) -> list[Point]:
+    """Measure a solver at every other tolerance."""
+    points = []
+    for tolerance in TOLERANCES[::2].tolist():
+        error = relative_error(case, run(tolerance))
+        points.append(Point(error, best_time(partial(run, tolerance), repeats, process_time)))
+    return points
+
+
+def by_scipy_at(case: Case, method: str) -> list[Point]:
+    """Measure one of SciPy's methods on the plain right-hand side."""
+    length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
+    scale = np.array([1.0, length, speed, length * 40.0])
+    return at_tolerances(case, lambda rtol: by_scipy(case, method, rtol, rtol * scale))
+
+
+def by_engine(case: Case, engine: engines.Engine, run: engines.Run) -> list[Point]:
+    """Measure a multibody engine at its steps."""
+    steps = engines.time_steps(case, engine.first_step, engine.last_step, 0.5)
+    found = (engines.fastest(run, case, step, 2) for step in steps)
+    return [Point(result.error, result.seconds) for result in found]
+
+
+def measured(case: Case, say: Callable[[str], None]) -> dict[str, list[Point]]:
+    """Return the points of all solvers that are installed, ours first."""
+    found = {OURS: in_process(case, "integration"), "Linkwork, all outputs": in_process(case, "whole")}
+    found |= {f"SciPy {method}": by_scipy_at(case, method) for method in SCIPY_METHODS}
+    found["multiplier form, SciPy DOP853"] = at_tolerances(case, partial(by_multipliers, case), 1)
+    mujoco, exudyn = engines.ENGINES
+    for name, engine, run in (
+        ("MuJoCo", mujoco, partial(engines.run_mujoco, iterations=2)),
+        ("MuJoCo, its model file alone", mujoco, partial(engines.run_mujoco, stiffened=False)),
+        ("Exudyn", exudyn, partial(engines.run_exudyn, newton_tolerance=1e-9)),
+    ):
+        try:
+            found[name] = by_engine(case, engine, run)
+        except ImportError as error:
+            say(f"left out, not installed (extra 'bench'): {error.name or error}")
+    return found
+
+
+def at_accuracy(points: Iterable[Point]) -> float:
+    """Return the least time of the points that reach the accuracy."""
+    return min(point.seconds for point in points if point.error <= ACCURACY)
+
+
+def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
+    """Plot error against time, a panel for each case."""
+    panels = []
+    for case, solvers in found.items():
+        unit = at_accuracy(solvers[OURS])
+        curves = []
+        for name, points in solvers.items():
+            x, y = zip(*((p.seconds / unit, p.error) for p in points if isfinite(p.error) and p.error < 1.0))
+            width = 2.2 if name.startswith("Linkwork") else 1.0
+            # there are fewer colours than solvers
+            again = len(curves) >= len(COLOURS)
+            line, label = "--" if again else "-", "" if panels else name
+            curves.append(Curve(x=x, y=y, label=label, marker="o", width=width, line=line, hollow=again))
+        panels.append(
+            Panel(
+                x_label="time, over that of our integration to 1e-6",
+                y_label="error of the slider position",
+                title=_TITLES[case],
+                curves=curves,
+                logarithmic="xy",
+                legend_at="" if panels else "outside",
+            )
+        )
+    return plot_curves(panels, title="Work and precision")
+
+
+def costs(most: int) -> list[tuple[int, float, float]]:
+    """Measure ensembles: number of runs, time of each over that of one alone, in lanes and one after the other."""
+    speed = SETS["table-3.1"].crank_speed
+    settings = {"stop_time": 0.1, "step": 1e-2}
+    alone = best_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40, process_time)
+    rows = []
+    for count in (count for count in COUNTS if count <= most):
+        values = {"slider.stiffness": np.linspace(500.0, 1500.0, count)}
+
+        def together(values: dict[str, Any] = values) -> object:
+            return simulate_many(TABLE_3_1, Inputs(speed=speed), vary=values, outputs=["slider.position"], **settings)
+
+        repeats = max(1, min(20, 20_000 // count))
+        lanes = best_time(together, repeats, process_time)
+        with without_lanes():
+            apart = best_time(together, max(1, repeats // 4), process_time)
+        rows.append((count, lanes / count / alone, apart / count / alone))
+    return rows
+
+
+def cost_picture(rows: list[tuple[int, float, float]]) -> Any:
+    """Plot the cost of a run over the number of runs."""
+    counts, lanes, apart = zip(*rows)
+    curves = [
+        Curve(x=counts, y=apart, label="one after the other", marker="o"),
+        Curve(x=counts, y=lanes, label="in lanes", marker="o", width=2.2),
+    ]
+    panel = Panel(
+        x_label="runs",
+        y_label="time of a run, over that of one alone",
+        curves=curves,
+        logarithmic="xy",
+        legend_at="best",
+    )
+    return plot_curves([panel], title="Cost of a run in an ensemble: Table 3.1, 0.1 s, one core")
+
+
+def main() -> None:
+    parser = ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="where the pictures go")
+    parser.add_argument("--runs", type=int, default=COUNTS[-1], help="most runs of an ensemble (default: %(default)s)")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    console = Console(width=110)
+    found = {case.name: measured(case, lambda text: console.print(text, highlight=False)) for case in CASES}
+    picture(found).savefig(options.folder / "work-precision.png", dpi=110)
+    rows = costs(options.runs)
+    cost_picture(rows).savefig(options.folder / "cost-of-runs.png", dpi=110)
+    table = Table("runs", "in lanes", "one after the other", title="time of a run, over that of one alone")
+    for count, lanes, apart in rows:
+        table.add_row(f"{count:,}", f"{lanes:.3f}", f"{apart:.3f}")
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()
