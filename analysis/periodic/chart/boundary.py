@@ -24,7 +24,7 @@ from linkwork.errors import LinkworkError
 
 from ...numerics.boundaries import Test, lowest
 from ...numerics.continuation import ContinuationError, End, Evaluate, Evaluation, Follower, Settings
-from ..motion.discretisation import OrbitError, operating_point
+from ..motion.discretisation import Discretisation, OrbitError, collocation_serves, operating_point
 from ..motion.floquet import Crossing, crossing_test
 from ..motion.orbit import PeriodicOrbit, orbit_of, trial_orbit
 from ..motion.variables import Family, Plane
@@ -113,15 +113,19 @@ def follow_crossing(
 def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
     """Return G = (y(T) - y(0), test) of the unknowns (y(0), x) and the parameter y, with its derivatives."""
     n = len(scale) - 1
+    (low, high), (bottom, top) = settings.bounds[n], (settings.low, settings.high)
+    corners = [operating_point(*at(a, b)) for a in (low, high) for b in (bottom, top)]
+    whole = np.array([0.0, corners[0].flow.period * turns])
+    path = Discretisation(whole, collocation_serves([c.drive for c in corners], [c.parameters for c in corners]))
 
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
         point = operating_point(*at(float(z[n]), float(z[n + 1])))
-        orbit, shift = trial_orbit(point, z[:n], turns)
+        orbit, shift = trial_orbit(point, z[:n], turns, path)
         # the test has no dimension; it gets the scale of x, in whose row it stands
         return np.append(shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
     steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
-    high = np.append(np.full(n, np.inf), [settings.bounds[n][1], settings.high])
+    most = np.append(np.full(n, np.inf), [high, top])
 
     def evaluation(unknowns: NDArray[np.float64], parameter: float) -> Evaluation:
         z = np.append(unknowns, parameter)
@@ -130,7 +134,7 @@ def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64],
         for j, step in enumerate(steps):
             there = z.copy()
             # into the box, where there is a mechanism for certain
-            there[j] += step if z[j] + step <= high[j] else -step
+            there[j] += step if z[j] + step <= most[j] else -step
             columns[:, j] = (values(there)[0] - here) / (there[j] - z[j])
         columns[:n, :n] = orbit.monodromy - np.eye(n)
         return Evaluation(here, columns[:, :-1], columns[:, -1], orbit)

@@ -323,7 +323,14 @@ class Discretisation:
         self._value: float | None = None
         self._mesh = self._firsts = np.empty(0)
 
-    def ends(self, point: OperatingPoint, starts: FloatArray, value: float, direction: Direction, along: float) -> Ends:
+    def ends(
+        self,
+        point: OperatingPoint,
+        starts: FloatArray,
+        value: float = 0.0,
+        direction: Direction | None = None,
+        along: float = 1.0,
+    ) -> Ends:
         """Compute the ends of the pieces from their beginnings at a value of lambda: see `OperatingPoint.shoot`.
 
         Raises OrbitError if a piece cannot be followed.

@@ -516,17 +516,26 @@ def solve_orbit(point: OperatingPoint, turns: int, guess: FloatArray) -> Periodi
     )
 
 
-def trial_orbit(point: OperatingPoint, start: FloatArray, turns: int) -> tuple[PeriodicOrbit, FloatArray]:
+def trial_orbit(
+    point: OperatingPoint, start: FloatArray, turns: int, path: Discretisation | None = None
+) -> tuple[PeriodicOrbit, FloatArray]:
     """Follow one period from a start; return it as an orbit, even if it does not close, and y(T) - y(0).
 
-    Raises OrbitError if the period cannot be followed.
+    ``path`` is the period as one piece, followed from the last motion. Raises OrbitError if it cannot be followed.
     """
-    period = point.period(start, turns)
-    residual = float(np.abs(period.shift / point.scale(start)).max())
+    path = path or Discretisation(np.array([0.0, point.flow.period * turns]), False)
+    ends = path.ends(point, start[None, :])
+    shift = ends.y[0] - start
     made = make_orbit(
-        point, turns=turns, start=start.copy(), monodromy=period.monodromy, residual=residual, iterations=1
+        point,
+        turns=turns,
+        start=start.copy(),
+        monodromy=ends.matrices[0].copy(),
+        residual=float(np.abs(shift / point.scale(start)).max()),
+        iterations=1,
+        nearest=ends.clearance,
     )
-    return made, period.shift
+    return made, shift
 
 
 class OrbitEquations:
