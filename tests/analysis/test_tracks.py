@@ -84,6 +84,33 @@ def test_lanes_take_the_steps_of_one_motion_alone(drive: Drive, columns: int) ->
     assert len(set(statuses.tolist())) > 1
 
 
+@kernel(int64(SECTION, MATRIX, VECTOR, VECTOR, VECTOR), purpose="a test")
+def deflate(section: Any, known: Any, start: Any, z: Any, correction: Any) -> int:
+    """Return what follows one integration from a start to z, and write the correction."""
+    hunt = kernels.make_hunt(start.shape[0])
+    kernels.begin_hunt(start, hunt)
+    what = kernels.deflated_next(section, 9, 1e9, DONE, known, z, hunt)
+    for i in range(start.shape[0]):
+        correction[i] = hunt.correction[i]
+    return what
+
+
+def test_known_motions_are_divided_out_by_their_distances() -> None:
+    """Newton's step of F times the product of 1 + 1/d^2, from the definition."""
+    generator = np.random.default_rng(8)
+    section = operating_point(RIG, Drive(speed=30.0)).section(np.zeros(2), *USED)
+    scale = section.scale
+    start, known = scale * generator.normal(size=2), scale * generator.normal(size=(3, 2))
+    end, monodromy = start + 0.1 * scale * generator.normal(size=2), generator.normal(size=(2, 2))
+    correction = np.zeros(2)
+    assert deflate(section, known, start, np.concatenate([end, monodromy.T.ravel()]), correction) == kernels.GOING
+    square = (((start - known) / scale) ** 2).sum(axis=1)
+    factor = np.prod(1.0 + 1.0 / square)
+    slope = factor * (-2.0 / (square * (1.0 + square)) * ((start - known) / scale**2).T).sum(axis=1)
+    jacobian = factor * (monodromy - np.eye(2)) + np.outer(end - start, slope)
+    assert correction == pytest.approx(np.linalg.solve(jacobian, factor * (start - end)), rel=1e-9)
+
+
 def test_the_motions_of_a_grid_close_and_differ() -> None:
     """Each closes after a turn, and no two are the same."""
     rig = SETS["rig-1-spring-b"].parameters
