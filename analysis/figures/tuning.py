@@ -22,14 +22,14 @@ _GREATEST = 2.0
 def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
-    what, si = orbit.swing
+    what, si = orbit.flow.components[0]
     unit, factor = display_of(si)
     family = tuned.after.response.family
     scale, of_x = (RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (1.0, family.unit)
     low, high = (level / scale for level in tuned.wish.span)
     span = [level / scale for level in (tuned.after.response.low, tuned.after.response.high)]
     rows = (
-        (f"amplitude of {what} [{unit}]", lambda b: factor * b.amplitude),
+        (f"amplitude of {spoken(what)} [{unit}]", lambda b: factor * b.amplitude),
         (
             f"largest Floquet multiplier,\nunstable above 1 (cut at {_GREATEST:g})",
             lambda b: np.minimum(b.largest_multiplier, _GREATEST),

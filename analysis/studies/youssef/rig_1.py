@@ -128,7 +128,7 @@ def draw_rig_1(result: StudyResult) -> Figure:
     panels = [
         Panel(
             x_label="crank speed [rpm]",
-            y_label="amplitude of u [cm]",
+            y_label="slider amplitude [cm]",
             title=title,
             curves=curves,
             verticals=verticals,
@@ -280,7 +280,7 @@ def draw_friction(result: StudyResult) -> Figure:
             panels.append(
                 Panel(
                     x_label=x_label,
-                    y_label="amplitude of u [cm]" if lines else "slider position u [cm]",
+                    y_label="slider amplitude [cm]" if lines else "slider position u [cm]",
                     title=title,
                     curves=curves_of(result, x, names),
                     verticals=lines,

@@ -189,7 +189,7 @@ def draw_resonance(spring: str, result: StudyResult) -> Figure:
     """Draw the amplitude relative to l4 over the speed."""
     panel = Panel(
         x_label="crank speed [rpm]",
-        y_label="amplitude of u / l4",
+        y_label="slider amplitude / $l_4$",
         title=f"rig 2, spring {spring}",
         curves=[
             Curve(
