@@ -354,14 +354,16 @@ def draw_forces(result: StudyResult) -> Figure:
 
 
 def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: str = "") -> Panel:
+    """Return a panel; that of the second spring, on the right, has the legend for both."""
+    first = spring == "C"
     return Panel(
         x_label="crank speed [rpm]",
         y_label=y_label,
         title=f"spring {spring}",
-        curves=lines,
+        curves=[replace(line, label="") for line in lines] if first else lines,
         verticals=marks(spring, 1),
         legend=legend,
-        legend_at="upper left",
+        legend_at="outside",
         x_range=(SLOWEST, FASTEST[spring]),
         y_range=(0.0, top),
     )
