@@ -432,28 +432,31 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     """Return the panel of the first harmonics of one-turn motions, each marked with its number."""
     single = [(n, branch) for n, branch in enumerate(branches) if branch.turns == 1] or list(enumerate(branches))
     names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
-    curves, top, least = [], 0.0, np.inf
+    tops = [float(np.nanmax(branch.columns()[name], initial=0.0)) for _, branch in single for name in names]
+    top = look.scale * max(tops, default=0.0)
+    least = top
+    curves: list[Curve] = []
     letters: list[Curve] = []
     for order, name in enumerate(names):
         options: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "width": THIN}
         label = f"harmonic {order + 1}"
         for n, branch in single:
             y = look.scale * branch.columns()[name]
-            y = np.where(y > 0.0, y, np.nan)
-            top = max(top, float(np.nanmax(y, initial=0.0)))
+            # what is smaller is rounding
+            y = np.where(y > _SMALL * top, y, np.nan)
             least = min(least, float(np.nanmin(y, initial=np.inf)))
             curves += _along(branch, n, look, y, **options)
             x = look.factor * branch.parameter
             # beside those of the other harmonics, whose curves may be near
             shift = (order + 1.0) / (len(names) + 1.0) - 0.5
             stable = np.where(_unstable(branch), np.nan, y)
-            letters.append(_letters(x, stable, str(order + 1), shift=shift, **options | {"label": label}))
-            label = "" if len(np.asarray(letters[-1].x)) else label
-    y_range = (max(_SMALL * top, 0.5 * least), 2.0 * top) if top > 0.0 else None
+            if np.isfinite(stable).any():
+                letters.append(_letters(x, stable, str(order + 1), shift=shift, label=label, **options))
+                label = ""
+    y_range = (0.5 * least, 2.0 * top) if top > 0.0 else None
     if y_range:
         width = look.factor * float(np.ptp(np.concatenate([branch.parameter for _, branch in single])))
-        letters = _apart(letters, width, y_range[1] / y_range[0])
-    curves += [curve for curve in letters if len(np.asarray(curve.x))]
+        curves += _apart(letters, width, y_range[1] / y_range[0])
     one = f",\none turn [{look.shown}]" if len(single) < len(branches) else f"\n[{look.shown}]"
     return Panel(
         x_label=look.axis,
