@@ -60,7 +60,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
             )
         )
     changed = [
-        f"{spoken(name)} {scaled * before:.4g} to {scaled * after:.4g} {quantity}"
+        f"{spoken(name)} {scaled * before:.5g} to {scaled * after:.5g} {quantity}"
         for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
         for quantity, scaled in [display_of(unit_of(tuned.wish.mechanism, name))]
     ]
