@@ -255,9 +255,10 @@ def closed_form_pictures() -> Iterator[Picture]:
     from analysis.figures import plot
     from analysis.synthesis import guidance, load_synthesis_case
 
-    for name, count in (("five-poses", 6), ("four-poses", 1)):
+    for name, dpi in (("five-poses", 100), ("four-poses", 92)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        yield name, plot(guidance(case.task, count), title=case.title), {"five-poses": 100, "four-poses": 92}[name]
+        # as many as the command asks for
+        yield name, plot(guidance(case.task, 6), title=case.title), dpi
 
 
 def linkage_pictures() -> Iterator[Picture]:

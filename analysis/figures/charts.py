@@ -280,8 +280,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
     name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
     drawn, scale = display_of(position_unit)
     half = len(found.motions[0].start) // 2
-    what, unit = found.motions[0].swing
-    shown, factor = display_of(unit)
+    shown, factor = display_of(found.motions[0].swing[1])
     curves = []
     for stable, marker in ((True, "o"), (False, "x")):
         those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]
@@ -295,7 +294,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
                     colour="0.05",
                     label="stable motion" if stable else "unstable motion",
                     hover={
-                        f"amplitude of {what} [{shown}]": [factor * orbit.amplitude for orbit in those],
+                        f"amplitude of {spoken(name)} [{shown}]": [factor * orbit.amplitude for orbit in those],
                         "largest multiplier": [orbit.largest for orbit in those],
                     },
                 )
@@ -309,7 +308,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
     names = [
-        f"ends in motion {n}{'' if orbit.turns == 1 else f' of {orbit.turns} turns'}, amplitude of {what} "
+        f"ends in motion {n}{'' if orbit.turns == 1 else f' of {orbit.turns} turns'}, amplitude of {spoken(name)} "
         f"{factor * orbit.amplitude:.3g} {shown}"
         for n, orbit in enumerate(found.motions, start=1)
     ]

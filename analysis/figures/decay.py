@@ -37,6 +37,7 @@ def plot_decay(
         Panel(x_label="time [s]", y_label=f"position [{unit}]" if unit else "position", curves=curves),
         Panel(
             x_label="swing",
+            x_ticks=cycles.tolist(),
             y_label="logarithmic decrement of a cycle",
             curves=[
                 Curve(

@@ -214,17 +214,18 @@ class _Scene:
         turn = np.degrees(q.crank_angle) % 360.0
         radius = max(0.5 * CM_PER_METRE * self.parameters.crank_length, 1.3 * unit)
         arc: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 3}
-        axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=0.0, theta2=turn, **arc))
-        half = np.radians(max(0.5 * turn, _LEAST_TURN))
-        theta = (radius + 0.95 * unit) * np.array([cos(half), sin(half)])
-        self._write(axis, theta, r"$\theta_2$")
+        taken = []
+        if turn > 1.0:
+            axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=0.0, theta2=turn, **arc))
+            half = np.radians(max(0.5 * turn, _LEAST_TURN))
+            taken.append((radius + 0.95 * unit) * np.array([cos(half), sin(half)]))
+            self._write(axis, taken[0], r"$\theta_2$")
         # each pin's letter goes where it has most room
         centre = (q.b + q.c + q.d) / 3.0
         a = np.zeros(2)
         foot = np.array([0.0, -2.0 * unit])
         links = [(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p)]
         lines = MultiLineString([*links, (a, foot), (a, self.zero), self.rail])
-        taken = [theta]
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
         for name, pin in pins.items():
             # where several places have as much room, outside the loop

@@ -10,7 +10,7 @@ from ..units import RAD_S_PER_RPM
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
 from .runs import display_unit
-from .style import Figure
+from .style import Figure, spoken
 
 #: Samples of a period.
 _SAMPLES = 512
@@ -42,7 +42,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     def closed(name: str) -> tuple[np.ndarray, str]:
         """Return an output over the period in drawn units, with its first value repeated at the end, and its label."""
         unit, factor = display_unit(variables[name])
-        return factor * np.append(turn[name], turn[name][0]), f"{name} [{unit}]"
+        return factor * np.append(turn[name], turn[name][0]), f"{spoken(name)} [{unit}]"
 
     angle = np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns))
     ticks = np.linspace(0.0, angle[-1], 5).tolist()
@@ -90,7 +90,7 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
         turn = orbit.turn(_SAMPLES)
         variable = next(v for v in mechanism_of(orbit.parameters).variables if v.name == turn.swing)
         unit, factor = display_unit(variable)
-        label = f"{turn.swing} [{unit}]"
+        label = f"{spoken(turn.swing)} [{unit}]"
         stable = orbit in found.stable
         curves.append(
             Curve(

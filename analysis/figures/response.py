@@ -46,11 +46,13 @@ _HIDDEN = 1.5 * LINE
 #: Relative error (%) that counts as none; harmonic, relative to the greatest, that does.
 _NONE, _SMALL = 1e-3, 2e-5
 #: Height above the valleys about it, relative to the axis, from which a peak has a text.
-_STANDS_OUT = 0.01
+_STANDS_OUT = 0.005
 #: Share of the axis within which crossings have one text.
 _CASCADE = 0.01
 #: Letters along a branch.
 _LETTERS = 7
+#: Distance (points) along an axis from which letters are clear of one another.
+_LETTER = 11.0
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -430,33 +432,54 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     """Return the panel of the first harmonics of one-turn motions, each marked with its number."""
     single = [(n, branch) for n, branch in enumerate(branches) if branch.turns == 1] or list(enumerate(branches))
     names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
-    curves, top = [], 0.0
+    tops = [float(np.nanmax(branch.columns()[name], initial=0.0)) for _, branch in single for name in names]
+    top = look.scale * max(tops, default=0.0)
+    least = top
+    curves: list[Curve] = []
+    letters: list[Curve] = []
     for order, name in enumerate(names):
         options: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "width": THIN}
         label = f"harmonic {order + 1}"
         for n, branch in single:
             y = look.scale * branch.columns()[name]
-            y = np.where(y > 0.0, y, np.nan)
-            top = max(top, float(np.nanmax(y, initial=0.0)))
+            # what is smaller is rounding
+            y = np.where(y > _SMALL * top, y, np.nan)
+            least = min(least, float(np.nanmin(y, initial=np.inf)))
             curves += _along(branch, n, look, y, **options)
             x = look.factor * branch.parameter
             # beside those of the other harmonics, whose curves may be near
             shift = (order + 1.0) / (len(names) + 1.0) - 0.5
             stable = np.where(_unstable(branch), np.nan, y)
-            letters = _letters(x, stable, str(order + 1), shift=shift, label=label, **options)
-            if len(np.atleast_1d(letters.x)):
-                curves.append(letters)
+            if np.isfinite(stable).any():
+                letters.append(_letters(x, stable, str(order + 1), shift=shift, label=label, **options))
                 label = ""
+    y_range = (0.5 * least, 2.0 * top) if top > 0.0 else None
+    if y_range:
+        width = look.factor * float(np.ptp(np.concatenate([branch.parameter for _, branch in single])))
+        curves += _apart(letters, width, y_range[1] / y_range[0])
     one = f",\none turn [{look.shown}]" if len(single) < len(branches) else f"\n[{look.shown}]"
     return Panel(
         x_label=look.axis,
         y_label=f"harmonics of {look.what}{one}",
         curves=curves,
         logarithmic="y",
-        y_range=(_SMALL * top, 2.0 * top) if top > 0.0 else None,
+        y_range=y_range,
         legend_at="above",
         shades=shades,
     )
+
+
+def _apart(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
+    """Return letters without those that stand on others, in a panel of this width and this ratio of its logarithmic axis."""
+    points = 72.0 * 0.85 * np.array([_SIZE[0], 0.75 * _HARMONICS * _SIZE[1]]) / (width or 1.0, np.log(ratio))
+    taken: list[FloatArray] = []
+    kept = []
+    for curve in letters:
+        places = points * np.column_stack([curve.x, np.log(np.asarray(curve.y, dtype=float))])
+        free = [not taken or float(np.abs(taken - place).max(axis=1).min()) > _LETTER for place in places]
+        taken += list(places[free])
+        kept.append(replace(curve, x=np.asarray(curve.x)[free], y=np.asarray(curve.y)[free]))
+    return kept
 
 
 def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shade]) -> Panel:

@@ -17,7 +17,20 @@ from linkwork.variables import UNITS, Variable
 from ..mechanisms import MECHANISMS, mechanism_of
 from ..run import Trajectory
 from .dispatch import draw_mechanism, has_picture, plot
-from .style import COLOURS, LINES, MARKED, SMALL, Figure, finish, legend_above, spoken, styled, write_notes, write_title
+from .style import (
+    COLOURS,
+    HAIR,
+    LINES,
+    MARKED,
+    SMALL,
+    Figure,
+    finish,
+    legend_above,
+    spoken,
+    styled,
+    write_notes,
+    write_title,
+)
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -148,7 +161,9 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
     middle = np.array([time[part].mean() for part in parts])
     ends = np.array([(values[part].min(), values[part].max()) for part in parts])
     (drawn,) = axis.plot(middle, [_smooth_mean(values[part]) for part in parts], line, label=label or None)
-    axis.fill_between(middle, *ends.T, color=drawn.get_color(), alpha=0.25, linewidth=0.0)
+    colour = drawn.get_color()
+    # with edges bands are told apart that lie over each other
+    axis.fill_between(middle, *ends.T, facecolor=(colour, 0.15), edgecolor=(colour, 0.6), linewidth=HAIR)
 
 
 def _smooth_mean(values: FloatArray) -> float:

@@ -38,7 +38,7 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
     """Plot motion, torque and joint forces over the crank angle, by components in a frame.
 
     Curves leave their axes towards poles and limits of assembly, and have gaps where there is no mechanism. Dead centres and
-    limits are dashed lines, named at the foot; so is what is zero throughout, which has no panel.
+    limits are dashed lines, named at the foot; so is what is zero or constant throughout, which has no panel.
 
     Parameters
     ----------
@@ -68,8 +68,13 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
     sizes = {name: _largest(curves.values()) for name, _, curves in contents}
     scales = {si: max(sizes[name] for name, other, _ in contents if other == si) for _, si, _ in contents}
     zero = [name for name, si, _ in contents if sizes[name] <= _ZERO * scales[si]]
-    panels = [_force_panel(turn, name, si, *known[si], curves) for name, si, curves in contents if name not in zero]
+    still = {name: _constant(curves, *known[si]) for name, si, curves in contents if name not in zero}
+    panels = [
+        _force_panel(turn, name, si, *known[si], curves) for name, si, curves in contents if still.get(name) == ""
+    ]
     notes = [f"Dashed: {', '.join(_marks(turn))}."] if _marks(turn) else []
+    said = [f"{name} {value}" for name, value in still.items() if value]
+    notes += [f"Constant, not drawn: {'; '.join(said)}."] if said else []
     notes += [f"Zero throughout, not drawn: {'; '.join(zero)}."] if zero else []
     return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5), notes=notes)
 
@@ -77,6 +82,13 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
 def _largest(curves: Iterable[Any]) -> float:
     """Return the largest magnitude of curves where they are determined."""
     return max(float(np.nanmax(np.abs(np.ma.filled(values, np.nan)), initial=0.0)) for values in curves)
+
+
+def _constant(curves: Mapping[str, Any], unit: str, one: float) -> str:
+    """Return the value of a single curve that is constant but for rounding, in a unit of the value ``one`` in SI."""
+    values = np.concatenate([np.ma.compressed(np.ma.masked_invalid(values)) for values in curves.values()])
+    constant = len(curves) == 1 and len(values) and np.ptp(values) <= _ZERO * np.abs(values).max()
+    return f"{values[0] / one:.4g} {unit}" if constant else ""
 
 
 def _marks(turn: ForceTurn) -> dict[str, float]:

@@ -136,10 +136,10 @@ def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> Non
     for piece in scene.curves:
         axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=THIN, zorder=2)
     if not scene.curves:
-        # of a function of the rocker's angle, the ways of B and C
-        places = [pins for phi in _around(scene) if (pins := scene.pins(float(phi))) is not None]
+        # of a function of the rocker's angle, the ways of B and C, with gaps where the links cannot be joined
+        places = [scene.pins(float(phi)) for phi in scene.transmission[0]]
         for name, colour in (("B", CRANK), ("C", ROCKER)):
-            way = MM_PER_METRE * np.array([pins[name] for pins in places])
+            way = MM_PER_METRE * np.array([(np.nan, np.nan) if pins is None else pins[name] for pins in places])
             axis.plot(*way.T, color=colour, alpha=0.35, linewidth=THIN, zorder=2)
     if traced and scene.traced is not None:
         axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=BOLD, zorder=4)

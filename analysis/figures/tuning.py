@@ -22,16 +22,18 @@ _GREATEST = 2.0
 def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     """Plot amplitude and largest Floquet multiplier over the speed before and after the change, unstable motions dashed."""
     orbit = tuned.after.response.branches[0].orbits[0]
-    what, si = orbit.swing
+    what, si = orbit.flow.components[0]
     unit, factor = display_of(si)
     family = tuned.after.response.family
     scale, of_x = (RAD_S_PER_RPM, "rpm") if family.unit == "rad/s" else (1.0, family.unit)
     low, high = (level / scale for level in tuned.wish.span)
     span = [level / scale for level in (tuned.after.response.low, tuned.after.response.high)]
+    branches = [branch for survey in (tuned.before, tuned.after) for branch in survey.response.branches]
+    cut = max(float(branch.largest_multiplier.max()) for branch in branches) > _GREATEST
     rows = (
-        (f"amplitude of {what} [{unit}]", lambda b: factor * b.amplitude),
+        (f"amplitude of {spoken(what)} [{unit}]", lambda b: factor * b.amplitude),
         (
-            f"largest Floquet multiplier,\nunstable above 1 (cut at {_GREATEST:g})",
+            "largest Floquet multiplier,\nunstable above 1" + (f" (cut at {_GREATEST:g})" if cut else ""),
             lambda b: np.minimum(b.largest_multiplier, _GREATEST),
         ),
     )
@@ -40,8 +42,8 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
         curves: list[Curve] = []
         # the curve after the change is seen on the one before where both are the same
         for colour, width, when, survey in (
-            (COLOURS[1], 2.5 * LINE, "before", tuned.before),
-            (COLOURS[0], LINE, "after", tuned.after),
+            (COLOURS[1], 2.5 * LINE, "" if number else "before", tuned.before),
+            (COLOURS[0], LINE, "" if number else "after", tuned.after),
         ):
             curves += _curves(survey, value, colour, width, when, scale)
         if number:
@@ -51,14 +53,14 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
                 x_label=f"{spoken(family.name)} [{of_x}]",
                 y_label=label,
                 curves=curves,
-                shades=[Shade(low=low, high=high, label="range to be kept clear")],
+                shades=[Shade(low=low, high=high, label="" if number else "range to be kept clear")],
                 x_range=(span[0], span[1]),
                 y_range=_in_view(curves),
                 legend_at="above",
             )
         )
     changed = [
-        f"{spoken(name)} {scaled * before:.6g} to {scaled * after:.6g} {quantity}"
+        f"{spoken(name)} {scaled * before:.5g} to {scaled * after:.5g} {quantity}"
         for name, before, after in zip(tuned.wish.names, tuned.wish.present, tuned.values)
         for quantity, scaled in [display_of(unit_of(tuned.wish.mechanism, name))]
     ]

@@ -171,10 +171,11 @@ class TestForces:
         assert low < clear.min()
         assert clear.max() < high
         titles = [a.get_title() for a in figure.axes]
-        # neither the axial force nor the moment of the guide, which are zero but for rounding
-        assert len(titles) == 8
+        # neither the axial force nor the moment of the guide, which are zero but for rounding, nor the torque that is given
+        assert len(titles) == 7
         assert figure.get_supxlabel().splitlines() == [
             "Dashed: dead centre 99.3°, dead centre 285.3°.",
+            "Constant, not drawn: crank torque 11.3 N.m.",
             "Zero throughout, not drawn: axial force on the crank; moment of the guide on the slider.",
         ]
         assert not any(axis.texts for axis in figure.axes)

@@ -261,8 +261,8 @@ def test_solutions_say_what_they_are() -> None:
 def test_a_picture_of_a_periodic_motion() -> None:
     fixed, free = find_orbit("table-3.1"), find_orbit("table-3.1", torque=0.5, start=[0.0, 0.0, 44.0])
     labels = [axis.get_ylabel() for axis in figures.plot(fixed).axes]
-    assert labels == ["slider.position [mm]", "drive.applied_torque [N.m]", "slider.velocity [m/s]", "imaginary part"]
-    assert "crank.speed [rpm]" in [axis.get_ylabel() for axis in figures.plot(free).axes]
+    assert labels == ["slider position [mm]", "drive applied torque [N.m]", "slider velocity [m/s]", "imaginary part"]
+    assert "crank speed [rpm]" in [axis.get_ylabel() for axis in figures.plot(free).axes]
     angle, plane, multipliers = (figures.plot(fixed, title="an orbit").axes[n] for n in (0, 2, 3))
     x, y = angle.lines[0].get_data()
     assert (x[0], x[-1], y[-1]) == (0.0, pytest.approx(360.0), y[0])

@@ -602,8 +602,8 @@ def rates() -> StudyResult:
     columns = {ANGLE: GRID_DEG}
     for case in ROW_F:
         lacking, mended = row_f(case)
-        columns[f"row 37f as printed; {case.name} [in/s]"] = lacking
-        columns[f"row 37f mended; {case.name} [in/s]"] = mended
+        columns[f"opening of the loop as printed; {case.name} [in/s]"] = lacking
+        columns[f"opening of the loop mended; {case.name} [in/s]"] = mended
     return StudyResult(
         number="rahman-rates",
         claim="Eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
@@ -1007,9 +1007,9 @@ def conclusions() -> StudyResult:
 
 
 #: Labels of the axes by the unit of their columns.
-_SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "row 37f", "[lb]": "4F4k"}
+_SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "opening of the loop", "[lb]": "4F4k"}
 #: Columns drawn dashed, over the others.
-_DASHED = ("37f mended", "both mended", "Davidon")
+_DASHED = ("loop mended", "both mended", "Davidon")
 
 
 def draw(result: StudyResult) -> Figure:

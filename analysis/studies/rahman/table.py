@@ -143,7 +143,7 @@ FIGURES: Mapping[str, Figure] = MappingProxyType(
         CONSTANT: Figure(
             "all",
             ("1F1k", "2F2j", "2F2k"),
-            "What Rahman finds to be constant: 1F1k, 2F2j, 2F2k, 4T4",
+            "Joint forces and moments that Rahman finds constant over the turn",
             "sections 2.8, 3.2",
         )
     }

@@ -256,7 +256,7 @@ def draw_drift(result: StudyResult) -> Figure:
         y_range=(-8.5, 2.0),
     )
     second = replace(
-        first, curves=[*curves, *others, key], legend=DAMPING_LEGEND, legend_at="lower center", x_range=(0.0, 40.0)
+        first, curves=[*curves, *others, key], legend=DAMPING_LEGEND, legend_at="above", x_range=(0.0, 40.0)
     )
     return plot_curves([first, second], title=result.heading, columns=2, size=(4.6, 3.7))
 

@@ -422,7 +422,7 @@ def draw_path(result: StudyResult, *, timed: bool) -> Figure:
     """Draw target and both curves, their distances over the crank's rotation or along the target, and the linkages."""
     place = result.columns["place on the target [deg]"]
     distances = Panel(
-        x_label="crank rotation [deg]" if timed else "ωt of the ellipse [deg]",
+        x_label="crank rotation [deg]" if timed else "place on the ellipse, its parameter [deg]",
         y_label="distance from the target [cm]",
         title="error over a turn" if timed else "error round the target",
         curves=[

@@ -128,7 +128,7 @@ def draw_rig_1(result: StudyResult) -> Figure:
     panels = [
         Panel(
             x_label="crank speed [rpm]",
-            y_label="amplitude of u [cm]",
+            y_label="slider amplitude [cm]",
             title=title,
             curves=curves,
             verticals=verticals,
@@ -276,17 +276,18 @@ def draw_friction(result: StudyResult) -> Figure:
             ("amplitude", f"speed; spring {s} [rpm]", "crank speed [rpm]", f"spring {s}", verticals),
             ("u", "crank angle [deg]", "crank angle [deg]", f"spring {s}, {speed:g} rpm", None),
         ):
-            names = {f"{what}; coefficient {c:g}; spring {s} [cm]": f"{c:g}" for c in COEFFICIENTS}
+            # the panel on the right has the legend for both
+            names = {f"{what}; coefficient {c:g}; spring {s} [cm]": "" if lines else f"{c:g}" for c in COEFFICIENTS}
             panels.append(
                 Panel(
                     x_label=x_label,
-                    y_label="amplitude of u [cm]" if lines else "slider position u [cm]",
+                    y_label="slider amplitude [cm]" if lines else "slider position u [cm]",
                     title=title,
                     curves=curves_of(result, x, names),
                     verticals=lines,
                     legend="coefficient",
-                    legend_at="best" if lines else "outside",
-                    x_ticks=None if lines else range(0, 361, 45),
+                    legend_at="outside",
+                    x_ticks=None if lines else range(0, 361, 90),
                 )
             )
     return plot_curves(panels, title=result.heading, columns=2, size=(5.2, 3.6))

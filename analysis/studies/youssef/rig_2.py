@@ -189,7 +189,7 @@ def draw_resonance(spring: str, result: StudyResult) -> Figure:
     """Draw the amplitude relative to l4 over the speed."""
     panel = Panel(
         x_label="crank speed [rpm]",
-        y_label="amplitude of u / l4",
+        y_label="slider amplitude / $l_4$",
         title=f"rig 2, spring {spring}",
         curves=[
             Curve(
@@ -354,14 +354,16 @@ def draw_forces(result: StudyResult) -> Figure:
 
 
 def _panel(spring: str, y_label: str, lines: list[Curve], top: float, legend: str = "") -> Panel:
+    """Return a panel; that of the second spring, on the right, has the legend for both."""
+    first = spring == "C"
     return Panel(
         x_label="crank speed [rpm]",
         y_label=y_label,
         title=f"spring {spring}",
-        curves=lines,
+        curves=[replace(line, label="") for line in lines] if first else lines,
         verticals=marks(spring, 1),
         legend=legend,
-        legend_at="upper left",
+        legend_at="outside",
         x_range=(SLOWEST, FASTEST[spring]),
         y_range=(0.0, top),
     )
