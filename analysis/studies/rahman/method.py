@@ -323,8 +323,9 @@ def closure() -> StudyResult:
             (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operators()),),
         ),
         Statement(
-            "This algorithm is the combination of Davidon-Fletcher-Powell optimization routine with the "
-            "Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
+            "The numerical method being used to determine the displacements is based on the algorithm (12) introduced "
+            "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
+            "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
             text("section 2.6.1, L366; abstract, L45"),
             "what the combination, as we read it, leaves of the rotation round the loop and of S4, greatest of the turn",
             f"{ROUNDING}; the closure with true ball joints leaves less",
@@ -919,6 +920,7 @@ def conclusions() -> StudyResult:
         for case in ALL
         if case.shift_in or case.twist_deg != IDEAL.twist_deg
     ]
+    cases = f"the {len(ended)} cases out of the plane whose loop the printed iteration closes"
     closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
     numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
     right = {symbol: values(_PLANE, COMPONENTS[symbol]) for symbol in _PLANAR}
@@ -942,8 +944,7 @@ def conclusions() -> StudyResult:
             Statement(
                 "This verifies the feasibility of the method.",
                 text("section 3.2, L1111"),
-                "share of the nine cases out of the plane, and of a4 = 20 in alone, whose loop the printed iteration "
-                "closes",
+                f"share of {cases}",
                 "all of them",
                 (at_least("cases closed", 1.0, closed),),
                 "the plane, in which eta2 = eta3 = 0, does not show erratum 1",
@@ -978,7 +979,7 @@ def conclusions() -> StudyResult:
                 "Since this method is well adapted for digital computation, any complex system can be analyzed using this "
                 "analytical tool.",
                 last,
-                "the same share",
+                f"share of {cases}",
                 "all of them",
                 (at_least("cases closed", 1.0, closed),),
                 "it does not analyse its own mechanism out of the plane (erratum 1)",
@@ -987,8 +988,7 @@ def conclusions() -> StudyResult:
                 "The main advantages of this method are its generality and that all calculations can be performed on "
                 "digital computer.",
                 last,
-                "generality: the same share; calculations: share of the cases in which the iteration ends with numbers all "
-                "over the turn",
+                f"generality: share of {cases}; calculations: share of them in which it ends with numbers all over the turn",
                 "all of them",
                 (at_least("generality", 1.0, closed), at_least("calculations", 1.0, numbers)),
                 "it is not general (erratum 1)",

@@ -246,8 +246,9 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "A good technique is to find the optimum values of linkage parameters to yield a minimum error over a "
-                "decreased number of specified output points.",
-                text("6.3.1, L4349"),
+                "decreased number of specified output points. These values are then used again in the optimisation but this "
+                "time taking all the specified output points into consideration.",
+                text("6.3.1, L4349-4359"),
                 f"probability that the errors at the end of {SEARCHES} searches which begin with {FEWER_POINTS} points are "
                 "so much lower than those of as many from random sets by chance (rank test)",
                 f"{CHANCE:g}, as is usual",
@@ -257,7 +258,8 @@ def compute() -> StudyResult:
                 "Another useful technique is to perform the optimisation for a decreased number of linkage parameters and "
                 "to use the values obtained in the initial guesses of the complete optimisation programme.",
                 text("6.3.1, L4359"),
-                "the same of searches that begin with X0, Y0, l2, a1 and th20 alone",
+                f"probability that the errors at the end of {SEARCHES} searches which begin with X0, Y0, l2, a1 and th20 alone "
+                "are so much lower than those of as many from random sets by chance (rank test)",
                 f"{CHANCE:g}, as is usual",
                 (at_most("by chance", CHANCE, chance[techniques[2]], why=luck),),
             ),

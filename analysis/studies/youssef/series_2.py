@@ -171,7 +171,8 @@ def moved_rocker() -> StudyResult:
                 "All the examples discussed in the previous chapter have been tried and in all cases the errors were "
                 "reduced.",
                 text("7.3.2, L5935; also 6.4.2, L4874, L4969"),
-                "error with two harmonics of the slider over that with the pivot fixed, the printed links kept",
+                "error with two harmonics of the slider, its stroke at most a fifth of the longest link, over that with the "
+                "pivot fixed, the printed links kept",
                 fewer,
                 tuple(at_most(name, 1.0 - ALIKE, share) for name, share in reduced().items()),
             ),
@@ -316,8 +317,8 @@ def moved_path() -> StudyResult:
                 "achieved anywhere within this envelope, thereby permitting a closer approximation to a desired path by "
                 "suitable control of U than could otherwise be obtained.",
                 text("7.0, L5248"),
-                "area between the path and the curve with two harmonics over that with the pivot fixed, the printed links "
-                "kept",
+                "area between the path and the curve with two harmonics of the slider, its stroke at most a fifth of the "
+                "longest link, over that with the pivot fixed, the printed links kept",
                 f"below {1.0 - ALIKE:g}, as a fall that is seen",
                 tuple(at_most(name, 1.0 - ALIKE, share) for name, share in paths.items()),
             ),
