@@ -252,7 +252,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
             "[sigma2] = 0.01 and increasing very slightly with increase of [sigma2].",
             text("5.3.1, L3876-3882"),
             "axis A of the right linear equation at sigma2 = 0.01, and its growth up to 0.1",
-            f"half a unit of the last digit; {SIGN}",
+            f"half a unit of the last digit: *approximately* is no 15 % of an A that departs from 2 by hundredths; {SIGN}",
             (
                 near(
                     "A",

@@ -156,8 +156,8 @@ def kinematics() -> tuple[Statement, ...]:
             "[A] proper control of the slider enabled modifications and more accurate generation of outputs than could "
             "otherwise be obtained.",
             text("9.1, L7012"),
-            "error with two harmonics of the slider over that with the pivot fixed, the most of the eight problems of "
-            "chapter VI",
+            "error with two harmonics of the slider over that with the pivot fixed, as in Fig 7.11, the most of the eight "
+            "problems of chapter VI",
             f"below {1.0 - ALIKE:g}, as a fall that is seen",
             (at_most("most of eight problems", 1.0 - ALIKE, max(reduced().values())),),
         ),
