@@ -11,6 +11,7 @@ function of each TABLE.
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Callable, Container, Iterator
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.mechanisms import MECHANISMS
+from analysis.studies.contents import SENTENCES
 from linkwork.parameters import field_name
 from linkwork.variables import Variable
 
@@ -159,6 +161,14 @@ def commanded(of: str, page: str) -> str:
     from benchmarks.commanded import markdown, read
 
     return markdown(read(HERE / "commanded.csv"))
+
+
+def sentences() -> str:
+    """Return what the studies on the pages of both theses are about, as `linkwork figures --list` prints it."""
+    from analysis.studies.page import sentences
+
+    found = [sentences((HERE / f"{page}.md").read_text(encoding="utf-8")) for page in ("youssef", "rahman")]
+    return json.dumps({**found[0], **found[1]}, indent=0, ensure_ascii=False) + "\n"
 
 
 #: The parts of the pages of the theses: chapters of Youssef's, Rahman's figures, and our own studies.
@@ -366,6 +376,11 @@ def main(arguments: list[str]) -> int:
             stale.append(path.name)
             if "--check" not in arguments:
                 path.write_text(new, encoding="utf-8")
+    listed = sentences()
+    if not SENTENCES.exists() or SENTENCES.read_text(encoding="utf-8") != listed:
+        stale.append(SENTENCES.name)
+        if "--check" not in arguments:
+            SENTENCES.write_text(listed, encoding="utf-8")
     if stale and "--check" in arguments:
         sys.exit(f"out of date, run python docs/generate.py: {', '.join(stale)}")
     return 0

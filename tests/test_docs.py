@@ -19,7 +19,8 @@ import yaml
 
 from analysis import cli
 from analysis.mechanisms import PUBLISHED
-from analysis.studies import RAHMAN, YOUSSEF
+from analysis.studies import RAHMAN, STUDIES, YOUSSEF
+from analysis.studies.contents import sentences
 from analysis.studies.page import MOST_BYTES, quotes
 from analysis.studies.statements import FAILS, HOLDS, IN_PART
 from analysis.studio import PAGE, case_of
@@ -39,6 +40,11 @@ def generate():
 def test_the_tables_of_the_documentation_are_up_to_date(generate):
     stale = [page.name for page in generate.PAGES if generate.filled(page.read_text()) != page.read_text()]
     assert stale == [], "run: make docs"
+
+
+def test_the_list_of_figures_is_about_the_statements_of_the_pages(generate):
+    assert generate.sentences() == generate.SENTENCES.read_text(encoding="utf-8"), "run: make docs"
+    assert set(sentences()) == set(STUDIES)
 
 
 def test_every_mechanism_has_its_tables(generate):

@@ -496,7 +496,7 @@ def _print_fmu(path: Path) -> None:
 @click.argument("numbers", nargs=-1)
 @out_option("out/figures", help="Folder.")
 @set_option("rod.length='45 in'; bare numbers are in SI. The verdicts are then on the changed mechanism")
-@click.option("--list", "listing", is_flag=True, help="Only list the figures, with the places of their statements.")
+@click.option("--list", "listing", is_flag=True, help="Only list the figures, with what each is about.")
 @handled
 def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: bool) -> None:
     """Make the theses' figures, a still and an animation of the linkage: plots, CSV, and each statement with its verdict.
@@ -512,11 +512,17 @@ def figures(numbers: Sequence[str], out: str, settings: Sequence[str], listing: 
     from textwrap import indent
 
     from ..studies import ENTRIES, STUDIES, make
+    from ..studies.contents import sentences
 
     if listing:
+        about = sentences()
         for number, study in STUDIES.items():
             place = ENTRIES[number].place
-            console.print(f"{number:>8}  {study}{place and f' ({place})'}", highlight=False, soft_wrap=True)
+            console.print(
+                f"{number:>8}  {study}{place and f' ({place})'}", highlight=False, markup=False, soft_wrap=True
+            )
+            for sentence in about[number]:
+                console.print(f"{'':>10}{sentence}", highlight=False, markup=False, soft_wrap=True)
         return
     values = changes(settings, number_or_text, "rod.length='45 in'")
     if values and not numbers:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
+
+#: What the statements of each study are about, from the pages of the theses; written by docs/generate.py.
+SENTENCES = Path(__file__).with_name("sentences.json")
 
 
 class Entry(NamedTuple):
@@ -15,3 +21,9 @@ class Entry(NamedTuple):
     title: str
     module: str = ""
     place: str = ""
+
+
+def sentences() -> Mapping[str, list[str]]:
+    """Return the statements that each study judges, shortened, with their places, by its number."""
+    found: dict[str, list[str]] = json.loads(SENTENCES.read_text(encoding="utf-8"))
+    return found

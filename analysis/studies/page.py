@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..figures import Figure, resize
 from . import ENTRIES, STUDIES, file_stem, load
-from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement
+from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement, shortened
 
 #: Folder of the plots beside the page, their width (in, px) and most bytes.
 PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
@@ -18,7 +18,7 @@ PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
 THREE_PANELS = 11.0
 #: What a page has of a statement: its quote, kind of source and place, measure and tolerance, verdict.
 _STATEMENT = re.compile(
-    rf"^> (.*)\n> \((text|program), .*\)\n\n(?:Measured: .*\n\n)?\*\*({'|'.join(OUTCOMES)})\*\*",
+    rf"^> (.*)\n> \((text|program), (.*)\)\n\n(?:Measured: .*\n\n)?\*\*({'|'.join(OUTCOMES)})\*\*",
     flags=re.MULTILINE | re.IGNORECASE,
 )
 
@@ -96,14 +96,24 @@ def save_small(figure: Figure, path: Path) -> None:
 
 def quotes(page: str) -> list[tuple[str, str]]:
     """Return quote and verdict of each statement on a page."""
-    return [(quote, outcome.lower()) for quote, _, outcome in _STATEMENT.findall(page)]
+    return [(quote, outcome.lower()) for quote, _, _, outcome in _STATEMENT.findall(page)]
+
+
+def sentences(page: str) -> dict[str, list[str]]:
+    """Return what each study on a page is about: its statements, shortened, with their places, and where others are judged."""
+    _, *parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
+    return {
+        number: [f"judged at {see}" for see in re.findall(r"are judged at Fig (\S+)\.$", part, flags=re.MULTILINE)]
+        + [f'"{shortened(quote)}" ({place})' for quote, _, place, _ in _STATEMENT.findall(part)]
+        for number, part in zip(parts[::2], parts[1::2])
+    }
 
 
 def count(page: str) -> str:
     """Return a sentence with the number of statements on a page by their verdicts."""
     found = _STATEMENT.findall(page)
     number = Counter(outcome.lower() for *_, outcome in found)
-    listed = sum(kind == "program" for _, kind, _ in found)
+    listed = sum(kind == "program" for _, kind, *_ in found)
     return (
         f"Of {len(found)} statements of the thesis {number[HOLDS]} hold, {number[IN_PART]} hold in part, "
         f"{number[FAILS]} do not hold, and {number[UNJUDGED]} cannot be judged, each with the reason. {listed or 'None'} of "

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-#: "About", "approximately", "nearly", "almost", "in the region of" a number: largest departure relative to it.
+#: "About", "approximately", "nearly", "almost", "near", "around", "similar", "in the region of" a number: largest
+#: departure relative to it.
 ABOUT = 0.15
 #: The same of an angle, which has no natural zero (deg).
 ABOUT_DEG = 10.0
@@ -17,8 +18,9 @@ READ, READ_DEG = 0.02, 3.0
 
 #: The rule as the pages print it.
 RULE = (
-    "**Words of degree.** One rule holds on both pages. *About*, *approximately*, *nearly*, *almost*, *in the region of*: "
-    f"within {100 * ABOUT:g} % of the number, or within {ABOUT_DEG:g} deg of an angle. *Slightly*, *a little*: a change by at "
+    "**Words of degree.** One rule holds on both pages. *About*, *approximately*, *nearly*, *almost*, *near*, *around*, *in "
+    f"the region of*, *similar*: within {100 * ABOUT:g} % of the number, or within {ABOUT_DEG:g} deg of an angle, or within "
+    "half of one where whole cycles are counted. *Slightly*, *a little*: a change by at "
     f"most {100 * SLIGHTLY:g} %, and by more than {100 * ALIKE:g} %. *Small*, *negligible*: at most {100 * SMALL:g} % of what "
     f"it is compared with. *The same*, *constant*, *linear*, *straight*, *steady*: within {100 * ALIKE:g} % of the scale, "
     f"which no one sees on a graph. A number that was read from a graph: within {100 * READ:g} % of its scale, or "

@@ -15,6 +15,11 @@ TEXT, LISTING = "text", "listing"
 HOLDS, IN_PART, FAILS, UNJUDGED = OUTCOMES = ("holds", "holds in part", "does not hold", "cannot be judged")
 
 
+def shortened(quote: str) -> str:
+    """Return a quote that a line of a terminal can hold, cut at the end of a word."""
+    return quote if len(quote) <= 120 else f"{quote[:100].rsplit(' ', 1)[0]} ..."
+
+
 class Source(NamedTuple):
     """Source of a statement: its kind, and its place in the thesis (section, lines L of the scanned text)."""
 
@@ -182,9 +187,8 @@ class Statement:
         return len({case.why for case in self.cases if not case.holds}) > 1
 
     def __str__(self) -> str:
-        quote = self.quote if len(self.quote) <= 120 else f"{self.quote[:100].rsplit(' ', 1)[0]} ..."
         outcome = self.outcome if self.outcome == HOLDS else self.outcome.upper()
-        lines = [f'"{quote}" ({self.source.words})', f"  {outcome}{self.reason and f': {self.reason}'}"]
+        lines = [f'"{shortened(self.quote)}" ({self.source.words})', f"  {outcome}{self.reason and f': {self.reason}'}"]
         for case in self.cases if len(self.cases) > 1 else ():
             why = [case.why] if self.reasons_differ and not case.holds else []
             lines.append("; ".join([f"    {case.label}: {case.outcome}", *case.numbers, *why]))

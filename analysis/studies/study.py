@@ -92,7 +92,9 @@ class Study:
             for name in changes:
                 if not known:
                     raise InputError(
-                        f"figure {self.number} has no parameters that can be changed: {name} means nothing in it"
+                        f"figure {self.number} has no parameters that can be changed: {name} means nothing in it; those of "
+                        "Youssef's chapters III and VIII and Rahman's R5 to R38 have, and analysis.youssef.slider_equation "
+                        "takes any for the equation of chapters IV and V"
                     )
                 if name not in known:
                     raise unknown_name(name, sorted(known), f"parameter {name!r} of figure {self.number}")

@@ -34,6 +34,18 @@ def test_the_combined_quality_function() -> None:
         assert both(found).combined < both(linkages()[other]).combined
 
 
+@pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "ellipse-a-bounded"])
+def test_a_small_change_of_an_angle_lowers_the_error_of_a_printed_linkage(name: str) -> None:
+    """The printed linkages for the ellipses are no minima, not even nearby."""
+    p = PROBLEMS[name]
+    errors = []
+    for field in ("point_angle", "ground_angle", "crank_phase"):
+        for change in (-0.01, -0.001, 0.001, 0.01):
+            other = replace(p.linkage, **{field: getattr(p.linkage, field) + change})
+            errors.append(evaluate(p.task, other).error)
+    assert min(errors) < 0.99 * evaluate(p.task, p.linkage).error
+
+
 def circle(radius: float, n: int) -> np.ndarray:
     """Points of a circle about the origin at equal steps, shape (n, 2)."""
     angle = 2.0 * np.pi * np.arange(n) / n

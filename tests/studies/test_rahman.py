@@ -532,6 +532,8 @@ class TestFiles:
         assert listed.exit_code == 0
         assert "R5  Slider displacement S4" in listed.output
         assert "rahman-closure  Rahman's loop closure" in listed.output
+        assert '"Slider displacement curves are almost semi-sinusoidal type' in listed.output
+        assert " judged at R5\n" in listed.output
         made = runner.invoke(main, ["figures", "R5", "--out", str(tmp_path)])
         assert made.exit_code == 0, made.output
         assert "DOES NOT HOLD" in made.output

@@ -519,7 +519,7 @@ def torque_result() -> StudyResult:
                 "deg].",
                 text("3.2.1, L1989-1993"),
                 "crank angle at which the torque passes zero between its greatest and least value, "
-                f"{low_at + 360 - high_at:.0f} deg apart",
+                f"{low_at + 360 - high_at:.0f} deg apart; {_k(1e6)}",
                 f"{ABOUT_DEG:g} deg, the rule for *in the region of* an angle",
                 (near(_k(1e6), "0", reversal, ABOUT_DEG, "deg"),),
             ),
@@ -560,7 +560,8 @@ def torque_result() -> StudyResult:
                 "presents no external load on the mechanism. The only effect results from the slight change in the "
                 "geometry which leads to changes in inertial loads.",
                 text("3.2.1, L2005-2013"),
-                "share of the inertial loads, all but the weight, in the same difference",
+                f"share of the inertial loads, all but the weight, in the difference of the torque between {_k(5e5)} and 2e6, "
+                "at the extremes",
                 f"{ALIKE:g}, the rule for *the same*",
                 tuple(near(f"{name} torque", 1.0, 1.0 - x, ALIKE) for name, (_, x) in shares.items()),
             ),

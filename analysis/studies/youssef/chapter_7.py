@@ -34,10 +34,10 @@ method, exact at each crank angle, and by a direct search for a Fourier series.
 
 *What stands.* Precision points may be kept while the motion between them changes. The coupler that points at the desired
 point gives the least error, exactly. Two harmonics of the slider reduce the error of all eight problems of chapter VI, that
-of the weighted rocker function fifty times. For path (b) the printed series gives the stated 4.3 cm2 once A0 = 3.1 is read
-as 0.31 and the guide's angle is taken from the horizontal. Cams of a few centimetres can drive such a slider; a drive
-without feedback fails on a machine that is not quite as modelled, and feedback holds the motion to a quarter of a per cent
-of the stroke.
+of the weighted rocker function fifty times where its stroke is not limited. For path (b) the printed series gives the
+stated 4.3 cm2 once A0 = 3.1 is read as 0.31 and the guide's angle is taken from the horizontal. Cams of a few centimetres
+can drive such a slider; a drive without feedback fails on a machine that is not quite as modelled, and feedback holds the
+motion to a quarter of a per cent of the stroke.
 
 *What does not.* The envelope has a hole where all curves of the family go round the same place: P reaches 24 to 85 % of
 what it encloses, by the limits of U. If the coupler cannot point at the desired point the rocker need not stand upright:

@@ -54,8 +54,8 @@ What can be judged is what the theory gives for the printed masses, springs and 
 *What stands.* The motion repeats itself after one turn of the crank at every speed that was run, and is stable. With spring
 A four peaks a turn become two at 452 rpm (450 in the thesis). The natural frequencies lie in the regions stated. Rig 2 is
 in resonance at 586 and 828 rpm (585 and 825), moves as a damped mass on a spring does, and the linear equation is within
-half a per cent of the full ones there. Friction in the guide by a coefficient of 0.05 changes the amplitudes with spring A
-slightly, and the phase by 3 deg, as the thesis says.
+three per cent of the full ones at all its speeds. Friction in the guide by a coefficient of 0.05 changes the amplitudes
+with spring A slightly, and the phase by 3 deg, as the thesis says.
 
 *What does not.* The amplitude of rig 1 is greatest near half the natural frequency, at 296 and 564 rpm, where the thesis
 has 290 and 580: its two natural frequencies are as 2 to 1, but springs of 3 and 11 on the same links make them 592 and 1133
@@ -528,7 +528,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
                 for s, n, part in fractions
             ),
             f"with a coefficient of friction of {rig_1.STRONG:g} in the guide the greatest of these rises is {hidden:.3f}, "
-            "but that is not slight (rig-1-friction); no figure is for a speed so low",
+            "but so much friction changes the amplitudes more than slightly (rig-1-friction); no figure is for a speed so low",
         ),
         Statement(
             "This suggested [a slider] solution based on the first and second harmonics, and that the third and higher "

@@ -230,7 +230,7 @@ def compute() -> StudyResult:
                 (near("", "2", evaluations_a_step(), 0.0),),
             ),
             Statement(
-                "The Hamming fourth order modified predictor-corrector is the method chosen here.",
+                "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
                 text("2.4, L1407-1409"),
                 "order at which the error of u falls with the step; modifier and final value take the leading error "
                 "out, and add one",

@@ -201,7 +201,7 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 #: How the rise of the crank speed is judged.
 RISE = (
     "greatest distance of the crank speed, up to its peak, from the nearest line, relative to the peak; crank angle "
-    "of the peak, which the points at 1 rad follow"
+    "of the peak, for which we take p1 and p2, while the torque acts up to 1 rad"
 )
 
 
