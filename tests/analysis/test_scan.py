@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import analysis.synthesis as syn
 from analysis.synthesis.search.polish import sum_of_squares
-from analysis.synthesis.search.scan import SHAPES, Candidates, _placed, _shapes, scan
+from analysis.synthesis.search.scan import SHAPES, Candidates, _placed, _shapes, _timed, scan
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
@@ -64,6 +64,17 @@ class TestVariableProjection:
         found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), replace(KNOWN, output_angle=0.9))
+
+    def test_rotations_of_untimed_points_are_in_order_and_go_all_round(self) -> None:
+        normal, limits = stated(syn.PrecisionPoints(points=KNOWN.path(syn.turn(5))))
+        shapes = np.tile(shape(KNOWN), (200, 1))
+        found = _timed(normal, limits, shapes, 1, np.random.default_rng(3)).rotation
+        assert found is not None
+        steps = np.diff(found, axis=1)
+        assert ((steps > 0.0).all(axis=1) | (steps < 0.0).all(axis=1)).all()
+        assert (steps[:, 0] > 0.0).any()
+        assert (steps[:, 0] < 0.0).any()
+        assert 1.9 * pi < np.abs(found).max() < 2.0 * pi
 
     def test_a_rocker_function_is_compared_at_its_mounting_angle(self) -> None:
         rotation = syn.turn(12)

@@ -503,6 +503,13 @@ LIGHT = replace(
 )
 
 
+def test_a_run_is_stiff_by_what_decays_in_a_step() -> None:
+    """With steps of 10 ms a decay of 1000/s is fast, one of 10/s is not."""
+    fast, slow = (cautions.stiffness(np.array([-rate + 0j]), 2000.0, 20.0, 1.0) for rate in (1000.0, 10.0))
+    assert "stiff" in fast
+    assert slow == ""
+
+
 def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cautions, "_PATIENCE", 100_000)
     whole, cut = (
