@@ -214,7 +214,7 @@ class _Scene:
         turn = np.degrees(q.crank_angle) % 360.0
         radius = max(0.5 * CM_PER_METRE * self.parameters.crank_length, 1.3 * unit)
         arc: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 3}
-        taken = []
+        taken: list[NDArray[np.float64]] = []
         if turn > 1.0:
             axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=0.0, theta2=turn, **arc))
             half = np.radians(max(0.5 * turn, _LEAST_TURN))

@@ -86,7 +86,8 @@ def _largest(curves: Iterable[Any]) -> float:
 
 def _constant(curves: Mapping[str, Any], unit: str, one: float) -> str:
     """Return the value of a single curve that is constant but for rounding, in a unit of the value ``one`` in SI."""
-    values = np.concatenate([np.ma.compressed(np.ma.masked_invalid(values)) for values in curves.values()])
+    values = np.concatenate([np.array(np.ma.filled(given, np.nan)) for given in curves.values()])
+    values = values[np.isfinite(values)]
     constant = len(curves) == 1 and len(values) and np.ptp(values) <= _ZERO * np.abs(values).max()
     return f"{values[0] / one:.4g} {unit}" if constant else ""
 
