@@ -45,7 +45,7 @@ FROM_A_FILE = {
 LIBRARY = Path(__file__).parents[1] / "examples" / "linkages"
 #: The linkage that fills the cache for the others.
 BEFORE = "toggle-press"
-#: The smallest and the largest leg, one with gears, one with springs as bearings.
+#: Two legs, one with gears, one with springs as bearings.
 MEASURED = ("klann", "jansen", "geared-five-bar", "elastic-bearing")
 
 
