@@ -56,8 +56,8 @@ class Picture:
                 joints.append(Marked(end, f"pitch line of {rack.rack}", f"*({x1}, {y1}, 0.0)"))
             parts.append(f'Part("axis", {tuple(ends)!r}, "pitch line of {rack.rack}")')
             tick = f"arm(b.{rack.gear}_frame.turn, p.{name}_radius, 0.0)"
-            joints.append(self.tick(rack.gear, pin.name, tick))
-            parts.append(f'Part("gear", ("{pin.name}", "{rack.gear}Tick"), "pitch circle of {rack.gear}")')
+            joints.append(self.tick(name, rack.gear, pin.name, tick))
+            parts.append(f'Part("gear", ("{pin.name}", "{name}{rack.gear}Tick"), "pitch circle of {rack.gear}")')
         for name, gear in d.gears.items():
             carrier, pins = self.bearings(gear.bodies)
             (x0, y0), (x1, y1) = (self.interface.own(carrier, pin) for pin in pins)
@@ -65,8 +65,8 @@ class Picture:
             share = f"p.{name}_ratio * (p.{name}_ratio - 1.0) / ((p.{name}_ratio - 1.0) ** 2 + 1e-12)"
             for body, pin, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):
                 tick = f"arm(b.{body}_frame.turn, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
-                joints.append(self.tick(body, pin, tick))
-                parts.append(f'Part("gear", ("{pin}", "{body}Tick"), "pitch circle of {body}")')
+                joints.append(self.tick(name, body, pin, tick))
+                parts.append(f'Part("gear", ("{pin}", "{name}{body}Tick"), "pitch circle of {body}")')
         parts += [f'Part("pivot", ("{own}",), "bearing {own}")' for own in d.ground if own in self.structure.joints]
         parts += [f'Part("axis", {s.between!r}, "{name}")' for name, s in d.springs.items() if s.between]
         for name, body in d.bodies.items():
@@ -76,9 +76,9 @@ class Picture:
                 parts.append(f'Part("link", {through!r}, "{name}")')
         return joints, parts
 
-    def tick(self, gear: str, pin: str, arm: str) -> Marked:
+    def tick(self, pair: str, gear: str, pin: str, arm: str) -> Marked:
         """Return the point of a gear on its pitch circle, from its bearing by the expression ``arm``."""
-        return Marked(f"{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)")
+        return Marked(f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)")
 
     def bearings(self, bodies: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
         """Return the body that carries two gears, and the pins of both on it."""
