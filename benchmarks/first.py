@@ -1,6 +1,11 @@
 """Waiting times: imports, first results on an empty cache of compiled code, and the same again.
 
     python -m benchmarks.first
+    python -m benchmarks.first linkages
+    python -m benchmarks.first linkages klann watt-1
+
+The second and third are of the library's linkages: from the file to a run and to a native FMU, on an empty cache, on one
+that another linkage has filled, and once more.
 
 Each is a process of its own; times are by the clock, and of the processor, which other programs change less.
 """
@@ -12,6 +17,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 from time import perf_counter
 
 from rich.console import Console
@@ -31,6 +37,17 @@ WAITS = {
     ),
 }
 
+#: What is done with the file of a linkage, whose path follows.
+FROM_A_FILE = {
+    "run": ("-m", "analysis.cli", "run"),
+    "native FMU": ("-m", "analysis.cli", "build", "--kinds", "native", "--dest", "."),
+}
+LIBRARY = Path(__file__).parents[1] / "examples" / "linkages"
+#: The linkage that fills the cache for the others.
+BEFORE = "toggle-press"
+#: Two legs, one with gears, one with springs as bearings.
+MEASURED = ("klann", "jansen", "geared-five-bar", "elastic-bearing")
+
 
 def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
     """Measure seconds by the clock and of the processor, and count the announced compilations."""
@@ -44,8 +61,32 @@ def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
     return f"{seconds:.2f}", f"{processor:.2f}", str(done.stderr.count("linkwork: compiling"))
 
 
+def linkages(names: list[str]) -> Table:
+    """Measure how long a linkage takes from its file to a run and to a native FMU."""
+    table = Table(title="from file; seconds by the clock, of the processor; compilations")
+    for heading in (
+        "",
+        *("empty cache", "s", "compiled"),
+        *("another before", "s", "compiled"),
+        *("again", "s", "compiled"),
+    ):
+        table.add_column(heading, justify="right" if heading else "left")
+    for name in names:
+        for what, command in FROM_A_FILE.items():
+            measured, other = ((*command, str(LIBRARY / f"{own}.toml")) for own in (name, BEFORE))
+            with tempfile.TemporaryDirectory() as folder:
+                alone = waited(measured, folder)
+            with tempfile.TemporaryDirectory() as folder:
+                waited(other, folder)
+                table.add_row(f"{name}: {what}", *alone, *waited(measured, folder), *waited(measured, folder))
+    return table
+
+
 def main() -> None:
     """Measure and print."""
+    if sys.argv[1:2] == ["linkages"]:
+        Console(width=140).print(linkages(sys.argv[2:] or list(MEASURED)))
+        return
     table = Table(title="seconds by the clock, of the processor; compilations")
     for heading in ("", *("first", "s", "compiled"), *("again", "s", "compiled")):
         table.add_column(heading, justify="right" if heading else "left")

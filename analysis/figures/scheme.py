@@ -124,6 +124,11 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
     elif part.kind in ("guide", "axis"):
         style = "-." if part.kind == "guide" else ":"
         axis.plot(*np.array([first, last]).T, color="0.6", linewidth=HAIR, linestyle=style, zorder=1)
+    elif part.kind == "gear":
+        # the radius to the second point, and the circle from there
+        turns = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73)) * complex(*(last - first))
+        rim = first + np.column_stack([turns.real, turns.imag])
+        axis.plot(*np.vstack([first, rim]).T, color="0.5", linewidth=THIN, zorder=2)
     elif part.kind in ("slider", "spring"):
         along = (through[2] - through[1]) / np.linalg.norm(through[2] - through[1])
         across = np.array([-along[1], along[0]])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .description import GROUND, given
 from .parameters import Interface, size
-from .structure import Freed, Pin, on_one_body, sliders
+from .structure import Freed, Geared, Pin, on_one_body, sliders
 from .writing import function, quoted
 
 
@@ -50,7 +50,23 @@ class Picture:
             side, line = "" if slide.bodies[1] == rack.rack else "-", f"b.{slide.name}_line"
             x, y = (f"b.at_{pin.name}.{c} {s} {side}p.{name}_radius * {line}.{t}" for c, s, t in ("x+s", "y-c"))
             joints.append(Marked(f"{name}Pitch", f"pitch point of {name}", f"*({x}, {y}, 0.0)"))
-            parts.append(f'Part("axis", ("{pin.name}", "{name}Pitch"), "radius of {rack.gear}")')
+            ends = {f"{name}Line": "-", f"{name}LineEnd": "+"}
+            for end, sign in ends.items():
+                x1, y1 = (f"{at} {sign} {0.5 * length!r} * {line}.{t}" for at, t in ((x, "c"), (y, "s")))
+                joints.append(Marked(end, f"pitch line of {rack.rack}", f"*({x1}, {y1}, 0.0)"))
+            parts.append(f'Part("axis", {tuple(ends)!r}, "pitch line of {rack.rack}")')
+            tick = f"arm(b.{rack.gear}_frame.turn, p.{name}_radius, 0.0)"
+            joints.append(self.tick(name, rack.gear, pin.name, tick))
+            parts.append(f'Part("gear", ("{pin.name}", "{name}{rack.gear}Tick"), "pitch circle of {rack.gear}")')
+        for name, gear in d.gears.items():
+            carrier, pins = self.bearings(gear.bodies)
+            (x0, y0), (x1, y1) = (self.interface.own(carrier, pin) for pin in pins)
+            # the pitch point divides the line of centres so that both gears have one velocity there
+            share = f"p.{name}_ratio * (p.{name}_ratio - 1.0) / ((p.{name}_ratio - 1.0) ** 2 + 1e-12)"
+            for body, pin, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):
+                tick = f"arm(b.{body}_frame.turn, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
+                joints.append(self.tick(name, body, pin, tick))
+                parts.append(f'Part("gear", ("{pin}", "{name}{body}Tick"), "pitch circle of {body}")')
         parts += [f'Part("pivot", ("{own}",), "bearing {own}")' for own in d.ground if own in self.structure.joints]
         parts += [f'Part("axis", {s.between!r}, "{name}")' for name, s in d.springs.items() if s.between]
         for name, body in d.bodies.items():
@@ -59,6 +75,18 @@ class Picture:
             if len(through) > 1:
                 parts.append(f'Part("link", {through!r}, "{name}")')
         return joints, parts
+
+    def tick(self, pair: str, gear: str, pin: str, arm: str) -> Marked:
+        """Return the point of a gear on its pitch circle, from its bearing by the expression ``arm``."""
+        return Marked(f"{pair}{gear}Tick", f"mark on {gear}", f"*(b.at_{pin}.x + {arm}.x, b.at_{pin}.y + {arm}.y, 0.0)")
+
+    def bearings(self, bodies: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+        """Return the body that carries two gears, and the pins of both on it."""
+        step = next(s for s in self.structure.steps if isinstance(s, Geared) and {s.body, s.mate} == set(bodies))
+        joints = [joint for joint in self.structure.joints.values() if isinstance(joint, Pin)]
+        return step.parent, tuple(
+            next(joint.name for joint in joints if {own, step.parent} <= set(joint.bodies)) for own in bodies
+        )
 
     def positions(self) -> str:
         """Write the function that computes the positions of the picture's points."""

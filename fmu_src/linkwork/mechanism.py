@@ -146,7 +146,8 @@ class Part(NamedTuple):
     kind : str
         ``pivot`` (a bearing of the ground at a point), ``link`` (through two points or more), ``guide`` (a line through two
         points), ``slider`` (a block at the first point, in the direction of the next two), ``spring``, ``damper`` (from a
-        slider to the ground, with the slider's points) or ``axis`` (a centre line through two points).
+        slider to the ground, with the slider's points), ``axis`` (a centre line through two points) or ``gear`` (the pitch
+        circle about the first point through the second, and its radius to there, which turns).
     joints : tuple of str
     text : str
         What it is.
@@ -161,7 +162,7 @@ class Part(NamedTuple):
 
 
 #: Points by kind of part: as many, or at least as many as a link has.
-PARTS = {"pivot": 1, "link": 2, "guide": 2, "slider": 3, "spring": 3, "damper": 3, "axis": 2}
+PARTS = {"pivot": 1, "link": 2, "guide": 2, "slider": 3, "spring": 3, "damper": 3, "axis": 2, "gear": 2}
 
 
 class Link(NamedTuple):

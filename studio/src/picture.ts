@@ -107,7 +107,7 @@ export class Picture {
       element("title", group).textContent = part.text;
       const drawn: SVGElement[] = [];
       if (part.kind === "link" && part.joints.length > 2) drawn.push(element("polygon", group));
-      const lines = { pivot: 1, link: 0, guide: 1, slider: 0, spring: 1, damper: 2, axis: 1 }[part.kind];
+      const lines = { pivot: 1, link: 0, guide: 1, slider: 0, spring: 1, damper: 2, axis: 1, gear: 1 }[part.kind];
       for (let i = 0; i < lines; i++) drawn.push(element("polyline", group));
       if (part.kind === "link") drawn.push(element("polyline", group));
       if (part.kind === "slider") drawn.push(element("polygon", group));
@@ -228,7 +228,14 @@ export class Picture {
     if (part.kind === "link")
       for (let n = 0; n < drawn.length; n++) set(n, n < drawn.length - 1 ? at : [a, b]);
     else if (part.kind === "axis") set(0, [a, b]);
-    else if (part.kind === "pivot") {
+    else if (part.kind === "gear") {
+      const rim = Array.from({ length: 73 }, (_, i): Point => {
+        const [c, s] = [Math.cos((i * Math.PI) / 36), Math.sin((i * Math.PI) / 36)];
+        const [x, y] = [b[0] - a[0], b[1] - a[1]];
+        return [a[0] + c * x - s * y, a[1] + s * x + c * y];
+      });
+      set(0, [a, ...rim]);
+    } else if (part.kind === "pivot") {
       const [x, y] = a;
       set(0, [a, [x - 11, y + 18], [x - 17, y + 18], [x + 17, y + 18], [x + 11, y + 18], a]);
     } else if (part.kind === "guide") {

@@ -39,7 +39,7 @@ export interface Joint {
 }
 
 export interface Part {
-  kind: "pivot" | "link" | "guide" | "slider" | "spring" | "damper" | "axis";
+  kind: "pivot" | "link" | "guide" | "slider" | "spring" | "damper" | "axis" | "gear";
   joints: number[];
   text: string;
   where: number;

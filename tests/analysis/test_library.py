@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import tomllib
 from collections.abc import Iterable
 from fractions import Fraction
@@ -174,6 +175,37 @@ def test_gears_turn_at_their_ratio():
     found = run("geared-five-bar")
     wanted = -2.0 * found["crank.angle"] + np.deg2rad(60.0)
     np.testing.assert_allclose(np.sin(found["second.angle"] - wanted), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["geared-five-bar", "rack-and-pinion"])
+def test_pitch_circles_are_drawn_and_roll_on_each_other(name):
+    made = load_linkage(FOLDER / f"{name}.toml")
+    drawing, known = made.drawing, made.first_set
+    start = made.state(known.initial)
+    circles = [part for part in drawing.parts if part.kind == "gear"]
+    p = known.parameters.constants()
+
+    def place(angle: float) -> dict[str, complex]:
+        x = drawing.positions((angle, *start[1:]), made.idle(p), p)
+        return {joint.name: complex(*x[3 * n : 3 * n + 2]) for n, joint in enumerate(drawing.joints)}
+
+    before, after = place(0.4), place(0.4 + 1e-6)
+    arcs = [
+        abs(before[mark] - before[pin]) * cmath.phase((after[mark] - after[pin]) / (before[mark] - before[pin]))
+        for pin, mark in (part.joints for part in circles)
+    ]
+    radii = [abs(before[mark] - before[pin]) for pin, mark in (part.joints for part in circles)]
+    if name == "geared-five-bar":
+        assert sum(radii) == pytest.approx(0.16)
+        assert arcs[0] == pytest.approx(-arcs[1], rel=1e-6)
+        assert arcs[0] > 0.0
+    else:
+        assert radii == pytest.approx([0.03])
+        # the pitch line is as far from the gear's bearing, and the rack moves by the arc
+        low, high = before["teethLine"], before["teethLineEnd"]
+        across = ((high - low).conjugate() * (before["E"] - low)).imag / abs(high - low)
+        assert abs(across) == pytest.approx(0.03)
+        assert abs(arcs[0]) == pytest.approx(abs(after["T"] - before["T"]), rel=1e-6)
 
 
 @pytest.mark.parametrize("start", ["5 deg", "-5 deg"])
