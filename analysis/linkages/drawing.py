@@ -63,10 +63,10 @@ class Picture:
             (x0, y0), (x1, y1) = (self.interface.own(carrier, pin) for pin in pins)
             # the pitch point divides the line of centres so that both gears have one velocity there
             share = f"p.{name}_ratio * (p.{name}_ratio - 1.0) / ((p.{name}_ratio - 1.0) ** 2 + 1e-12)"
-            for body, pin, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):
-                tick = f"arm(b.{body}_frame.turn, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
-                joints.append(self.tick(name, body, pin, tick))
-                parts.append(f'Part("gear", ("{pin}", "{name}{body}Tick"), "pitch circle of {body}")')
+            for wheel, bearing, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):
+                tick = f"arm(b.{wheel}_frame.turn, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
+                joints.append(self.tick(name, wheel, bearing, tick))
+                parts.append(f'Part("gear", ("{bearing}", "{name}{wheel}Tick"), "pitch circle of {wheel}")')
         parts += [f'Part("pivot", ("{own}",), "bearing {own}")' for own in d.ground if own in self.structure.joints]
         parts += [f'Part("axis", {s.between!r}, "{name}")' for name, s in d.springs.items() if s.between]
         for name, body in d.bodies.items():

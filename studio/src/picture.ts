@@ -107,7 +107,9 @@ export class Picture {
       element("title", group).textContent = part.text;
       const drawn: SVGElement[] = [];
       if (part.kind === "link" && part.joints.length > 2) drawn.push(element("polygon", group));
-      const lines = { pivot: 1, link: 0, guide: 1, slider: 0, spring: 1, damper: 2, axis: 1, gear: 1 }[part.kind];
+      const lines = { pivot: 1, link: 0, guide: 1, slider: 0, spring: 1, damper: 2, axis: 1, gear: 1 }[
+        part.kind
+      ];
       for (let i = 0; i < lines; i++) drawn.push(element("polyline", group));
       if (part.kind === "link") drawn.push(element("polyline", group));
       if (part.kind === "slider") drawn.push(element("polygon", group));
