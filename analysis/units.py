@@ -79,7 +79,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
         an angular speed, as a cycle is not a radian.
     """
     spelled = _PINT.get(unit, unit)
-    wanted = f"be a number in {unit}"
+    wanted = f"be a number in {unit}" if unit != "1" else "be a number"
     if unit != "1":
         wanted += f", or a text with a unit of that kind{f', such as {_USUAL[unit]}' if unit in _USUAL else ''}"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
@@ -196,7 +196,7 @@ _USUAL = {
     "N.m/rad": "N*m/rad or N*m/deg",
     "N.m.s/rad": "N*m*s/rad",
 }
-_PLAIN = "write a number with a decimal point, without spaces or separators in it, and a unit"
+_PLAIN = "write a number with a decimal point, without spaces or separators in it"
 
 
 def _respelled(text: str, unit: str) -> str:
@@ -211,7 +211,7 @@ def _convert(text: str, unit: str, spelled: str, name: str, wanted: str) -> floa
     match = _GRAMMAR.fullmatch(_respelled(text, unit)) if len(text) <= _LONGEST else None
     if match is None:
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
-        raise ParameterError(name, shown, f"{wanted}: {_PLAIN}")
+        raise ParameterError(name, shown, f"{wanted}: {_PLAIN}" + (", and a unit" if unit != "1" else ""))
     number, of = float(match[1]), match[2]
     if of is None:
         if unit == "1":

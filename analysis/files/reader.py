@@ -249,7 +249,9 @@ class Many:
         if self.single and not isinstance(value, list):
             return (self.item(value, name),)
         if not isinstance(value, list) or self.length not in (None, len(value)):
-            raise ParameterError(name, value, "be a list" if self.length is None else f"be a list of {self.length}")
+            raise ParameterError(
+                name, value, "be a list" if self.length is None else f"be a list of {self.length} entries"
+            )
         if len(value) < self.least:
             raise ParameterError(name, value, f"have at least {self.least} entries")
         return tuple(self.item(v, f"{name}[{k}]") for k, v in enumerate(value))

@@ -301,7 +301,7 @@ def analyse(description: Description) -> Structure:
         freedoms = _proposed(description, found, count)
     if len(freedoms) != count:
         raise LinkageError(
-            f"{says}, but {len(freedoms)} are given in linkage.freedoms ({', '.join(freedoms)}): they must be as many"
+            f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): they must be as many"
         )
     for name, freedom in freedoms.items():
         if freedom.joint not in found:
