@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 # every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
 PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo quick test test-all test-long lint docs figures bench bench-targets mutate studio release clean
+.PHONY: demo quick test durations test-all test-long lint docs figures bench bench-targets mutate studio release clean
 
 demo: $(RUN)
 	$(BIN)/python build_fmu.py
@@ -21,7 +21,12 @@ quick: $(DEV)
 
 test: $(DEV) lint
 	$(BIN)/python build_fmu.py
-	$(PYTEST) -m 'not slow' $(PARALLEL)
+	$(PYTEST) -m 'not slow and not seconds' $(PARALLEL)
+
+# on a quiet machine: which tests take seconds, and are left to test-all
+durations: $(DEV)
+	$(BIN)/python build_fmu.py
+	$(PYTEST) -m 'not slow' --note-seconds $(PARALLEL)
 
 test-all: $(DEV) lint
 	$(BIN)/python build_fmu.py

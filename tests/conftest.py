@@ -55,11 +55,34 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return Units(config, log)
 
 
+#: The tests that took so many seconds and more when they were last measured: ``make durations`` writes the file.
+SECONDS, LONGER = 2.0, Path(__file__).parent / "seconds.txt"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--note-seconds", action="store_true", help=f"write {LONGER.name}: tests of {SECONDS:g} s and more"
+    )
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Write the names of the tests that took longer, their fixtures not counted, which others share."""
+    if terminalreporter.config.getoption("note_seconds"):
+        calls = (report for report in terminalreporter.stats.get("passed", ()) if report.when == "call")
+        names = sorted(
+            report.nodeid for report in calls if report.duration >= SECONDS and "slow" not in report.keywords
+        )
+        LONGER.write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what builds or runs an FMU, and what is long as slow; on several cores what takes longest goes first."""
+    """Mark what takes longer, what builds or runs an FMU, and what is long as slow; on several cores the longest goes first."""
+    longer = frozenset(LONGER.read_text(encoding="utf-8").splitlines())
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: item.path.name not in ("test_docs.py", "test_chapter_8.py"))
     for item in items:
+        if item.nodeid in longer:
+            item.add_marker(pytest.mark.seconds)
         if item.get_closest_marker("long"):
             item.add_marker(pytest.mark.slow)
         if {"fmus", "natives"} & set(getattr(item, "fixturenames", ())) or item.path.parent.name == "fmu":
