@@ -56,7 +56,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 #: The tests that took so many seconds and more when they were last measured: ``make durations`` writes the file.
-SECONDS, LONGER = 2.0, Path(__file__).parent / "seconds.txt"
+SECONDS, LONGER = 1.5, Path(__file__).parent / "seconds.txt"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
