@@ -289,7 +289,7 @@ MISTAKES = [
     ("assembly", {"C": 2}, "linkage.assembly.C"),
     ("assembly", {"C": "left"}, "linkage.assembly.C"),
     ("assembly", {"B": 1}, "linkage.assembly"),
-    ("freedoms", {"a": "A", "d": "D"}, "2 are given"),
+    ("freedoms", {"a": "A", "d": "D"}, "linkage.freedoms has 2"),
     ("freedoms/crank/joint", "Z", "linkage.freedoms.crank"),
     ("freedoms/crank/start", "1 m", "linkage.freedoms.crank.start"),
     ("freedoms/crank/speed", "1 m/s", "linkage.freedoms.crank.speed"),
