@@ -950,6 +950,19 @@ def test_a_speed_that_contradicts_its_acceleration_is_named(five_bar: Library, m
     assert [said in text for _, text in c.log] == [True] * bool(said)
 
 
+def test_a_speed_that_contradicts_its_acceleration_since_an_event_is_named(five_bar: Library) -> None:
+    c = five_bar.instance("me", logging=True).start(drive__speed=40.0)
+    assert c("EnterContinuousTimeMode") == OK
+    assert c("SetTime", 0.1) == OK
+    assert c("EnterEventMode") == OK
+    c.set(drive__speed=30.0, drive__acceleration=50.0)
+    c.discrete()
+    assert c("EnterContinuousTimeMode") == OK
+    assert c("SetTime", 0.2) == OK
+    assert c("Terminate") == WARNING
+    assert "drive.speed stayed at 30 while drive.acceleration is 50" in c.log[-1][1]
+
+
 def test_model_exchange_without_a_command_in_force(five_bar: Library) -> None:
     c = five_bar.instance("me").start(drive__mode=0, drive__acceleration=50.0, initial__crank_speed=40.0)
     assert c("EnterContinuousTimeMode") == OK
