@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from analysis import find_orbit
-from analysis.periodic import Drive, OrbitEquations, orbit_of
+from analysis.numerics.vectors import LANES
+from analysis.periodic import Drive, OrbitEquations, OrbitError, orbit_of
 from analysis.periodic.chart.grid import largest_multipliers
 from analysis.periodic.motion.discretisation import Discretisation, collocation_serves
 from analysis.periodic.motion.variables import Family
@@ -38,6 +39,22 @@ def test_a_neighbour_followed_by_collocation_is_the_integrator_s() -> None:
         assert np.abs(found.matrices - matrices).max() < 1e-8 * scale.max()
         assert np.abs(found.slopes - slopes).max() < 1e-8 * np.abs(slopes).max()
     assert used == 6
+
+
+def test_a_piece_beyond_the_limit_of_assembly_is_not_forgotten_for_the_next() -> None:
+    """Each piece has a row of lanes or more of its own."""
+    orbit = find_orbit(SMOOTH, speed=30.0)
+    family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
+    angles = np.array([0.0, pi, 2.0 * pi])
+    starts = np.vstack([orbit.start, orbit.point.shoot(angles[:2], orbit.start[None, :]).y])
+    direction = family.direction(30.0, 30.0, 31.0)
+    path = Discretisation(angles, True)
+    path._divide(np.linspace(0.0, 2.0 * pi, 4 * LANES + 1), 2)
+    path._calls = 1
+    assert path.ends(orbit.point, starts, 30.0, direction).clearance is not None
+    with pytest.raises(OrbitError, match="limit of assembly"):
+        path.ends(orbit.point, starts + np.array([[9.0, 0.0], [0.0, 0.0]]), 30.0, direction)
+    assert np.isfinite(path.ends(orbit.point, starts, 30.0, direction).y).all()
 
 
 def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() -> None:

@@ -304,9 +304,11 @@ def _is_known(start, known, scale, away):
 
 
 class Seekers(NamedTuple):
-    """Searches in lanes: of each its place in the queue, -1 without one, whether it polishes what it found, and its state."""
+    """Searches in lanes: of each its place in the queue, -1 without one, how many motions were known as it began, whether it
+    polishes what it found, and its state."""
 
     place: NDArray[np.int64]
+    begun: NDArray[np.int64]
     polishing: NDArray[np.bool_]
     starts: NDArray[np.float64]
     trials: NDArray[np.float64]
@@ -320,7 +322,8 @@ class Seekers(NamedTuple):
 @part
 def _make_seekers(n):
     return Seekers(
-        np.full(LANES, -1), np.zeros(LANES, np.bool_), np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)),
+        np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_),
+        np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)),
         np.zeros((LANES, n)), np.zeros((LANES, n, n + 1)), np.zeros((LANES, n * (1 + n))), np.zeros((LANES, 4)),
     )  # fmt: skip
 
@@ -354,17 +357,18 @@ def _begin_search(lane, point, seekers, v):
     """Begin the search of a lane at its place: from a motion of the point before, or with the known ones divided out."""
     place, before = seekers.place[lane], point.before.shape[0]
     seekers.polishing[lane] = place < before
+    seekers.begun[lane] = point.count[0]
     v.step[lane] = 0.1
     begin_hunt(point.before[place] if place < before else point.guesses[place - before], _hunt(lane, seekers))
 
 
 @inner
 def _record(lane, point, seekers, v, room, carry):
-    """Add the motion that a lane has found; return whether it is a new one."""
+    """Add the motion that a lane has found, if it is a new one."""
     count, start = point.count[0], seekers.starts[lane]
     single = v.z[: start.shape[0]]
     if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own.scale, single):
-        return False
+        return
     copy(start, point.starts[count])
     copy(v.z[start.shape[0] :], point.monodromies[count])
     copy(start, single)
@@ -375,7 +379,6 @@ def _record(lane, point, seekers, v, room, carry):
             angle = point.angles[i]
         point.swings[count, i] = single[0]
     point.count[0] += 1
-    return True
 
 
 @inner
@@ -394,11 +397,14 @@ def _go_on(lane, point, seekers, v, room, carry):
     elif not seekers.polishing[lane]:
         seekers.polishing[lane] = True
         begin_hunt(hunt.start, hunt)
-    elif _record(lane, point, seekers, v, room, carry) and seekers.place[lane] >= point.before.shape[0]:
-        # from the same guess to another motion
-        _begin_search(lane, point, seekers, v)
     else:
-        seekers.place[lane] = -1
+        _record(lane, point, seekers, v, room, carry)
+        count = point.count[0]
+        if seekers.place[lane] >= point.before.shape[0] and seekers.begun[lane] < count and count < MOST_ORBITS:
+            # from the same guess to another motion: this one, or what another lane found meanwhile, was not divided out
+            _begin_search(lane, point, seekers, v)
+        else:
+            seekers.place[lane] = -1
 
 
 @part

@@ -76,13 +76,13 @@ class Desk(NamedTuple):
 
 @inner
 def rows_of(elements):
-    """Return the number of rows that hold so many desk."""
+    """Return the number of rows that hold so many elements."""
     return (elements + LANES - 1) // LANES
 
 
 @part
 def make_desk(n, most, directional):
-    """Make work space for y of n components and at most ``most`` desk."""
+    """Make work space for y of n components and at most ``most`` elements."""
     f, columns = n // 2, n + 1 if directional else n
     unknowns, rows = NODES * f, rows_of(most)
     return Desk(
@@ -107,7 +107,7 @@ def make_desk(n, most, directional):
 
 @inner
 def lay_elements(angles, desk):
-    """Write the angles at which elements begin, with the end of the last, into rows."""
+    """Write the angles at which elements begin, with the end of the last, onto the desk."""
     m = angles.shape[0] - 1
     for place in range(rows_of(m) * LANES):
         e = min(place, m - 1)
@@ -306,10 +306,8 @@ def _chain(e, product, desk):
 def _greatest(values, so_far):
     """Return the greatest of numbers that are not negative; NaN if one is NaN."""
     for value in values:
-        if not value <= so_far:
+        if not (value <= so_far or isnan(so_far)):
             so_far = value
-        if isnan(so_far):
-            break
     return so_far
 
 
@@ -373,14 +371,14 @@ def _correct_period(section, m, y, w, desk):
 def _tails(section, row, w, desk):
     """Compute the size of the last Legendre coefficients of the slopes and of their derivatives, relative to the greatest.
 
-    It is written into ``desk.single`` for each of a row of desk.
+    It is written into ``desk.single`` for each of a row of elements.
     """
     scale = section.scale
     n = scale.shape[0]
     f = n // 2
     moves, h = desk.moves[row], load(desk.lengths[row], 0)
     columns = moves.shape[0] // (NODES * f * LANES)
-    worst = 0.0 * h
+    worst, valid = 0.0 * h, 0.0 * h
     for i in range(f):
         for j in range(columns):
             # of the slopes themselves, then of their derivatives
@@ -390,9 +388,9 @@ def _tails(section, row, w, desk):
                 line = s * f + i
                 value = h * (load(w[row], line) if j == 0 else load(moves, line * columns + j))
                 before, last = fused(TAIL[0, s], value, before), fused(TAIL[1, s], value, last)
-                most = greater(most, size(value))
+                most, valid = greater(most, size(value)), fused(0.0, value, valid)
             worst = greater(worst, greater(size(before), size(last)) / (weight + most))
-    store(desk.single, 0, worst)
+    store(desk.single, 0, worst + valid)
 
 
 @inner
@@ -407,7 +405,7 @@ def _least_gap(section, y, w, desk):
                 section.equations[IN_LANES + GAP], 0.0, desk.z, section.modes, section.drive, section.p, desk.single
             )
             for gap in desk.single:
-                if not gap >= least:
+                if not (gap >= least or isnan(least)):
                     least = gap
     return least
 
@@ -427,7 +425,7 @@ def close(section, m, y, w, desk):
             for row in range(y.shape[0]):
                 _tails(section, row, w, desk)
                 tail = _greatest(desk.single, tail)
-            if tail > DECAY * np.sqrt(section.tolerance):
+            if not tail <= DECAY * np.sqrt(section.tolerance):
                 return NO_STEP, tail
             return (DONE if _least_gap(section, y, w, desk) > LIMIT_SINE else LIMIT), tail
         before = size
@@ -568,7 +566,8 @@ def _walk(section, angles, firsts, starts, change, known, neighbour, found, tabl
             first, last = firsts[piece], firsts[piece + 1]
             status = spread(section, angles[first : last + 1], first, starts[piece].copy(), y, w, room)
             if status != DONE:
-                return status
+                # that the integrator finds no step is no matter of the elements' length
+                return LIMIT if status == LIMIT else DIVERGED
     repeat_last(m, y)
     repeat_last(m, w)
     size = before = np.inf
@@ -588,7 +587,7 @@ def _walk(section, angles, firsts, starts, change, known, neighbour, found, tabl
         for lane in range(min(LANES, m - LANES * row)):
             found.tails[LANES * row + lane] = desk.single[lane]
     for tail in found.tails:
-        if tail > DECAY * np.sqrt(section.tolerance):
+        if not tail <= DECAY * np.sqrt(section.tolerance):
             return NO_STEP
     found.clearance[0] = _least_gap(section, y, w, desk)
     return DONE if found.clearance[0] > LIMIT_SINE else LIMIT

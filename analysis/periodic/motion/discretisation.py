@@ -371,7 +371,7 @@ class Discretisation:
                 self._value = value
                 return _ends(found.rows, n)._replace(clearance=clearance)
             if status == Status.NO_STEP:
-                long = found.tails > collocation.DECAY * np.sqrt(section.tolerance)
+                long = ~(found.tails <= collocation.DECAY * np.sqrt(section.tolerance))
             elif known:
                 # not found from the neighbour: without it
                 continue

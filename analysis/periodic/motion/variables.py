@@ -243,12 +243,14 @@ def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     UnknownNameError
         If there is no parameter of that name.
     InputError
-        If both axes are the same, or one does not act in this drive.
+        If both axes are the same, or both speeds of cranks, or one does not act in this drive.
     """
     if x == y:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")
     for name in (x, y):
         require_variable(parameters, drive, name)
+    if {x, y} <= set(speed_names(mechanism_of(parameters))):
+        raise InputError(f"{x} and {y} keep their ratio: one of them can be an axis")
     return NamedPlane(parameters, drive, x, y)
 
 
