@@ -12,6 +12,7 @@ from analysis import find_orbit
 from analysis.numerics.vectors import LANES
 from analysis.periodic import Drive, OrbitEquations, OrbitError, orbit_of
 from analysis.periodic.chart.grid import largest_multipliers
+from analysis.periodic.motion import collocation
 from analysis.periodic.motion.discretisation import Discretisation, collocation_serves
 from analysis.periodic.motion.variables import Family
 from linkwork.five_bar.published import SETS
@@ -55,6 +56,11 @@ def test_a_piece_beyond_the_limit_of_assembly_is_not_forgotten_for_the_next() ->
     with pytest.raises(OrbitError, match="limit of assembly"):
         path.ends(orbit.point, starts + np.array([[9.0, 0.0], [0.0, 0.0]]), 30.0, direction)
     assert np.isfinite(path.ends(orbit.point, starts, 30.0, direction).y).all()
+
+
+@pytest.mark.parametrize(("values", "so_far"), [([1.0, np.nan, 2.0], 0.0), ([1.0], np.nan)])
+def test_what_is_no_number_is_the_greatest(values: list[float], so_far: float) -> None:
+    assert np.isnan(collocation._greatest.py_func(np.array(values), so_far))
 
 
 def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() -> None:
