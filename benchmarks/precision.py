@@ -33,9 +33,9 @@ from benchmarks.solvers import by_multipliers
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
-#: Tolerances of the solvers; powers of two between the first and last step of an engine.
+#: Tolerances of the solvers.
 TOLERANCES = 10.0 ** np.arange(-3.0, -12.5, -0.5)
-#: Numbers of runs, and how many more times the shortest are repeated.
+#: Numbers of runs of the ensembles.
 COUNTS = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
 OURS = "Linkwork, integration"
 _TITLES = {"constant-speed": "Table 3.1, 420 rpm, three turns", "torsion-bar": "under a torsion bar, 0.5 s"}

@@ -68,11 +68,11 @@ class MachineCode:
     lanes : int
         How many arguments each call takes at once: with more than one, arrays have so many numbers for each of theirs, and t
         is the same for all.
-    shared : bool
-        Whether all lanes have the same b, c and d, which are then arrays as for one.
     rows : sequence of str
         Names of the functions whose outputs are written one lane after the other, which readers of single lanes need: to
         gather them takes some processors longer than to compute them.
+    shared : bool
+        Whether all lanes have the same b, c and d, which are then arrays as for one.
 
     Attributes
     ----------

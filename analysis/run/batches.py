@@ -254,7 +254,7 @@ def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
 
     The others, with harmonics, ramps, motors, torsion bars or functions of the state, go one by one.
     """
-    from .lanes import LANES
+    from ..numerics.vectors import LANES
 
     fits: NDArray[np.bool_] = (batch.steady & ~batch.laws[:, :, 2].any(axis=1)) | (settings.hold > 0.0)
     return fits & (LANES > 1)

@@ -372,13 +372,14 @@ class _Gathered:
 def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
     """Return a hash of the code that runs depend on: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
+    from ..numerics.vectors import LANES
     from . import batches, compiled, lanes
 
     kernels = (compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows)
     switch = mechanism.switch and getattr(constants_of(mechanism, parameters)[1], mechanism.switch)
     switched = bool(np.any(switch)) if mechanism.switch else False
     ours = [
-        *(machine(mechanism, switched, n).fingerprint for n in sorted({1, lanes.LANES})),
+        *(machine(mechanism, switched, n).fingerprint for n in sorted({1, LANES})),
         inspect.getsource(batches),
         *map(fingerprint, kernels),
     ]

@@ -25,9 +25,9 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
 from ..numerics.codegen import MAKING, MachineCode, copy, evaluate, inline, inner, kernel, part
-from ..numerics.lanes import width
 from ..numerics.references import refer
 from ..numerics.symbolic import library
+from ..numerics.vectors import LANES
 from .compiled import (
     BATCH,
     Batch,
@@ -47,8 +47,6 @@ from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Sam
 from .sources import ADDRESSES, SOURCE, Source
 from .stepping import STAGES, following, shorter
 
-#: Runs at once.
-LANES = width()
 #: In the place of a sum of squares that is zero.
 LEAST = 1e-300
 

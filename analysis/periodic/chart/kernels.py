@@ -17,7 +17,7 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, copy, inline, inner, kerne
 from ...numerics.references import refer
 from ...numerics.vectors import LANES
 from ...run.compiled import take
-from ..motion.collocation import NODES, close, lay_elements, make_desk, repeat_last, rows_of, spread
+from ..motion.collocation import NODES, close, lay_elements, make_desk, repeat_last, row_count, spread
 from ..motion.drive import SAME
 from ..motion.kernels import (
     DIVERGED,
@@ -110,7 +110,7 @@ def divide(section, search, level, start, path, desk, room):
         m = COUNTS[level] * search.turns
         angles = np.linspace(0.0, search.end, m + 1)
         lay_elements(angles, desk)
-        rows = rows_of(m)
+        rows = row_count(m)
         if spread(section, angles, 0, start.copy(), y[:rows], w[:rows], room) != DONE:
             break
         repeat_last(m, y[:rows])
@@ -152,7 +152,7 @@ def solve_from_left(section, points, search, guess, found, tables):
     carry = np.array([0.1, 0.0])
     report = np.zeros(3)
     start = np.empty(n)
-    most_rows = rows_of(COUNTS[-1] * search.turns)
+    most_rows = row_count(COUNTS[-1] * search.turns)
     # this orbit and those before it, the last first: all numbers of one in a row, and by rows of elements in lanes
     sizes = n * LANES, NODES * (n // 2) * LANES
     ys, ws = np.zeros((1 + PASSED, most_rows * sizes[0])), np.zeros((1 + PASSED, most_rows * sizes[1]))
@@ -167,7 +167,7 @@ def solve_from_left(section, points, search, guess, found, tables):
         what = DIVERGED
         if known:
             m = COUNTS[level] * search.turns
-            rows = rows_of(m)
+            rows = row_count(m)
             predict(known, rows * sizes[0], ys)
             predict(known, rows * sizes[1], ws)
             what, tail = close(own, m, y[0, :rows], w[0, :rows], desk)
@@ -215,7 +215,7 @@ def solve_from_left(section, points, search, guess, found, tables):
                 if not by_collocation:
                     pause = _PAUSE
         if by_collocation:
-            rows = rows_of(COUNTS[level] * search.turns)
+            rows = row_count(COUNTS[level] * search.turns)
             shift(rows * sizes[0], ys)
             shift(rows * sizes[1], ws)
             known = min(known + 1, PASSED)
@@ -305,35 +305,29 @@ def _is_known(start, known, scale, away):
 
 class Seekers(NamedTuple):
     """Searches in lanes: of each its place in the queue, -1 without one, how many motions were known as it began, whether it
-    polishes what it found, and its state."""
+    polishes what it found, and its state, of which each array has a row for each lane."""
 
     place: NDArray[np.int64]
     begun: NDArray[np.int64]
     polishing: NDArray[np.bool_]
-    starts: NDArray[np.float64]
-    trials: NDArray[np.float64]
-    corrections: NDArray[np.float64]
-    followings: NDArray[np.float64]
-    systems: NDArray[np.float64]
-    lasts: NDArray[np.float64]
-    numbers: NDArray[np.float64]
+    hunts: Hunt
 
 
 @part
 def _make_seekers(n):
-    return Seekers(
-        np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_),
-        np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)),
-        np.zeros((LANES, n)), np.zeros((LANES, n, n + 1)), np.zeros((LANES, n * (1 + n))), np.zeros((LANES, 4)),
+    hunts = Hunt(
+        np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)), np.zeros((LANES, n)),
+        np.zeros((LANES, n, n + 1)), np.zeros((LANES, n * (1 + n))), np.zeros((LANES, 4)),
     )  # fmt: skip
+    return Seekers(np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_), hunts)
 
 
 @inline
-def _hunt(lane, seekers):
+def _hunt(lane, hunts):
     """Return the state of the search in a lane."""
     return Hunt(
-        seekers.starts[lane], seekers.trials[lane], seekers.corrections[lane], seekers.followings[lane],
-        seekers.systems[lane], seekers.lasts[lane], seekers.numbers[lane],
+        hunts.start[lane], hunts.trial[lane], hunts.correction[lane], hunts.following[lane],
+        hunts.system[lane], hunts.last[lane], hunts.numbers[lane],
     )  # fmt: skip
 
 
@@ -359,13 +353,13 @@ def _begin_search(lane, point, seekers, v):
     seekers.polishing[lane] = place < before
     seekers.begun[lane] = point.count[0]
     v.step[lane] = 0.1
-    begin_hunt(point.before[place] if place < before else point.guesses[place - before], _hunt(lane, seekers))
+    begin_hunt(point.before[place] if place < before else point.guesses[place - before], _hunt(lane, seekers.hunts))
 
 
 @inner
 def _record(lane, point, seekers, v, room, carry):
     """Add the motion that a lane has found, if it is a new one."""
-    count, start = point.count[0], seekers.starts[lane]
+    count, start = point.count[0], seekers.hunts.start[lane]
     single = v.z[: start.shape[0]]
     if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own.scale, single):
         return
@@ -384,7 +378,7 @@ def _record(lane, point, seekers, v, room, carry):
 @inner
 def _go_on(lane, point, seekers, v, room, carry):
     """Go on with the search of a lane whose integration has ended; it has no place afterwards if it is over."""
-    hunt, most, status = _hunt(lane, seekers), point.search.most, v.status[lane]
+    hunt, most, status = _hunt(lane, seekers.hunts), point.search.most, v.status[lane]
     take(lane, LANES, v.x, v.z)
     if seekers.polishing[lane]:
         what = newton_next(point.own, most, status, v.z, hunt)
@@ -428,7 +422,7 @@ def _search_point(point, seekers, tables, room, carry):
                         break
                     if seekers.place[lane] >= 0:
                         tolerance = (point.own if seekers.polishing[lane] else point.wide).tolerance
-                        begin(lane, point.own, seekers.trials[lane], point.search.end, tolerance, v)
+                        begin(lane, point.own, seekers.hunts.trial[lane], point.search.end, tolerance, v)
             running = advance_tracks(point.own, v)
 
 
@@ -478,9 +472,11 @@ def _arrived(z, known, near, scale, away):
 
 
 @part
-def _settle(section, turn, near, most, starts, known, ends, tables, rows, turns, away):
-    """Do the work of `settle_starts`, which holds the arrays that are referred to here; in each lane a row, or -1."""
-    v = refer(tables)
+def _settle(section, turn, near, most, starts, known, ends, tables):
+    """Do the work of `settle_starts`, which holds the arrays that are referred to here."""
+    v, away = refer(tables), np.empty(starts.shape[1])
+    # of each lane its row, or -1, and the turns that it has made
+    rows, turns = np.full(LANES, -1), np.zeros(LANES, np.int64)
     following, running = 0, True
     while running:
         for lane in range(LANES):
@@ -521,18 +517,6 @@ def settle_starts(section, turn, near, most, starts, known, ends):
     ends : ndarray of int64, shape (m,)
         Written: number of the known motion, or `LOST` or `UNSETTLED`.
     """
-    tables, n = make_tracks(starts.shape[1], 0), starts.shape[1]
+    tables = make_tracks(starts.shape[1], 0)
     set_scale(section.scale, tables)
-    _settle(
-        section,
-        turn,
-        near,
-        most,
-        starts,
-        known,
-        ends,
-        tables,
-        np.full(LANES, -1),
-        np.zeros(LANES, np.int64),
-        np.empty(n),
-    )
+    _settle(section, turn, near, most, starts, known, ends, tables)

@@ -75,7 +75,7 @@ class Desk(NamedTuple):
 
 
 @inner
-def rows_of(elements):
+def row_count(elements):
     """Return the number of rows that hold so many elements."""
     return (elements + LANES - 1) // LANES
 
@@ -84,7 +84,7 @@ def rows_of(elements):
 def make_desk(n, most, directional):
     """Make work space for y of n components and at most ``most`` elements."""
     f, columns = n // 2, n + 1 if directional else n
-    unknowns, rows = NODES * f, rows_of(most)
+    unknowns, rows = NODES * f, row_count(most)
     return Desk(
         np.zeros((rows, LANES)),
         np.zeros((rows, LANES)),
@@ -109,7 +109,7 @@ def make_desk(n, most, directional):
 def lay_elements(angles, desk):
     """Write the angles at which elements begin, with the end of the last, onto the desk."""
     m = angles.shape[0] - 1
-    for place in range(rows_of(m) * LANES):
+    for place in range(row_count(m) * LANES):
         e = min(place, m - 1)
         desk.angles[place // LANES, place % LANES] = angles[e]
         desk.lengths[place // LANES, place % LANES] = angles[e + 1] - angles[e]
@@ -418,17 +418,17 @@ def close(section, m, y, w, desk):
     """
     before = tail = 0.0
     for count in range(_CORRECTIONS):
-        size = _correct_period(section, m, y, w, desk)
-        if not size <= (0.5 * before if count else _FAR):
+        change = _correct_period(section, m, y, w, desk)
+        if not change <= (0.5 * before if count else _FAR):
             return DIVERGED, tail
-        if size <= 100.0 * section.tolerance:
+        if change <= 100.0 * section.tolerance:
             for row in range(y.shape[0]):
                 _tails(section, row, w, desk)
                 tail = _greatest(desk.single, tail)
             if not tail <= DECAY * np.sqrt(section.tolerance):
                 return NO_STEP, tail
             return (DONE if _least_gap(section, y, w, desk) > LIMIT_SINE else LIMIT), tail
-        before = size
+        before = change
     return DIVERGED, tail
 
 
@@ -570,15 +570,15 @@ def _walk(section, angles, firsts, starts, change, known, neighbour, found, tabl
                 return LIMIT if status == LIMIT else DIVERGED
     repeat_last(m, y)
     repeat_last(m, w)
-    size = before = np.inf
+    before = 0.0
     for count in range(_CORRECTIONS):
-        size = _correct_pieces(section, firsts, starts, y, w, desk, found.rows)
-        if not size <= (0.5 * before if count else _FAR):
+        moved = _correct_pieces(section, firsts, starts, y, w, desk, found.rows)
+        if not moved <= (0.5 * before if count else _FAR):
             return DIVERGED
-        if size <= 100.0 * section.tolerance:
+        if moved <= 100.0 * section.tolerance:
             break
-        before = size
-    if size > 100.0 * section.tolerance:
+        before = moved
+    else:
         return DIVERGED
     _write_derivatives(firsts, found.rows, desk)
     for row in range(y.shape[0]):
