@@ -13,6 +13,8 @@ SLIGHTLY = 0.15
 SMALL = 0.05
 #: "The same", "constant", "linear", "straight", "steady": what a reader cannot tell from it on a graph, relative to its scale.
 ALIKE = 0.05
+#: A fall that is not only there but seen, as studies print it: what is more than "the same".
+SEEN_FALL = f"below {1.0 - ALIKE:g}, a fall that is seen by the rule for *the same*"
 #: What a place on a graph can be read to: relative to the scale, and for a crank angle (deg).
 READ, READ_DEG = 0.02, 3.0
 

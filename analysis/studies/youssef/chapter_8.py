@@ -407,7 +407,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
             text("8.4.1.2, L6579"),
             "maxima and minima together in a turn at the speeds of Fig 8.8 to 8.10, 8.14 and 8.15 but the last; second "
             "harmonic over the first, the least of these speeds",
-            f"none of a count; more than {NOTICED:g}, what one notices on a graph",
+            f"none of a count; more than {NOTICED:g}, the rule for *the same*",
             (
                 *(near(f"peaks at {speed:g} rpm", 4.0, n, 0.0) for speed, n in counted.items()),
                 at_least("second harmonic over first", NOTICED, second),
@@ -522,7 +522,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
             "were observed at [w = wn/3, wn/4], where wn is the natural frequency.",
             text("8.4.1.2, L6770"),
             "rise of the amplitude at the maximum there over the next minimum, relative",
-            f"{NOTICED:g}, what one notices on a graph",
+            f"{NOTICED:g}, the rule for *the same*",
             tuple(
                 at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, rise_at(s, n), why=meets[n])
                 for s, n, part in fractions
@@ -585,7 +585,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
         part = p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates
         force = sizes[s][:, 0] * np.abs(part)
         spread.append(np.ptp(force / rates**2) / np.mean(force / rates**2))
-        growth.append(force[-1] / force[0])
+        growth.append(force.max() / force.min())
     why = "near half the natural frequency the second is as large, though both are below 1 mm"
     almost = f"{ABOUT:g}, the rule for *almost*"
     return (
@@ -624,12 +624,16 @@ def _fig_8_18() -> tuple[Statement, ...]:
             "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
             "described by [m u'' + mu u' + k u = F0 Sin (wt + phi)].",
             text(f"{section}, L6820; again L6970"),
-            "force on a damped mass-spring system of the mean effective mass that gives the first harmonic, divided by the "
-            "square of the speed: its spread from 300 to 1000 rpm relative to its mean",
-            f"{ABOUT:g}, the rule for *almost*, for *similar* too",
-            tuple(at_most(f"spring {s}", ABOUT, value) for s, value in zip("CD", spread)),
-            f"F0 is not constant: as of a rotating unbalance it grows with the square of the speed, {min(growth):.0f} times "
-            "over this range",
+            "F0, the force on a damped mass-spring system of the mean effective mass that gives the first harmonic, from 300 "
+            "to 1000 rpm: the most over the least; and the spread of F0 over the square of the speed, relative to its mean",
+            f"{ABOUT:g}, the rule for *similar*",
+            (
+                *(
+                    at_most(f"spring {s}, F0", 1.0 + ABOUT, times, why="it grows with the speed, as of an unbalance")
+                    for s, times in zip("CD", growth)
+                ),
+                *(at_most(f"spring {s}, F0 over the square", ABOUT, value) for s, value in zip("CD", spread)),
+            ),
         ),
     )
 

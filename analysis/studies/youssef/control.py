@@ -25,7 +25,7 @@ from ...linear import Design, design_pid, linearise_along
 from ...numerics.fourier import FourierSeries
 from ...slider import TrackingController, TrackingResult, best_spring, inverse_dynamics, motion_of_plant, track
 from ...units import CM_PER_METRE
-from ..rules import ALIKE, SMALL
+from ..rules import ALIKE, SEEN_FALL, SMALL
 from ..statements import Case, Statement, at_least, at_most, text
 from ..study import Study, StudyResult, padded
 from .chapter_7 import slider
@@ -163,7 +163,7 @@ def compute() -> StudyResult:
                 "least radius of curvature of the smallest plate cam for the two harmonics of Fig 7.11 and 7.12; weighted "
                 "error of the rocker function with one harmonic, which a Scotch yoke on the crank shaft gives, over that "
                 "with the pivot fixed",
-                f"{small}; below {1.0 - ALIKE:g}, a fall that is seen",
+                f"{small}; {SEEN_FALL}",
                 (
                     *(
                         at_least(f"cam of {n}, base radius {c.base:.1f} cm", ROLLER, c.curvature, "cm")
@@ -187,7 +187,7 @@ def compute() -> StudyResult:
                 text("7.1.1 (c), L5321"),
                 "rms deviation of the slider from the two harmonics of Fig 7.11, relative to the stroke, with the force "
                 "that the model needs and no feedback, on a machine that differs from the model",
-                f"more than {ALIKE:g}, what one sees; one example is enough for *may be*",
+                f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
                 (at_least("no feedback", ALIKE, missed),),
                 f"after {open_loop.loop.time[-1] * SPEED / (2.0 * pi):.1f} turns the links cannot be joined any more",
             ),
@@ -195,8 +195,8 @@ def compute() -> StudyResult:
                 "This is stored as a [reference] model to which the actual motion is required to adhere by means of "
                 "feedback.",
                 text("7.1.2, L5338"),
-                "the same with feedback to the stored motion",
-                f"at most {ALIKE:g}",
+                "the same deviation with feedback to the stored motion",
+                f"{ALIKE:g}, the rule for *the same*",
                 (at_most("feedback", ALIKE, kept),),
             ),
             Statement(

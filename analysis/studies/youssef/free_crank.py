@@ -277,7 +277,7 @@ def launch_speeds() -> StudyResult:
             "equations of motion. However, it is oscillatory and decaying.",
             text("3.2.2, L2142-2147"),
             SWINGS,
-            f"{ALIKE:g}, below which it would be steady; {SIGN}",
+            f"{ALIKE:g}, the rule for *steady*; {SIGN}",
             _swings(runs, 1.0),
         ),
         Statement(
@@ -510,7 +510,7 @@ def _free_swings() -> Statement:
         "decreases with crank angle and (3) The mean position of oscillation reduces with crank angle.",
         text("3.3, L2241-2251"),
         "range of the crank speed in a turn over its mean, least; range and mean relative to the turn before, greatest",
-        f"{ALIKE:g}, below which it would be steady; {SIGN}",
+        f"{ALIKE:g}, the rule for *steady*; {SIGN}",
         tuple(
             case
             for label, t in turns.items()

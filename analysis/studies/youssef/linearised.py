@@ -211,7 +211,7 @@ def compute() -> StudyResult:
                 text("4.1, eqs (4.2) to (4.8), L2421-2477"),
                 "order in the crank's length of the error of (4.8) against the closed linkage, the slider off by "
                 f"half of sigma2, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
-                "2, the first order that is neglected in (4.4), to 0.05",
+                "2, the first order that is neglected in (4.4); 0.05, as an order is a whole number",
                 tuple(near(name, 2.0, x, 0.05) for name, x in zip(("xi3", "xi4"), orders)),
             ),
             Statement(
@@ -252,7 +252,7 @@ def compute() -> StudyResult:
                 text("4.3, eqs (4.22) to (4.29), L2853-2930"),
                 "order of what (4.23) and (4.24) leave out of the quotient of the printed coefficients, from sigma2 "
                 f"= {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1",
-                "3, to 0.05",
+                "3; 0.05, as an order is a whole number",
                 tuple(
                     at_least(name, 2.95, x, why="the mean has a part of second order too")
                     for name, x in zip(("mean", "first harmonic", "second harmonic"), left)

@@ -137,7 +137,7 @@ def compute() -> StudyResult:
                 text("6.2.2, L4207"),
                 "area between curve and ellipse (a) of the linkage that is best in time over that of the linkage that is "
                 "best without",
-                f"above {1.0 + ALIKE:g}",
+                f"above {1.0 + ALIKE:g}, the rule for *the same*: a condition that costs nothing would leave it",
                 (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
             ),
             Statement(

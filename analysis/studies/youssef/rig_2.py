@@ -246,7 +246,7 @@ def compute_harmonics() -> StudyResult:
                 "half the natural frequency, which again indicated a slider motion based on the first harmonic.",
                 text("8.4.2.2, L6871"),
                 "rise of the amplitude at the maximum there over the next minimum, relative",
-                f"{NOTICED:g}, what one notices on a graph",
+                f"{NOTICED:g}, the rule for *the same*",
                 tuple(cases),
                 f"with friction by {SLIGHT:g} of the guide's force, more than linear bearings have, {' and '.join(left)} "
                 "are left at half",

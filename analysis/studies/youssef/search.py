@@ -251,7 +251,7 @@ def compute() -> StudyResult:
                 text("6.3.1, L4349-4359"),
                 f"probability that the errors at the end of {SEARCHES} searches which begin with {FEWER_POINTS} points are "
                 "so much lower than those of as many from random sets by chance (rank test)",
-                f"{CHANCE:g}, as is usual",
+                f"{CHANCE:g}, the usual level of significance",
                 (at_most("by chance", CHANCE, chance[techniques[1]], why=luck),),
             ),
             Statement(
@@ -260,7 +260,7 @@ def compute() -> StudyResult:
                 text("6.3.1, L4359"),
                 f"probability that the errors at the end of {SEARCHES} searches which begin with X0, Y0, l2, a1 and th20 alone "
                 "are so much lower than those of as many from random sets by chance (rank test)",
-                f"{CHANCE:g}, as is usual",
+                f"{CHANCE:g}, the usual level of significance",
                 (at_most("by chance", CHANCE, chance[techniques[2]], why=luck),),
             ),
             Statement(

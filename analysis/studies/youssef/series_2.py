@@ -34,7 +34,7 @@ from ...synthesis import (
     turn,
 )
 from ...units import CM_PER_METRE
-from ..rules import ALIKE
+from ..rules import ALIKE, SEEN_FALL
 from ..statements import Statement, at_most, near, text
 from ..study import Study, StudyResult, padded
 from .chapter_7 import slider
@@ -159,9 +159,7 @@ def moved_rocker() -> StudyResult:
         columns[f"angle; {n} [deg]"] = wanted_angle() + columns[f"error; {n} [deg]"]
     heavy = np.asarray(p.task.weights) == WEIGHT
     in_window = float(np.degrees(np.sqrt(np.mean(found[2].evaluation.errors[heavy] ** 2))))
-    fewer = (
-        f"below {1.0 - ALIKE:g}: a freedom more cannot raise the least error, so that the fall must be one that is seen"
-    )
+    fewer = f"{SEEN_FALL}: a freedom more cannot raise the least error"
     return StudyResult(
         number="7.11",
         claim="The slider moved by two harmonics brings the weighted error of the rocker function from 35.0 to 4.8 deg2.",
@@ -326,7 +324,7 @@ def moved_path() -> StudyResult:
                 text("7.0, L5248"),
                 "area between the path and the curve with two harmonics of the slider, its stroke at most a fifth of the "
                 "longest link, over that with the pivot fixed, the printed links kept",
-                f"below {1.0 - ALIKE:g}, as a fall that is seen",
+                SEEN_FALL,
                 tuple(at_most(name, 1.0 - ALIKE, share) for name, share in paths.items()),
                 "what of the envelope can be reached is judged at Fig 7.2",
             ),
