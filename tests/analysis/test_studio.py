@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,13 +60,31 @@ def _opened(browser: Browser, path: Path) -> Page:
 
 def _load(page: Page, state: Mapping[str, Any]) -> dict[str, Any]:
     """Let the page show a state: what it answers, its rows as columns by name."""
-    before = int(page.evaluate("document.documentElement.dataset.answer"))
-    page.evaluate("state => window.studio.restore(state)", state)
-    page.wait_for_function(
-        f"Number(document.documentElement.dataset.answer) > {before} && document.documentElement.dataset.settled === 'true'"
-    )
+    with _settled(page):
+        page.evaluate("state => window.studio.restore(state)", state)
     page.evaluate("window.studio.go(0)")
     return _shown(page)
+
+
+@contextmanager
+def _settled(page: Page) -> Iterator[None]:
+    """Wait, after what is done within, for the page's answer to it; one that never comes tells what the page shows."""
+    before = int(page.evaluate("document.documentElement.dataset.answer"))
+    yield
+    from playwright.sync_api import TimeoutError
+
+    # asked for by time: a page that is not painted answers too
+    try:
+        page.wait_for_function(
+            f"Number(document.documentElement.dataset.answer) > {before}"
+            " && document.documentElement.dataset.settled === 'true'",
+            polling=100,
+        )
+    except TimeoutError as error:
+        shown = page.evaluate(
+            "[{...document.documentElement.dataset}, location.href, document.querySelector('#fault').textContent]"
+        )
+        raise AssertionError(f"no answer after {before}: {shown}") from error
 
 
 def _shown(page: Page) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from analysis.run import Case, Inputs
 from analysis.studio import PAGE, address_of, opening_state, state_of
 
 from ..scripts import script_of_docs
-from .test_studio import _drag, _given, _load, _opened, _pin, _saved, in_browser
+from .test_studio import _drag, _given, _load, _opened, _pin, _saved, _settled, in_browser
 
 ROOT = Path(__file__).parents[2]
 WIDE, PHONE = {"width": 1400, "height": 1000}, {"width": 390, "height": 844}
@@ -372,15 +372,11 @@ def test_what_the_documentation_links_to_opens(browser: Any) -> None:
     openings = script_of_docs("openings")
     page = _opened(browser, PAGE)
     for name, state in openings.states().items():
-        before = page.evaluate("Number(document.documentElement.dataset.answer)")
-        page.evaluate("address => { location.href = address }", address_of(state, PAGE.as_uri()))
-        page.wait_for_function(
-            f"Number(document.documentElement.dataset.answer) > {before} && document.documentElement.dataset.settled === 'true'"
-        )
+        with _settled(page):
+            page.evaluate("address => { location.href = address }", address_of(state, PAGE.as_uri()))
         assert page.inner_text("#title") == state["title"], name
         assert page.inner_text("#fault") == "", name
         assert page.evaluate("window.studio.shown().rows.count") > 1, name
-        page.evaluate("document.documentElement.dataset.settled = ''")
     page.close()
 
 
