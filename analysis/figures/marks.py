@@ -29,6 +29,8 @@ _DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
 _DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 90.0, 70.0, 110.0, -90.0, -70.0, -110.0])
 #: Largest share of an axis that a legend may add to it.
 _ROOM = 0.45
+#: From this share on, every other number of the axis is left out.
+_CLOSE = 0.3
 #: How much a line that crosses a text counts beside a text that covers a curve.
 _CROSSED = 3
 #: Directions from a pin in which its letter may stand.
@@ -171,7 +173,9 @@ def _make_room(axis: Axes) -> None:
         axis.set_ylim(before)
     else:
         # the room has no numbers, which would be wider than those that were laid out
-        axis.set_yticks([tick for tick in ticks if before[0] <= tick <= before[1]])
+        kept = [tick for tick in ticks if before[0] <= tick <= before[1]]
+        zero = min(range(len(kept)), key=lambda n: abs(kept[n]), default=0)
+        axis.set_yticks(kept if share < _CLOSE else kept[zero % 2 :: 2])
 
 
 def place_marks(figure: Figure) -> Figure:

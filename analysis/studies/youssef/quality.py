@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
+from ...figures.curves import Label
 from ...synthesis import Linkage, UntimedPath, area_between, evaluate, turn
 from ..rules import ALIKE
 from ..statements import Statement, at_least, at_most, near, text
@@ -31,6 +32,8 @@ LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
 EVALUATIONS, ROUNDS, SIZE = 1500, 3, 0.01
 #: Error of a linkage outside the limits (cm2).
 REFUSED = 1e6
+#: What each linkage was found for.
+AIMS = {"timed": "for points in time", "path": "for the curve alone", "combined": "for both"}
 #: Number of random four-bars in the test of the constraint.
 SAMPLES = 10_000
 
@@ -203,25 +206,18 @@ def compute() -> StudyResult:
 
 def draw(result: StudyResult) -> Figure:
     """Draw the area over the timed error of each linkage."""
-    c = result.columns
     looks = {"printed": COLOURS[1], "ours": COLOURS[0]}
-    curves = [
-        Curve(
-            x=c[f"{name} timed [cm2]"],
-            y=c[f"{name} area [cm2]"],
-            label=name.replace(";", ","),
-            line="",
-            marker=marker,
-            colour=looks[name.split(";")[0]],
-        )
-        for name, marker in zip(linkages(), "osos^")
-    ]
+    curves, labels = [], []
+    for name, marker in zip(linkages(), "osos^"):
+        owner, aim = name.split("; ")
+        timed, area = (result.columns[f"{name} {error} [cm2]"] for error in ("timed", "area"))
+        curves.append(Curve(x=timed, y=area, line="", marker=marker, colour=looks[owner]))
+        labels.append(Label(x=float(timed[0]), y=float(area[0]), text=f"{owner}, {AIMS[aim]}"))
     panel = Panel(
         x_label="sum of squared distances in time [cm$^2$]",
         y_label="area between the curves [cm$^2$]",
         curves=curves,
-        legend="found for",
-        legend_at="outside",
+        labels=labels,
         logarithmic="xy",
     )
     return plot_curves([panel], title=result.heading, size=(6.4, 3.4))
