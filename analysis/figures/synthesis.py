@@ -429,7 +429,7 @@ def plot_sheet(
         panels = figure.subplot_mosaic(
             rows,
             width_ratios=(1.2, 1.0),
-            height_ratios=(*(1.6 if name == "task" else 1.0 for name in right), 1.3),
+            height_ratios=(*(2.4 if name == "task" else 1.0 for name in right), 1.5),
         )
         _panel(panels["linkage"], scene, size=2.0)
         _task(panels["task"], scene)
@@ -456,7 +456,7 @@ def _forces(axis: Axes, forces: PinForces, last: str) -> None:
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
     _quarters(axis, np.degrees(forces.rotation))
     axis.set_ylabel("pin force [N]")
-    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.97), ncols=4, borderpad=0.2, columnspacing=1.0)
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, borderpad=0.2, columnspacing=1.0)
 
 
 @plot.register

@@ -275,7 +275,7 @@ def _links(
         if dist(start, end) > height:
             choices = [
                 Dimension(layer="dimension", start=start, end=end, offset=side * rank * height, height=0.7 * height)
-                for rank in (1.5, 3.0, 4.5, 6.0, 7.5, 9.0, 10.5, 12.0)
+                for rank in (2.0, 3.5, 5.0, 6.5, 8.0, 9.5, 11.0, 12.5)
                 for side in (1.0, -1.0)
             ]
             # the nearest of those that cover least
