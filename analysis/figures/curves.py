@@ -233,6 +233,7 @@ def resize(figure: Figure, width: float, height: float) -> Figure:
     with styled():
         figure.set_layout_engine("constrained")
         figure.set_size_inches(width, height)
+        write_title(figure, figure.get_suptitle().replace("\n", " "))
         return settle(finish(figure))
 
 

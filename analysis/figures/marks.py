@@ -31,7 +31,7 @@ _DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 90.0, 70.0, 11
 _ROOM = 0.45
 #: From this share on, every other number of the axis is left out.
 _CLOSE = 0.3
-#: How much a line that crosses a text counts beside a text that covers a curve.
+#: How much a line that crosses a text, or another text, counts beside a text that covers a curve.
 _CROSSED = 3
 #: Directions from a pin in which its letter may stand.
 _ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
@@ -110,7 +110,7 @@ class _Scene:
     def covered(self, box: Bbox, others: Sequence[Bbox]) -> int:
         """Count the curves, markers, names and edges of the axes that a box covers."""
         inside = self.inside
-        count = sum(box.overlaps(other) for other in others)
+        count = _CROSSED * sum(box.overlaps(other) for other in others)
         count += 10 * (box.x0 < inside.x0 or box.x1 > inside.x1 or box.y0 < inside.y0 or box.y1 > inside.y1 + _GAP)
         if self.legend is not None:
             count += box.overlaps(self.legend)
@@ -182,15 +182,18 @@ def place_marks(figure: Figure) -> Figure:
     """Move the texts of marks and points to places where they cover least; the figure must be laid out."""
     for axis in figure.axes:
         texts = [text for text in axis.texts if isinstance(text, Annotation)]
-        scene = _Scene.of(axis) if any(text.get_gid() in _MOVES for text in texts) else None
-        placed: list[Bbox] = []
-        leaders: list[Path] = []
-        for gid, (move, first, second) in _MOVES.items():
-            for text in (text for text in texts if text.get_gid() == gid):
-                assert scene is not None
-                placed.append(_place(text, move, product(first, second), scene, placed, leaders))
-                if gid == _LABEL:
-                    leaders.append(_leader(text, placed[-1]))
+        moved = [(text, _MOVES[gid]) for gid in _MOVES for text in texts if text.get_gid() == gid]
+        scene = _Scene.of(axis) if moved else None
+        placed: dict[Annotation, Bbox] = {}
+        leaders: dict[Annotation, Path] = {}
+        # the first may have to make way for those after it
+        for text, (move, first, second) in 2 * moved:
+            assert scene is not None
+            placed.pop(text, None)
+            leaders.pop(text, None)
+            placed[text] = _place(text, move, product(first, second), scene, [*placed.values()], [*leaders.values()])
+            if text.get_gid() == _LABEL:
+                leaders[text] = _leader(text, placed[text])
     return figure
 
 
