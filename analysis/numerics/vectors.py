@@ -94,26 +94,53 @@ def store(typing_context, array, index, value):
 
 
 @intrinsic
-def fused(typing_context, a, b, c):
-    """Return a b + c of vectors or numbers, rounded once."""
+def spread(typing_context, rows, index, value):
+    """Write the number of each lane at ``index`` of its row of an array, to be read there by single lanes.
+
+    To gather the numbers of a lane takes some processors longer than to compute them.
+    """
 
     def generate(context, builder, signature, arguments):
-        name = f"llvm.fma.v{LANES}f64" if LANES > 1 else "llvm.fma.f64"
-        values = map(_wide, [builder] * 3, signature.args, arguments)
-        return builder.call(declared(builder.module, name, _KIND, 3), [*values])
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        length = builder.extract_value(array.shape, 1)
+        for lane in range(LANES):
+            row = builder.mul(length, ir.Constant(length.type, lane))
+            number = (
+                arguments[2] if LANES == 1 else builder.extract_element(arguments[2], ir.Constant(ir.IntType(32), lane))
+            )
+            builder.store(number, builder.gep(array.data, [builder.add(row, arguments[1])]))
+        return context.get_dummy_value()
 
-    return LANE(a, b, c), generate
+    return types.void(rows, int64, LANE), generate
+
+
+def _called(name: str) -> Any:
+    """Return the writer of a call of one of LLVM's functions; numbers among the arguments become vectors."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values = [_wide(builder, *one) for one in zip(signature.args, arguments)]
+        full = f"llvm.{name}.v{LANES}f64" if LANES > 1 else f"llvm.{name}.f64"
+        return builder.call(declared(builder.module, full, _KIND, len(values)), values)
+
+    return generate
+
+
+@intrinsic
+def fused(typing_context, a, b, c):
+    """Return a b + c of vectors or numbers, rounded once."""
+    return LANE(a, b, c), _called("fma")
 
 
 @intrinsic
 def size(typing_context, a):
     """Return the absolute values."""
+    return LANE(LANE), _called("fabs")
 
-    def generate(context, builder, signature, arguments):
-        name = f"llvm.fabs.v{LANES}f64" if LANES > 1 else "llvm.fabs.f64"
-        return builder.call(declared(builder.module, name, _KIND, 1), arguments)
 
-    return LANE(LANE), generate
+@intrinsic
+def root(typing_context, a):
+    """Return the square roots."""
+    return LANE(LANE), _called("sqrt")
 
 
 @intrinsic

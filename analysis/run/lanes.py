@@ -10,23 +10,19 @@ A run fits here if its inputs are constant in each interval. Others, which have 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import cache
 from math import isfinite, isnan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import int64, types
 from numpy.typing import NDArray
 
-from linkwork import tableau
 from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 
-from ..numerics.codegen import MAKING, MachineCode, copy, evaluate, inline, inner, kernel, part
+from ..numerics.codegen import copy, evaluate, inline, inner, kernel, part
 from ..numerics.references import refer
-from ..numerics.symbolic import library
 from ..numerics.vectors import LANES
 from .compiled import (
     BATCH,
@@ -41,21 +37,19 @@ from .compiled import (
     sample_step,
     take,
 )
-from .equations import CLEARANCE, DERIVATIVE, JUMP, machine
+from .equations import CLEARANCE, DERIVATIVE, machine
 from .locating import end_at, locate_events
 from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
 from .sources import ADDRESSES, SOURCE, Source
 from .stepping import STAGES, following, shorter
-
-#: In the place of a sum of squares that is zero.
-LEAST = 1e-300
+from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpolate_in_lanes, stage_in_lanes
 
 
 class Lanes(NamedTuple):
     """Work arrays: addresses of the functions in lanes; of each lane its run or -1, where that is, whether the step is the last
     of its interval, what became of it; and in lanes the state, its end and that at a stage, modes, channels, constants, scales,
-    step size, fraction of the step, stages, interpolant, clearance; and a row for each lane, the state at the fraction. After
-    the state at the end of the step comes the error."""
+    step size, error, fraction of the step, stages, interpolant, clearance; and a row for each lane, the state at the
+    fraction."""
 
     code: NDArray[np.int64]
     run: NDArray[np.int64]
@@ -70,6 +64,7 @@ class Lanes(NamedTuple):
     p: NDArray[np.float64]
     scale: NDArray[np.float64]
     h: NDArray[np.float64]
+    error: NDArray[np.float64]
     fraction: NDArray[np.float64]
     k: NDArray[np.float64]
     f: NDArray[np.float64]
@@ -81,47 +76,11 @@ class Lanes(NamedTuple):
 _BETWEEN, _ENTERED, _INSIDE = range(3)
 # What became of a step
 _IDLE, _REJECTED, _ACCEPTED, _SAMPLED = range(4)
-# Places of addresses, after the equations: stage s of a step at _STAGE + s
-_STAGE = JUMP
-_INTERPOLANT, _INTERPOLATE = _STAGE + 16, _STAGE + 17
 
 
 def code_of(mechanism: Mechanism, switched: bool) -> NDArray[np.int64]:
-    """Return the addresses of the equations in lanes, and of the straight lines of a step."""
-    return np.concatenate([machine(mechanism, switched, LANES).addresses, _code_of_steps(mechanism.size)])
-
-
-@cache
-def _code_of_steps(n: int) -> NDArray[np.int64]:
-    """Return the addresses of the sums of a step of n states: `stepping.stage` and its kin, without loops.
-
-    The end of a step is followed by its error, of order 8 in the step size; without a number where the end is not finite.
-    """
-    casadi = library()
-    x, k, h, scale, y = (casadi.SX.sym(name, size) for name, size in zip("xkhsy", (n, 16 * n, 1, n, n)))
-    f, t = casadi.SX.sym("f", 7 * n), casadi.SX.sym("t")
-
-    def total(pairs: Iterable[tuple[int, float]]) -> Any:
-        return sum((weight * k[n * j : n * (j + 1)] for j, weight in pairs if weight), casadi.SX.zeros(n))
-
-    stages = {f"stage{s}": x + h * total(tableau.A[s]) for s in range(1, 16)}
-    end = stages[f"stage{STAGES}"]
-    weight = scale + casadi.fmax(casadi.fabs(x), casadi.fabs(end))
-    sum3, sum5 = (casadi.sumsqr(total(enumerate(row)) / weight) for row in (tableau.E3, tableau.E5))
-    bottom = casadi.fmax((sum5 + 0.01 * sum3) * n, LEAST)
-    stages[f"stage{STAGES}"] = casadi.vertcat(end, h * sum5 / casadi.sqrt(bottom))
-    delta, first, last = y - x, k[:n], k[n * STAGES : n * (STAGES + 1)]
-    interpolant = [delta, h * first - delta, 2.0 * delta - h * (last + first)]
-    interpolant += [h * total(enumerate(row)) for row in tableau.D]
-    between = casadi.SX.zeros(n)
-    for r in range(7):
-        between = (between + f[n * (6 - r) : n * (7 - r)]) * (h if r % 2 == 0 else 1.0 - h)
-    functions = [casadi.Function(name, [t, x, k, h, scale], [value], {"cse": True}) for name, value in stages.items()]
-    functions.append(casadi.Function("interpolant", [t, x, k, h, y], [casadi.vertcat(*interpolant)], {"cse": True}))
-    functions.append(casadi.Function("interpolate", [t, x, f, h, scale], [x + between]))
-    with MAKING:
-        addresses = MachineCode(functions, LANES, ("interpolate",)).addresses
-    return np.array([addresses[function.name()] for function in functions], dtype=np.int64)
+    """Return the addresses of the equations in lanes."""
+    return machine(mechanism, switched, LANES).addresses
 
 
 @part
@@ -130,9 +89,9 @@ def _make_lanes(code, states, modes, channels, constants):
     n = states * LANES
     return Lanes(
         code, np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
-        np.zeros(n), np.zeros(n + LANES), np.zeros(n), np.zeros(modes * LANES), np.zeros(channels * LANES),
-        np.zeros(constants * LANES), np.zeros(n), np.zeros(LANES), np.zeros(LANES), np.zeros((16, n)), np.zeros((7, n)),
-        np.zeros(LANES), np.zeros((LANES, states)),
+        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(modes * LANES), np.zeros(channels * LANES),
+        np.zeros(constants * LANES), np.zeros(n), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros((16, n)),
+        np.zeros((7, n)), np.zeros(LANES), np.zeros((LANES, states)),
     )  # fmt: skip
 
 
@@ -142,27 +101,22 @@ def _equation(which, x, out, v):
 
 
 @inner
-def _stage(s, out, v):
-    """Compute the states at a stage of the lanes' steps; after those at the end the errors."""
-    evaluate(v.code[_STAGE + s], 0.0, v.x, v.k, v.h, v.scale, out)
-
-
-@inner
 def _attempt(v):
     """Take a step in all lanes into ``v.y``, as `stepping.attempt`."""
     for s in range(1, STAGES):
-        _stage(s, v.y, v)
+        stage_in_lanes(s, v.x, v.k, v.h, v.y)
         _equation(DERIVATIVE, v.y, v.k[s], v)
-    _stage(STAGES, v.y, v)
+    stage_in_lanes(STAGES, v.x, v.k, v.h, v.y)
+    errors_in_lanes(v.x, v.y, v.k, v.h, v.scale, v.error)
 
 
 @inner
 def _make_interpolants(v):
     """Compute the interpolants of all lanes' steps."""
     for s in range(STAGES + 1, 16):
-        _stage(s, v.z, v)
+        stage_in_lanes(s, v.x, v.k, v.h, v.z)
         _equation(DERIVATIVE, v.z, v.k[s], v)
-    evaluate(v.code[_INTERPOLANT], 0.0, v.x, v.k, v.h, v.y, v.f)
+    interpolants_in_lanes(v.x, v.y, v.k, v.h, v.f)
 
 
 @inner
@@ -181,7 +135,7 @@ def _sample(samples, state, v):
                     v.outcome[lane] = _ACCEPTED
         if not more:
             return
-        evaluate(v.code[_INTERPOLATE], 0.0, v.x, v.f, v.fraction, v.scale, v.between)
+        interpolate_in_lanes(v.fraction, v.x, v.f, v.between)
         for lane in range(LANES):
             if v.outcome[lane] == _SAMPLED:
                 i = v.run[lane]
@@ -332,9 +286,9 @@ def _end_at_limit(lane, v, w):
 @inner
 def _decide(lane, least, v, w):
     """Decide what becomes of the step of a lane."""
-    i, h, states = v.run[lane], v.h[lane], w.state.x.shape[1]
+    i, h = v.run[lane], v.h[lane]
     carry = w.state.carries[i]
-    error = v.y[LANES * states + lane] / w.problem.tolerance
+    error = v.error[lane] / w.problem.tolerance
     v.outcome[lane] = _judge(lane, error, carry, w.samples, v)
     if v.outcome[lane] != _REJECTED:
         carry.step = following(h, carry.step, error)

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ...numerics.codegen import evaluate, inner, part
-from ...numerics.vectors import LANES, fused, greater, load, size, store
+from ...numerics.vectors import LANES, fused, load, store
 from ...run.compiled import put, take
-from ...run.stepping import E3, E5, FROM, NODES, ROW, STAGES, WEIGHT, following, shorter
+from ...run.stepping import NODES, STAGES, following, shorter
+from ...run.stepping_in_lanes import errors_in_lanes, stage_in_lanes
 from .flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from .kernels import DONE, LEAST_STEP, LIMIT, NO_STEP, STALL, STALLED, start_piece
 
@@ -26,16 +27,16 @@ RUNNING, IDLE = -1, -2
 
 class Tracks(NamedTuple):
     """Work space of the lanes. In lanes: z, which is y and the columns of its derivatives, at the beginning of a step and at a
-    stage; arguments and values of the flow; stages; sums of the error. A number of each lane: angle, its end, step and the next
-    one, tolerance, least speed, clearance; status. Not in lanes: z of one lane, and the magnitudes of z."""
+    stage; arguments and values of the flow; stages; the magnitudes of z. A number of each lane: error, angle, its end, step and
+    the next one, tolerance, least speed, clearance; status. Not in lanes: z of one lane."""
 
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     argument: NDArray[np.float64]
     out: NDArray[np.float64]
     k: NDArray[np.float64]
-    sum3: NDArray[np.float64]
-    sum5: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    error: NDArray[np.float64]
     angle: NDArray[np.float64]
     end: NDArray[np.float64]
     h: NDArray[np.float64]
@@ -45,7 +46,6 @@ class Tracks(NamedTuple):
     gap: NDArray[np.float64]
     status: NDArray[np.int64]
     z: NDArray[np.float64]
-    sizes: NDArray[np.float64]
 
 
 @part
@@ -55,8 +55,8 @@ def make_tracks(n, columns):
     lanes = width * LANES
     return Tracks(
         np.zeros(lanes), np.zeros(lanes), np.zeros((n + 1) * LANES), np.zeros(n * (1 + n) * LANES), np.zeros((STAGES, lanes)),
-        np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.ones(LANES),
-        np.zeros(LANES), np.zeros(LANES), np.full(LANES, IDLE), np.zeros(width), np.zeros(width),
+        np.zeros(lanes), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.ones(LANES),
+        np.zeros(LANES), np.zeros(LANES), np.full(LANES, IDLE), np.zeros(width),
     )  # fmt: skip
 
 
@@ -65,9 +65,9 @@ def set_scale(scale, v):
     """Set the magnitudes of z from those of y."""
     n = scale.shape[0]
     for i in range(n):
-        v.sizes[i] = scale[i]
-        for j in range(v.sizes.shape[0] // n - 1):
-            v.sizes[n + j * n + i] = scale[i] / scale[j]
+        store(v.sizes, i, scale[i])
+        for j in range(v.z.shape[0] // n - 1):
+            store(v.sizes, n + j * n + i, scale[i] / scale[j])
 
 
 @inner
@@ -118,27 +118,13 @@ def _rates(section, s, z, v):
 
 @inner
 def _attempt(section, v):
-    """Take a step in all lanes into ``v.y``, with the sums of `stepping.attempt` for its error, and the clearance after it."""
-    h = load(v.h, 0)
+    """Take a step in all lanes into ``v.y``, with its error and the clearance after it."""
     _rates(section, 0, v.x, v)
-    for s in range(1, STAGES + 1):
-        for i in range(v.sizes.shape[0]):
-            total = 0.0 * h
-            for j in range(ROW[s], ROW[s + 1]):
-                total = fused(WEIGHT[j], load(v.k[FROM[j]], i), total)
-            store(v.y, i, fused(h, total, load(v.x, i)))
-        if s < STAGES:
-            _rates(section, s, v.y, v)
-    sum3, sum5, valid = 0.0 * h, 0.0 * h, 0.0 * h
-    for i in range(v.sizes.shape[0]):
-        e3, e5, end = 0.0 * h, 0.0 * h, load(v.y, i)
-        for j in range(STAGES):
-            e3, e5 = fused(E3[j], load(v.k[j], i), e3), fused(E5[j], load(v.k[j], i), e5)
-        weight = 1.0 / (v.sizes[i] + greater(size(load(v.x, i)), size(end)))
-        e3, e5, valid = e3 * weight, e5 * weight, fused(0.0, end, valid)
-        sum3, sum5 = fused(e3, e3, sum3), fused(e5, e5, sum5)
-    store(v.sum3, 0, sum3 + valid)
-    store(v.sum5, 0, sum5 + valid)
+    for s in range(1, STAGES):
+        stage_in_lanes(s, v.x, v.k, v.h, v.y)
+        _rates(section, s, v.y, v)
+    stage_in_lanes(STAGES, v.x, v.k, v.h, v.y)
+    errors_in_lanes(v.x, v.y, v.k, v.h, v.sizes, v.error)
     _set_argument(1.0, section.scale.shape[0], v.y, v)
     evaluate(section.equations[IN_LANES + GAP], 0.0, v.argument, section.modes, section.drive, section.p, v.gap)
 
@@ -147,8 +133,7 @@ def _attempt(section, v):
 def _judge(lane, section, last, v):
     """Accept the step of a lane or make it shorter; return whether its motion has ended."""
     h, n = v.h[lane], section.scale.shape[0]
-    bottom = v.sum5[lane] + 0.01 * v.sum3[lane]
-    error = 0.0 if bottom == 0.0 else h * v.sum5[lane] / np.sqrt(bottom * v.sizes.shape[0]) / v.tolerance[lane]
+    error = v.error[lane] / v.tolerance[lane]
     if not error <= 1.0:
         # beyond the limit of assembly the error is NaN
         v.step[lane] = shorter(h, error)

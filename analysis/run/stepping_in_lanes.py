@@ -1,0 +1,84 @@
+"""A step of the integrator in all lanes of the processor at once, for ensembles and periodic motions: DOP853 as in `stepping`.
+
+Arrays are in lanes (`numerics.vectors`): states, scales, the stages k[s], the coefficients of the interpolant f[r]; step sizes,
+errors and fractions are a number of each lane. Sums are rounded once for each of their terms, so that they differ from those of
+`stepping` in the last digits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from linkwork import tableau
+
+from ..numerics.codegen import inner
+from ..numerics.vectors import LANES, fused, greater, load, root, size, spread, store
+from .stepping import E3, E5, FROM, ROW, STAGES, WEIGHT
+
+#: In the place of a sum of squares that is zero.
+LEAST = 1e-300
+# stages that the error and the interpolant need, which are few of the first ones, with their weights
+_OF_ERROR = np.flatnonzero((E3 != 0.0) | (E5 != 0.0))
+_E3, _E5 = E3[_OF_ERROR], E5[_OF_ERROR]
+_OF_CURVE = np.flatnonzero(np.any(tableau.D, axis=0))
+_D0, _D1, _D2, _D3 = np.array(tableau.D)[:, _OF_CURVE].copy()
+
+
+@inner
+def stage_in_lanes(s, x, k, h, y):
+    """Compute the states at stage s of steps of size h from x; stage 12 is the end of the step."""
+    step = load(h, 0)
+    for i in range(x.shape[0] // LANES):
+        total = 0.0 * step
+        for j in range(ROW[s], ROW[s + 1]):
+            total = fused(WEIGHT[j], load(k[FROM[j]], i), total)
+        store(y, i, fused(step, total, load(x, i)))
+
+
+@inner
+def errors_in_lanes(x, y, k, h, scale, errors):
+    """Estimate the relative errors of steps from x to y, of order 8 in h (Hairer); NaN where y is not finite."""
+    step = load(h, 0)
+    sum3, sum5, valid = 0.0 * step, 0.0 * step, 0.0 * step
+    n = x.shape[0] // LANES
+    for i in range(n):
+        e3, e5, end = 0.0 * step, 0.0 * step, load(y, i)
+        for j in range(_OF_ERROR.shape[0]):
+            rate = load(k[_OF_ERROR[j]], i)
+            e3, e5 = fused(_E3[j], rate, e3), fused(_E5[j], rate, e5)
+        weight = 1.0 / (load(scale, i) + greater(size(load(x, i)), size(end)))
+        e3, e5, valid = e3 * weight, e5 * weight, fused(0.0, end, valid)
+        sum3, sum5 = fused(e3, e3, sum3), fused(e5, e5, sum5)
+    bottom = greater(float(n) * (sum5 + 0.01 * sum3), 0.0 * step + LEAST)
+    store(errors, 0, step * sum5 / root(bottom) + valid)
+
+
+@inner
+def interpolants_in_lanes(x, y, k, h, f):
+    """Compute the coefficients of the interpolants between x and y (Hairer's contd8); k holds all sixteen stages."""
+    step = load(h, 0)
+    for i in range(x.shape[0] // LANES):
+        delta, first = load(y, i) - load(x, i), step * load(k[0], i)
+        store(f[0], i, delta)
+        store(f[1], i, first - delta)
+        store(f[2], i, 2.0 * delta - (step * load(k[STAGES], i) + first))
+        a = b = c = d = 0.0 * step
+        for j in range(_OF_CURVE.shape[0]):
+            rate = load(k[_OF_CURVE[j]], i)
+            a, b, c, d = fused(_D0[j], rate, a), fused(_D1[j], rate, b), fused(_D2[j], rate, c), fused(_D3[j], rate, d)
+        store(f[3], i, step * a)
+        store(f[4], i, step * b)
+        store(f[5], i, step * c)
+        store(f[6], i, step * d)
+
+
+@inner
+def interpolate_in_lanes(fractions, x, f, out):
+    """Interpolate the states at fractions of the steps into rows, one for each lane."""
+    after = load(fractions, 0)
+    before = 1.0 - after
+    for i in range(x.shape[0] // LANES):
+        total = (load(f[6], i) * after + load(f[5], i)) * before
+        total = ((total + load(f[4], i)) * after + load(f[3], i)) * before
+        total = ((total + load(f[2], i)) * after + load(f[1], i)) * before
+        spread(out, i, fused(total + load(f[0], i), after, load(x, i)))
