@@ -176,6 +176,7 @@ def test_torque_drive_over_its_torque(tmp_path: Path) -> None:
     assert response.branches[0].special[0].kind is Crossing.FOLD
     rows = np.loadtxt(response.to_csv(tmp_path / "torque.csv"), delimiter=",", skiprows=1)
     assert len(rows) == sum(map(len, response.branches))
+    assert set(rows[:, 0]) == set(range(1, len(response.branches) + 1))
 
 
 def test_no_orbit_at_either_end_is_an_error() -> None:

@@ -111,6 +111,11 @@ def test_a_small_margin_is_given_more_turns() -> None:
     assert run.agrees
     # told too soon the run stays bounded, and its growth is held to the multiplier's
     assert confirm(rig, drive, turns=500).agrees
+    # of a motion that neither decays nor grows within the run the growth has to be that of its multiplier
+    margin = run.verdict.margin
+    slow = replace(run, outcome=Outcome.BOUNDED, growth=1.0 - 1.05 * margin)
+    assert slow.agrees
+    assert not replace(slow, growth=1.0 - 1.2 * margin).agrees
 
 
 # Lines
