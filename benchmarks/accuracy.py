@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -45,13 +45,13 @@ def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choic
     return min(tried, key=lambda choice: choice.error)._replace(reached=False)
 
 
-def best_time(run: Callable[[], object], repeats: int = 7, timer: Callable[[], float] = perf_counter) -> float:
-    """Return the shortest time of several runs (s), by the clock or another timer."""
+def best_time(run: Callable[[], object], repeats: int = 7) -> float:
+    """Return the shortest of several runs in time of the processor (s), which other work disturbs little."""
     times = []
     for _ in range(repeats):
-        begun = timer()
+        begun = process_time()
         run()
-        times.append(timer() - begun)
+        times.append(process_time() - begun)
     return min(times)
 
 

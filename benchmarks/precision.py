@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +27,7 @@ from analysis.figures.style import COLOURS
 from benchmarks import engines
 from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, best_time
 from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
-from benchmarks.ensembles import without_lanes
+from benchmarks.ensembles import kernels_timed, without_lanes
 from benchmarks.solvers import by_multipliers
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -60,9 +59,13 @@ def in_process(case: Case, of: str) -> list[Point]:
     for tolerance in TOLERANCES.tolist():
         error = relative_error(case, run(tolerance)["slider.position"])
         if of == "whole":
-            seconds = best_time(partial(run, tolerance), 40, process_time)
+            seconds = best_time(partial(run, tolerance), 40)
         else:
-            seconds = min(run(tolerance).statistics["seconds_integrating"] for _ in range(40))
+            spent: list[float] = []
+            with kernels_timed(spent):
+                for _ in range(40):
+                    run(tolerance)
+            seconds = min(spent)
         points.append(Point(error, seconds))
     return points
 
@@ -72,7 +75,7 @@ def at_tolerances(case: Case, run: Callable[[float], np.ndarray], repeats: int =
     points = []
     for tolerance in TOLERANCES[::2].tolist():
         error = relative_error(case, run(tolerance))
-        points.append(Point(error, best_time(partial(run, tolerance), repeats, process_time)))
+        points.append(Point(error, best_time(partial(run, tolerance), repeats)))
     return points
 
 
@@ -120,12 +123,22 @@ def picture(found: dict[str, dict[str, list[Point]]]) -> Any:
         unit = at_accuracy(solvers[OURS])
         curves = []
         for name, points in solvers.items():
-            x, y = zip(*((p.seconds / unit, p.error) for p in points if isfinite(p.error) and p.error < 1.0))
+            usable = [p for p in points if isfinite(p.error) and p.error < 1.0]
             width = 2.2 if name.startswith("Linkwork") else 1.0
             # there are fewer colours than solvers
             again = len(curves) >= len(COLOURS)
             line, label = "--" if again else "-", "" if panels else name
-            curves.append(Curve(x=x, y=y, label=label, marker="o", width=width, line=line, hollow=again))
+            curves.append(
+                Curve(
+                    x=[p.seconds / unit for p in usable],
+                    y=[p.error for p in usable],
+                    label=label,
+                    marker="o",
+                    width=width,
+                    line=line,
+                    hollow=again,
+                )
+            )
         panels.append(
             Panel(
                 x_label="time, over that of our integration to 1e-6",
@@ -143,7 +156,7 @@ def costs(most: int) -> list[tuple[int, float, float]]:
     """Measure ensembles: number of runs, time of each over that of one alone, in lanes and one after the other."""
     speed = SETS["table-3.1"].crank_speed
     settings = {"stop_time": 0.1, "step": 1e-2}
-    alone = best_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40, process_time)
+    alone = best_time(lambda: simulate(TABLE_3_1, Inputs(speed=speed), **settings), 40)
     rows = []
     for count in (count for count in COUNTS if count <= most):
         values = {"slider.stiffness": np.linspace(500.0, 1500.0, count)}
@@ -152,9 +165,9 @@ def costs(most: int) -> list[tuple[int, float, float]]:
             return simulate_many(TABLE_3_1, Inputs(speed=speed), vary=values, outputs=["slider.position"], **settings)
 
         repeats = max(1, min(20, 20_000 // count))
-        lanes = best_time(together, repeats, process_time)
+        lanes = best_time(together, repeats)
         with without_lanes():
-            apart = best_time(together, max(1, repeats // 4), process_time)
+            apart = best_time(together, max(1, repeats // 4))
         rows.append((count, lanes / count / alone, apart / count / alone))
     return rows
 
