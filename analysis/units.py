@@ -23,6 +23,9 @@ Units = str | Mapping[str, str] | Callable[[], Mapping[str, str]]
 
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 
+#: Magnitude in the units of tables and pictures (mm, deg, N) below which a result is rounding, and shown as zero.
+ROUNDING = 1e-9
+
 #: Units of length (m).
 LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})
 

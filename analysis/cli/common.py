@@ -203,7 +203,7 @@ def workers_options(default: int | None = None) -> Callable[..., Any]:
         metavar="ADDRESS",
         expose_value=False,
         callback=_join,
-        help="Of a Dask cluster, such as tcp://10.0.0.5:8786, over all of whose cores work goes instead.",
+        help="Of a Dask cluster, such as tcp://10.0.0.5:8786: run on its cores instead.",
     )
     return lambda command: jobs(scheduler(command))
 

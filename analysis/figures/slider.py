@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..slider import SliderDrive, TrackingResult
+from ..units import ROUNDING
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
-from .style import ROUNDING
 
 
 @plot.register

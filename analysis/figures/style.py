@@ -61,9 +61,6 @@ STYLE: dict[Any, Any] = {
     "lines.markersize": 4.5,
 }
 
-#: Magnitude in drawn units (mm, deg, N) below which a result is rounding, and drawn as zero.
-ROUNDING = 1e-9
-
 #: A line at a value that means something, such as zero, and one at a place that is marked.
 REFERENCE: dict[str, Any] = {"color": "0.6", "linewidth": HAIR, "zorder": 1}
 MARK: dict[str, Any] = {"color": "0.35", "linewidth": THIN, "linestyle": ":", "zorder": 1}

@@ -39,6 +39,7 @@ from ..synthesis import (
     quality_name,
     quality_unit,
 )
+from ..units import ROUNDING
 from .animation import check_frames, gif
 from .dispatch import animate, plot
 from .marks import roomiest
@@ -54,7 +55,6 @@ from .style import (
     LETTER,
     LINE,
     ROCKER,
-    ROUNDING,
     SLIDER,
     SMALL,
     TARGET,

@@ -57,9 +57,16 @@ def parameters_from(
     data = {name: value for name, value in data.items() if name != "mechanism"}
     keys = {field_name(name): name for name in mechanism.mechanism_variables}
     flat = resolve_sections(mechanism, files.flattened(data), base)
-    made: Parameters = files.read(
-        mechanism.parameters, flat, "", readers=parameter_readers(mechanism), keys=keys, base=base
-    )
+    try:
+        made: Parameters = files.read(
+            mechanism.parameters, flat, "", readers=parameter_readers(mechanism), keys=keys, base=base
+        )
+    except MissingParameterError as error:
+        bare = [link for link in mechanism.links if link.length in flat and link.inertia not in flat]
+        if bare:
+            sections = ", ".join(f"{link.name}.section" for link in bare)
+            error.args = (f"{error}; give masses and inertias, or what they follow from: {sections}",)
+        raise
     return made
 
 

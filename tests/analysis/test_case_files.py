@@ -77,6 +77,9 @@ def test_parameters_say_whose_they_are(name):
 def test_missing_names_are_listed():
     with pytest.raises(MissingParameterError, match=r"ground\.length is missing.*rocker\.cog_distance"):
         parameters_from({"slider": {"stiffness": 1.0}}, mechanism=FIVE_BAR)
+    lengths = {"crank.length": 0.05, "crank.inertia": 1e-3, "coupler.length": 0.15, "rocker.length": 0.15}
+    with pytest.raises(MissingParameterError, match=r"what they follow from: coupler\.section, rocker\.section$"):
+        parameters_from(lengths, mechanism=FIVE_BAR)
 
 
 @pytest.mark.parametrize(

@@ -390,6 +390,7 @@ def test_command_of_five_poses(linkwork: Callable[..., Result], tmp_path: Path) 
         "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "linkage.toml",
         *(f"linkage-{rank}.toml" for rank in range(2, 8)),
     }  # fmt: skip
+    assert "rms error 0 mm, worst 0 mm" in (tmp_path / "out" / "best-report.txt").read_text()  # no rounding errors
     case = load_case(tmp_path / "out" / "linkage-7.toml")
     assert (
         simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step).status

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ...units import ROUNDING
 from ..linkage.kernels import PLACES
 from ..linkage.linkage import ANGLES, LENGTHS, LINKS, FiveBar, Linkage, SliderCrank, wrapped
 from ..linkage.pivot import SecondCrank, SliderMotion, format_ratio
@@ -355,6 +356,11 @@ def quality_name(task: Task) -> str:
     return f"sum of {'weighted ' if weighted else ''}squared {what}"
 
 
+def _met(solution: Solution) -> bool:
+    """Return whether a solution meets its task but for rounding."""
+    return error_unit(solution.task)[0] * solution.evaluation.worst < ROUNDING
+
+
 def format_dimension(name: str, value: float) -> str:
     """Format a dimension with its unit."""
     if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
@@ -369,10 +375,10 @@ def headline(solution: Solution) -> str:
     scale, length = error_unit(solution.task)
     v = solution.verdicts
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
-    error = factor * solution.error
+    error, worst = (0.0, 0.0) if _met(solution) else (factor * solution.error, scale * solution.evaluation.worst)
     return (
         f"{quality_name(solution.task)} {f'{error:.4g}' if error < 1e4 else f'{error:.0f}'} {unit}\n"
-        f"worst error {scale * solution.evaluation.worst:.3g} {length}, largest link {1e3 * solution.largest_link:.4g} mm\n"
+        f"worst error {worst:.3g} {length}, largest link {1e3 * solution.largest_link:.4g} mm\n"
         f"transmission angle {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")
         + (f"\n{', '.join(v.defects)}" if v.defects else "")
@@ -495,9 +501,11 @@ def quality_headings(task: Task) -> tuple[str, str, str]:
 
 
 def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
-    """Return quality function, rms error and greatest error of a solution as text."""
+    """Return quality function, rms error and greatest error of a solution as text; zero if the task is met but for rounding."""
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
+    if _met(solution):
+        return "0", "0", "0"
     return f"{factor * solution.error:.{digits}g}", f"{scale * found.rms:.4g}", f"{scale * found.worst:.4g}"
 
 

@@ -413,7 +413,7 @@ def violated(
     if off.max() <= KEPT:
         return f"{answer.worst} by {answer.excess}"
     name = UNKNOWNS[int(off.argmax())]
-    over = f"{degrees(off.max()):.3g} deg" if name in ANGLES else f"{1e3 * normal.unit * off.max():.3g} mm"
+    over = f"{degrees(off.max()):.3g} deg" if name in ANGLES else f"{1e3 * normal.unit * off.max():.6g} mm"
     return f"bound of {name} by {over}"
 
 
