@@ -163,7 +163,9 @@ class Walk:
             text = f"{full} returned {STATUS[status] if status < len(STATUS) else status} for a legal call"
             self.note(WRONG, f"{name}: strange status", text)
         elif status == ERROR:
-            severity = QUESTIONABLE if name in _MAY_REFUSE or name.startswith("Set") else WRONG
+            # before the start of a run all is computed from start values, which the probe chose
+            may = name in _MAY_REFUSE or name.startswith("Set") or state in ("instantiated", "ready", "initialization")
+            severity = QUESTIONABLE if may else WRONG
             said = f" ({self.session.messages[-1]})" if self.session.messages else ""
             self.note(
                 severity,

@@ -110,7 +110,7 @@ def linkages(case: Case, wanted: Linkages) -> Answer:
     found = synthesize(
         wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=Search(starts=wanted.starts)
     )
-    headings = ["rank", "area [mm²]", "worst [mm]", "transmission [deg]", "longest link [mm]", "kind"]
+    headings = ["rank", "area [mm²]", "worst [mm]", "transmission [deg]", "largest link [mm]", "kind"]
     rows, states, curves, files = [], [], [], []
     with folder() as place:
         for rank, solution in enumerate(found.solutions, 1):

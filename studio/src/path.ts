@@ -69,7 +69,7 @@ function drawing(form: PathForm): { rows: Child[]; target: () => object } {
 export function pathPart(form: PathForm): HTMLElement {
   const { rows, target } = drawing(form);
   const [angle, leastAngle] = number("transmission angle at least", "deg", 40, { least: 0, below: 90 });
-  const [longest, longestLink] = number("longest link", "mm", "", { above: 0, missing: Infinity });
+  const [longest, longestLink] = number("largest link", "mm", "", { above: 0, missing: Infinity });
   const [harmonics, count] = number("harmonics", "", 2, { least: 1, whole: true });
   const [stroke, greatest] = number("stroke at most", "mm", "", { above: 0, missing: Infinity });
   const length = (name: string, mm: number): object => (Number.isFinite(mm) ? { [name]: mm / 1e3 } : {});

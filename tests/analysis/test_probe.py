@@ -9,12 +9,14 @@ import tarfile
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from analysis import probe
 from analysis.cli import main
+from analysis.probe.walk import Walk
 from linkwork.errors import InputError
 
 SOURCES = Path(__file__).parent / "probed"
@@ -265,3 +267,13 @@ def test_an_fmu_that_makes_no_instance_is_said(natives: dict[str, Path], tmp_pat
     assert (
         probe.probe(tmp_path / "other.fmu", interface="cs", checks=["legal"], calls=10).findings[0].severity == "wrong"
     )
+
+
+@pytest.mark.parametrize(("state", "severity"), [("initialization", "questionable"), ("continuous", "wrong")])
+def test_an_fmu_may_refuse_what_follows_from_start_values(state: str, severity: str) -> None:
+    found = []
+    session = SimpleNamespace(prefix="fmi2", messages=["the bodies cannot be joined"])
+    walk = SimpleNamespace(judged=True, session=session, note=lambda *said: found.append(said))
+    Walk._judge(walk, "GetContinuousStates", state, 3)
+    assert [said[0] for said in found] == [severity]
+    assert "cannot be joined" in found[0][2]
