@@ -584,7 +584,7 @@ def torque_result() -> StudyResult:
                 text("3.2.1, L2001-2005; the same in L2017-2029"),
                 f"share of the slider's acceleration in the difference of the torque between {_k(5e5)} and 2e6, at "
                 "the extremes",
-                "more than half",
+                "more than half, as *due to* says",
                 tuple(at_least(f"{name} torque", 0.5, x) for name, (x, _) in shares.items()),
                 "at the least torque the acceleration makes hardly any of it, and at the greatest it acts against "
                 "it: the terms with the squares of the velocities, at another position, make the difference",

@@ -325,7 +325,7 @@ def compute_deviation() -> StudyResult:
                 text("4.5.1, L3146-3150"),
                 "greatest distance of the deviation from a straight line through zero, of the greatest deviation, up "
                 "to I4 = 1.5; deviation at I4 = 0",
-                f"{ALIKE_WORDS}; rounding",
+                f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
                 (
                     at_most("distance from the line", ALIKE, bent),
                     near("at I4 = 0", "0", found[0], 1e-6, "rad/s"),
@@ -336,7 +336,7 @@ def compute_deviation() -> StudyResult:
                 "differential equation describing an idealised spring-mass system.",
                 text("4.5.1, L3152-3156"),
                 "greatest coefficient of the right equation beyond a mass on a spring",
-                "rounding",
+                "1e-12, above rounding errors",
                 (at_most("", 1e-12, rest),),
             ),
         ),

@@ -327,7 +327,7 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "approximately constant with increase of [sigma3].",
             text("5.3.1, L3892-3898"),
             "axis A of the true periodic motion at sigma3 = 0.8; its range over sigma3 relative to it",
-            f"half a unit of the last digit; {ALIKE_WORDS}",
+            f"half a unit of the last digit; {ALIKE:g}, the rule for *constant*: *approximately* is no 15 % here either",
             tuple(
                 case
                 for (words, of), why in zip(both.items(), (f"the listing has {listed:.4f} at {LISTED_RATIO}", follow))

@@ -551,7 +551,7 @@ def _free_causes() -> Statement:
         text("3.3, L2253-2259"),
         "change of the mechanical energy in a turn relative to that of the crank speed squared, greatest: without it "
         f"the speed swings because the inertia changes with the position; {UNDAMPED}",
-        f"less than half; {ALIKE_WORDS}",
+        f"less than half, as *due to* says; {ALIKE_WORDS}",
         (*swings, *_undamped({label: coast(k, 0.0) for label, k in BOTH.items()}, 0.0)),
     )
 

@@ -101,9 +101,9 @@ def residuals() -> dict[str, float]:
     return worst
 
 
-def coefficients(sigma2: float) -> dict[str, float]:
+def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
     """Return the coefficients of (4.21) as printed, about its own datum, relative to the right ones of first order."""
-    mechanism = with_crank(sigma2)
+    mechanism = with_crank(sigma2, inertia_ratio)
     right = slider_equation(mechanism, 1.0, variant=Variant.FIRST_ORDER)
     parts = printed(ratios(mechanism), datum(sigma2))
     found = {name: _over(getattr(parts, name), parts.spring) for name in ("inertia", "stiffness", "force")}
