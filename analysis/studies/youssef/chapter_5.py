@@ -61,9 +61,9 @@ region is not negligible: the terms of first order largely cancel in the first, 
 with the longest crank wider. The axes of Fig 5.2 and 5.3 are not those of I4 = 1 and 2, which the text has: 1.96 is that
 of I4 = 0.5, which the listing has, and 1.968 lies near it (1.967; by the listing 1.964). Fig 5.3 varies the coupler with
 the angles held, to which another ground link belongs at each length; on one ground link the region is narrowest at equal
-links. Nor is it narrower than those of Fig 5.1 and 5.2. Nine terms of the determinant give two regions, not all. The
-zeroth boundary does not part two stable regions: beyond it, at a thousand rad/s or so, the slider falls away, and no
-damper stops it."""
+links. Nor is the region of Fig 5.3 narrower than those of Fig 5.1 and 5.2. Cut after nine terms, the determinant gives
+two regions, not all. The zeroth boundary does not part two stable regions: beyond it, at a thousand rad/s or so, the
+slider falls away, and no damper stops it."""
 
 #: omega_c (1/s) that removes the region up to I4 = 1.5, as stated.
 STATED = 0.45
