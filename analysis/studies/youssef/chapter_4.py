@@ -212,7 +212,7 @@ def compute_first() -> StudyResult:
                 "THIS PROG. INV[E]STIG[A]TES RESONANCE IN PRES[EN]CE OF DAMPING",
                 listing("appendix 2, L8398"),
                 "both speeds at which the determinant of (4.33) vanishes without a damper, and the second harmonic "
-                "at its resonance: by the listing, run to the letter, and by the right equation",
+                "at its resonance: by the listing, run with I4 set to each, and by the right equation",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
                 "M' zeta' is missing, and every term in the crank's length is halved",
