@@ -53,6 +53,9 @@ def test_programs_halve_the_inertias_harmonics() -> None:
 def test_datum_of_the_programs_is_a_degree_off() -> None:
     assert np.degrees(datum(published.SIGMA2).crank) == pytest.approx(148.08, abs=0.005)
     assert np.degrees(DATUM.crank) == 149.0
+    # (4.6) with alpha4 rounded to whole degrees gives their other angles
+    crank, coupler, _ = np.degrees(datum(published.SIGMA2, DATUM.rocker))
+    assert (crank, coupler) == pytest.approx((148.57, 57.13), abs=0.006)
 
 
 def test_sum_of_squares_as_printed_leaves_out_the_mounting_of_the_coupler() -> None:

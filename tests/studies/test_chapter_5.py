@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, Stability, confirm
 from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, removing, without_factor
 from analysis.studies.youssef.linearised import with_crank
@@ -18,7 +21,15 @@ from analysis.studies.youssef.regions import (
     removing_estimate,
     right,
 )
-from analysis.youssef import Form, Variant, boundary_stiffnesses, monodromy, perturbed_region, slider_equation
+from analysis.youssef import (
+    Form,
+    Variant,
+    boundary_stiffnesses,
+    hill_regions,
+    monodromy,
+    perturbed_region,
+    slider_equation,
+)
 from linkwork.five_bar.published import chapter_4
 from tests import published
 
@@ -52,6 +63,15 @@ def test_the_printed_coefficients_make_the_region_four_times_too_wide() -> None:
     assert (printed.low, printed.high) == pytest.approx((by_hill.low, by_hill.high), abs=3e-5)
 
 
+@pytest.mark.parametrize("inertia_ratio", [0.5, 1.0, 1.5])
+def test_without_the_rate_of_the_mass_the_region_is_four_times_too_wide(inertia_ratio: float) -> None:
+    """The right equation less M' zeta' alone."""
+    whole = equation(chapter_4(inertia_ratio))
+    bare = replace(whole, b=FourierSeries.constant(0.0))
+    widths = [hill_regions(e, 1)[1].width for e in (bare, whole)]
+    assert widths[0] / widths[1] == pytest.approx(4.0, abs=0.01)
+
+
 def test_both_couplers_are_the_same_at_equal_links() -> None:
     one, other = (right(mechanism(1.0)) for mechanism in (held, closed))
     assert (one.low, one.high) == pytest.approx((other.low, other.high), abs=1e-9)
@@ -82,6 +102,8 @@ def test_axis_of_a_short_crank(sigma2: float, inertia_ratio: float, by_listing: 
 
 @pytest.mark.parametrize(("inertia_ratio", "known"), [(2.0, 1.87), (0.5, 1.965)])
 def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, known: float) -> None:
+    if inertia_ratio == 2.0:
+        assert axis(right(held(0.8, inertia_ratio))) == pytest.approx(1.873, abs=5e-4)
     assert axis(appendix_3(held(0.8, inertia_ratio))) == pytest.approx(
         known, abs=0.005 if inertia_ratio == 2.0 else 1e-3
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import asin, log, pi
+from math import asin, degrees, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,17 +43,20 @@ Sections 3.2 and 3.3 run Table 3.1: without a spring, with three springs, launch
 **What stands.** The equations (3.8) and (3.10) are right to the last sign; the multipliers are the force at C and the
 crank torque; and the failure of closure does tell the error, being some five to fifteen times that of the slider. The
 program of appendix 1 prints the closure, but integrates the slider alone, so that its own check shows nothing. The
-torque reverses near 0 deg and hardly depends on the spring; launches, the decay by the damper, the phase planes, and
-the resonance of the second harmonic at half the natural frequency are as described.
+torque reverses near 0 deg and hardly depends on the spring; the rise of the speed along a line in a launch, the decay
+by the damper, the phase planes, and the resonance of the second harmonic at half the natural frequency are as described.
 
-**What does not.** Without a spring the slider does not drift along a line: gravity and the mean of the inertia forces
-push it towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look
-straight. Gravity holds the drift back: without it, M is greater by a quarter in size, and so not slightly reduced.
-With the softer springs the transient outlasts the first cycle. With the stiffest the least position comes at 5 deg,
-not at 0; a spring stiffer still does not make the slope constant. The torque varies with the spring at its extremes,
-but not because the slider's accelerations differ: they make 3 % of the difference at the least torque. T0 is not
-hyperbolic in the time of a launch; T0 t^2 is nearly constant. The second harmonic near 27 rad/s goes on growing as
-the speed falls further. And Milne's method, which the thesis takes for as stable as Hamming's, is weakly unstable."""
+**What does not.** Without a spring the slider does not drift along a line: the mean of the inertia forces pushes it
+towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look
+straight, and only with the weakest the transient lasts about two. Gravity holds the drift back: without it, M is
+greater by a quarter in size, and so not slightly reduced. With the softer springs the transient outlasts the first
+cycle. With the stiffest the least position comes at 5 deg, not at 0, u rises 1.6 times as steeply as with the softest,
+and the spring's force is not dominant; a spring stiffer still does not make the slope constant. The torque varies with
+the spring at its least value, but not because the slider's accelerations differ: they make 3 % of the difference. T0
+is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the slider swings to
+both sides of its start, and with the stiffest spring its mean decays from the first turn on. The second harmonic near
+27 rad/s goes on growing down to 22 rad/s. And Milne's method, which the thesis takes for as stable as Hamming's, is
+weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
@@ -66,8 +69,8 @@ DRIFT_TURNS = 40
 SAMPLES_PER_DRIFT_TURN = 120
 #: Dampers (dyn.s/cm) with which the drift is nearly linear.
 NEAR_LINEAR = (5e5, 1e6)
-#: Turns over which the drift is compared with a line.
-DRAWN_TURNS = 10
+#: Turns of the transient, as the thesis has it, and end of those over which the drift is compared with a line.
+TRANSIENT_TURNS, DRAWN_TURNS = 2, 10
 
 TURNS, ANGLE = "turns of the crank [1]", "crank angle [deg]"
 DAMPING_LEGEND, STIFFNESS_LEGEND = r"damping $\mu$ [dyn s/cm]", "stiffness k [dyn/cm]"
@@ -111,17 +114,19 @@ class Drift:
 
     @property
     def bend(self) -> float:
-        """Greatest distance of the ends of the first turns from their best line, relative to the drift over them."""
+        """Greatest distance of the ends of turns after the transient from their best line, relative to the drift over them."""
         last = int(min(DRAWN_TURNS, np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS)))
-        turns, ends = np.arange(last + 1), self.slider_cm[: last * SAMPLES_PER_DRIFT_TURN + 1 : SAMPLES_PER_DRIFT_TURN]
+        # from the start if none comes after it
+        turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
+        ends = self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
         return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     @property
     def unsteadiness(self) -> float:
-        """Difference in shape between the motions over the fourth and the third turn, relative to the range of the "
-        "fourth."""
-        line = np.linspace(0.0, self.per_turn(4), SAMPLES_PER_DRIFT_TURN + 1)
-        return float(np.ptp(self.turn(4) - self.turn(3)) / np.ptp(self.turn(4) - line))
+        """Difference between the third and the fourth turn, each less its drift, relative to the range of the fourth."""
+        share = np.linspace(0.0, 1.0, SAMPLES_PER_DRIFT_TURN + 1)
+        third, fourth = (self.turn(n) - share * self.per_turn(n) for n in (3, 4))
+        return float(np.ptp(fourth - third) / np.ptp(fourth))
 
 
 @cache
@@ -145,13 +150,13 @@ def drift(damping: float, gravity: float = 9.81) -> Drift:
 def drift_result() -> StudyResult:
     """Compute the drift with the five dampers, its departure from a line, and when the links become collinear."""
     runs = {mu: drift(mu) for mu in DAMPINGS}
-    weakest = table_3_1(0.0, DAMPINGS[0])
-    settling = -log(ALIKE) * mean_effective_mass(weakest) / weakest.slider_damping / PERIOD
+    tables = {mu: table_3_1(0.0, mu) for mu in DAMPINGS}
+    settling = {mu: -log(ALIKE) * mean_effective_mass(p) / p.slider_damping / PERIOD for mu, p in tables.items()}
     accelerates = "it accelerates"
     shapes = [
         at_most(_mu(mu), ALIKE, run.unsteadiness, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]
     ]
-    bends = [at_most(_mu(mu), ALIKE, run.bend, why=accelerates) for mu, run in runs.items()]
+    bends = [at_most(_mu(mu), ALIKE, run.bend, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
     # with the strongest damper the links never are collinear
     folds = {mu: run.collinear_turn for mu, run in runs.items() if np.isfinite(run.collinear_turn)}
     sooner = [
@@ -169,34 +174,35 @@ def drift_result() -> StudyResult:
             Statement(
                 "The first of these is a transient region of duration approximately two cycles.",
                 text("3.2.1, L1905-1907"),
-                f"cycles in which the slider's free motion falls to {ALIKE:g}, with the weakest damper, whose "
-                "transient is the longest of the figure",
-                "half a cycle, since the text counts whole ones",
-                (near(_mu(DAMPINGS[0]), "2", settling, unit="cycles"),),
+                f"cycles in which exp(-mu t/m), m the mean effective mass, falls to {ALIKE:g}, the rule for *steady*",
+                "half a cycle, the rule where whole cycles are counted",
+                tuple(near(_mu(mu), "2", x, unit="cycles", why="it is shorter") for mu, x in settling.items()),
             ),
             Statement(
                 "The second consists of a steady periodic motion superimposed upon a drift.",
                 text("3.2.1, L1907-1911"),
-                "change of the motion's shape from the third cycle to the fourth, relative to its range; with the "
-                "weakest damper the links are collinear before",
+                "change from the third cycle to the fourth of the motion less the line from end to end of the cycle, "
+                "relative to its range; with the weakest damper the links are collinear before",
                 ALIKE_WORDS,
                 tuple(shapes),
             ),
             Statement(
                 "The drift is linear with crank angle and may be described by the equation u = M[.theta2 + u0].",
                 text("3.2.1, L1911-1915"),
-                f"greatest distance of u at the ends of the first {DRAWN_TURNS} cycles, or of those before the links "
-                "are collinear, from their best line, relative to the drift over them",
+                f"greatest distance of u at the ends of cycles {TRANSIENT_TURNS} to {DRAWN_TURNS}, or of those before the "
+                f"links are collinear, from their best line, relative to the drift over them; {DRAWN_TURNS} cycles are ours, "
+                "the text does not say how many are drawn; with the weakest damper none is left",
                 ALIKE_WORDS,
                 tuple(bends),
             ),
             Statement(
-                "This indicates that for a small viscous force the linkage tends to collapse quickly into a "
-                "collinear configuration. However, as the viscous force is increased this tendency is counteracted.",
+                "... where [M and u0] are constants depending on [mu]. This indicates that for a small viscous force the "
+                "linkage tends to collapse quickly into a collinear configuration. However, as the viscous force is "
+                "increased this tendency is counteracted.",
                 text("3.2.1, L1917-1925"),
-                f"cycles until abs(sin(th4 - th3)) < {COLLINEAR_SINE:g}, "
-                f"{', '.join(f'{n:.1f}' for n in folds.values())} and, with the strongest damper, more than 40, "
-                "relative to those with the next stronger damper",
+                f"cycles until coupler and rocker are within {degrees(asin(COLLINEAR_SINE)):.0f} deg of a line, abs(sin(th4 "
+                f"- th3)) = {COLLINEAR_SINE:g}, ours: {', '.join(f'{n:.1f}' for n in folds.values())} and, with the "
+                f"strongest damper, more than {DRIFT_TURNS}; relative to those with the next stronger damper",
                 SIGN,
                 tuple(sooner),
             ),
@@ -371,12 +377,14 @@ def _shape_statements() -> list[Statement]:
     ends = np.array([[find(t.angle_deg, t.slider_cm)[0] for find in (least, greatest)] for t in turns])
     widths, ranges = np.diff(ends, axis=1)[:, 0] % 360.0, np.array([np.ptp(t.slider_cm) for t in turns])
     rise, fall = (each.max() / each.min() for each in (ranges / widths, ranges / (360.0 - widths)))
-    varies = {}
+    shares = np.array([spring_share(k) for k in STIFFNESSES])
+    varies, least_at = {}, []
     for k in (1e7, 1e8):
         u = _steady(k).slider_cm
         high, low = int(u.argmax()), int(u.argmin())
         slope = np.diff(np.tile(u[:-1], 2))[high : high + (low - high) % (len(u) - 1)]
         varies[k] = np.ptp(slope) / abs(slope.mean())
+        least_at.append(f"{360 * low / (len(u) - 1):.0f}")
     return [
         Statement(
             "The rate of change of the slider position is approximately the same for all the response curves between "
@@ -395,16 +403,22 @@ def _shape_statements() -> list[Statement]:
             text("3.2.1, L1972-1976"),
             "width, read as the crank angle from the least to the greatest u, relative to that with the next softer "
             f"spring; the height grows, by {100 * (ranges[-1] / ranges[0] - 1):.0f} % from the softest to the "
-            "stiffest",
-            SIGN,
-            (at_most("greatest", 1.0, greatest_ratio(widths)),),
+            "stiffest; amplitude of the spring's force over the greater of the damper's and that of the mean effective "
+            "mass times the acceleration",
+            f"{SIGN}; at least 1, as *dominant* says",
+            (
+                at_most("width, greatest", 1.0, greatest_ratio(widths)),
+                at_least("growth of the spring's share, least", 0.0, np.diff(shares).min()),
+                at_least(f"spring's share; {_k(2e6)}", 1.0, shares[-1], why="the inertia force is greater"),
+            ),
         ),
         Statement(
             "Eventually, although not shown on this figure, as k increases further the slope of the response curve "
             "takes a constant value between the maximum and minimum values of the oscillation on the portions of the "
             "curve below the zero degree crank angle positions.",
             text("3.2.1, L1976-1986"),
-            "range of the slope between the greatest and the least u, relative to its mean",
+            "range of the slope between the greatest and the least u, relative to its mean; with these springs, ours, the "
+            f"least comes before 0 deg, at {' and '.join(least_at)} deg",
             ALIKE_WORDS,
             tuple(at_most(_k(k), ALIKE, x) for k, x in varies.items()),
             "the stiffer the spring, the more the slider swings on it, and the motion tends to the inertia force "
@@ -454,18 +468,37 @@ class Parts:
     gravity: NDArray[np.float64]
 
 
+def slider_motion(stiffness: float) -> list[NDArray[np.float64]]:
+    """Return u, u' and u'' over the steady turn (SI), the derivatives by its harmonics."""
+    u = _steady(stiffness).slider_cm[:-1] / CM_PER_METRE
+    waves = np.fft.rfft(u)
+    order = 1j * SPEED * RAD_S_PER_RPM * np.arange(len(waves))
+    return [np.fft.irfft(order**n * waves, len(u)) for n in range(3)]
+
+
+def spring_share(stiffness: float) -> float:
+    """Return the range of the spring's force over a steady turn, over the greater of the damper's and the mean inertia's."""
+    p = table_3_1(stiffness)
+    factors = (p.slider_stiffness, p.slider_damping, mean_effective_mass(p))
+    spring, *others = (factor * np.ptp(x) for factor, x in zip(factors, slider_motion(stiffness)))
+    return float(spring / max(others))
+
+
 def parts(stiffness: float) -> Parts:
-    """Split the torque of the steady turn, with the derivatives of u by its harmonics."""
-    turn, parameters, speed = _steady(stiffness), table_3_1(stiffness), SPEED * RAD_S_PER_RPM
-    waves = np.fft.rfft(turn.slider_cm[:-1] / CM_PER_METRE)
-    order = 1j * speed * np.arange(len(waves))
-    u, v, a = (np.fft.irfft(order**n * waves, len(turn.slider_cm) - 1) for n in range(3))
-    angle = np.radians(turn.angle_deg[:-1])
+    """Split the torque of the steady turn."""
+    parameters, speed = table_3_1(stiffness), SPEED * RAD_S_PER_RPM
+    angle, (u, v, a) = np.radians(_steady(stiffness).angle_deg[:-1]), slider_motion(stiffness)
     whole, unaccelerated, weightless = (
         balance(angle, u, v, x, speed, p.constants()).torque
         for x, p in ((a, parameters), (0.0 * a, parameters), (a, replace(parameters, gravity=0.0)))
     )
     return Parts(whole, whole - unaccelerated, whole - weightless)
+
+
+def mean_torque(stiffness: float) -> tuple[float, float]:
+    """Return the mean torque over a steady turn that the damper takes, by its power, and the whole (N.m)."""
+    power = table_3_1(stiffness).slider_damping * slider_motion(stiffness)[1] ** 2
+    return float(power.mean()) / (SPEED * RAD_S_PER_RPM), float(_steady(stiffness).torque[:-1].mean())
 
 
 def apart_on_the_graph(
@@ -506,6 +539,7 @@ def torque_result() -> StudyResult:
         shares[name] = [
             (getattr(stiff, part)[i] - getattr(soft, part)[i]) / whole for part in ("acceleration", "gravity")
         ]
+    (lost, mean), (lost_stiff, mean_stiff) = (mean_torque(k) for k in (STIFFNESSES[0], STIFFNESSES[-1]))
     columns = {ANGLE: angle}
     columns |= {f"crank torque; {_k(k)} [N.m]": turn.torque for k, turn in turns.items()}
     return StudyResult(
@@ -530,16 +564,16 @@ def torque_result() -> StudyResult:
                 text("3.2.1, L1993-2001"),
                 "distance between the curves as it is seen, square to them, on a graph as wide as it is high, "
                 "relative to its size; spread of the extremes between the springs, relative to the peak",
-                f"{ALIKE_WORDS}; the spread of an extreme is more than that distance and at most {SLIGHTLY:g}, the "
-                "rule for *slight*",
+                f"{ALIKE_WORDS}; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
                 (
                     at_most("distance of the curves farther than 10 deg from an extreme", ALIKE, elsewhere),
                     *(
                         Case(
                             label=f"spread of the {name} torque",
                             computed=np.ptp(x) / peak,
-                            lower=elsewhere,
+                            lower=ALIKE,
                             upper=SLIGHTLY,
+                            why=f"there the springs differ by {100 * np.ptp(x) / peak:.0f} %, which is not seen",
                         )
                         for name, x in (("greatest", torque.max(axis=1)), ("least", torque.min(axis=1)))
                     ),
@@ -550,7 +584,7 @@ def torque_result() -> StudyResult:
                 text("3.2.1, L2001-2005; the same in L2017-2029"),
                 f"share of the slider's acceleration in the difference of the torque between {_k(5e5)} and 2e6, at "
                 "the extremes",
-                "more than half",
+                "more than half, as *due to* says",
                 tuple(at_least(f"{name} torque", 0.5, x) for name, (x, _) in shares.items()),
                 "at the least torque the acceleration makes hardly any of it, and at the greatest it acts against "
                 "it: the terms with the squares of the velocities, at another position, make the difference",
@@ -564,6 +598,16 @@ def torque_result() -> StudyResult:
                 "at the extremes",
                 f"{ALIKE:g}, the rule for *the same*",
                 tuple(near(f"{name} torque", 1.0, 1.0 - x, ALIKE) for name, (_, x) in shares.items()),
+            ),
+            Statement(
+                "The energy dissipation in the slider guide due to viscous friction also accounts for variations in "
+                "torque.",
+                text("3.2.1, L2013-2017"),
+                f"share of the damper's power in the difference of the mean torque over a turn between {_k(5e5)} and 2e6, "
+                f"which is {100 * (mean_stiff - mean) / peak:.1f} % of the peak; spring, weight and inertia take nothing "
+                "over a turn",
+                f"{ALIKE:g}, the rule for *the same*",
+                (near("", 1.0, (lost_stiff - lost) / (mean_stiff - mean), ALIKE),),
             ),
         ),
     )

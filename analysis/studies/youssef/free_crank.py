@@ -99,8 +99,8 @@ class Turns:
         Time at which each ends (s).
     speed, speed_range : ndarray
         Crank speed: 2 pi over the time of the turn, and its range (rad/s).
-    slider, slider_range : ndarray
-        Slider position: mean and range (cm).
+    slider, slider_range, velocity_range : ndarray
+        Slider position: mean and range (cm); range of the velocity (cm/s).
     first, second : ndarray
         Harmonics of the crank's turn in the slider position (cm).
     energy_share : ndarray
@@ -112,6 +112,7 @@ class Turns:
     speed_range: NDArray[np.float64]
     slider: NDArray[np.float64]
     slider_range: NDArray[np.float64]
+    velocity_range: NDArray[np.float64]
     first: NDArray[np.float64]
     second: NDArray[np.float64]
     energy_share: NDArray[np.float64]
@@ -124,7 +125,8 @@ class Turns:
         times = np.interp(marks, angle, run.time)
         grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
         energy = run["energy.kinetic"] + run["energy.potential"]
-        u, w, e = (np.interp(grid, angle, x) for x in (run["slider.position"], run["crank.speed"], energy))
+        outputs = (run["slider.position"], run["slider.velocity"], run["crank.speed"], energy)
+        u, v, w, e = (np.interp(grid, angle, x) for x in outputs)
         harmonics = 2.0 * CM_PER_METRE / SAMPLES * np.abs(np.fft.rfft(u, axis=1))
         return cls(
             ends=times[1:],
@@ -132,6 +134,7 @@ class Turns:
             speed_range=np.ptp(w, axis=1),
             slider=CM_PER_METRE * u.mean(axis=1),
             slider_range=CM_PER_METRE * np.ptp(u, axis=1),
+            velocity_range=CM_PER_METRE * np.ptp(v, axis=1),
             first=harmonics[:, 1],
             second=harmonics[:, 2],
             energy_share=np.ptp(e, axis=1) / e.mean(axis=1) / np.ptp(w * w, axis=1) * (w * w).mean(axis=1),
@@ -201,7 +204,7 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
 #: How the rise of the crank speed is judged.
 RISE = (
     "greatest distance of the crank speed, up to its peak, from the nearest line, relative to the peak; crank angle "
-    "of the peak, for which we take p1 and p2, while the torque acts up to 1 rad"
+    "of the peak, while the torque acts up to 1 rad"
 )
 
 
@@ -268,7 +271,7 @@ def launch_speeds() -> StudyResult:
             "behaves in a linear manner up to the stage when the input torque becomes less than the torque "
             "sufficient to accelerate the mechanism. This stage occurs when the points p1 and p2 are reached.",
             text("3.2.2, L2124-2134"),
-            RISE,
+            f"{RISE}; for p1 and p2 we take the peaks",
             ALIKE_WORDS,
             _rise({label: accelerated(torque) for label, torque in zip(runs, TORQUES)}),
         ),
@@ -303,8 +306,9 @@ def torque_over_time() -> StudyResult:
         columns={"T0 [dyn.cm]": TORQUE_RANGE, "time to 1 rad [s]": time, "T0 t^2 [dyn.cm.s2]": TORQUE_RANGE * time**2},
         statements=(
             Statement(
-                "It shows a hyperbolic relationship[ ]between T0 and T asymptotic to T0 = 0 and T = 0.",
-                text("3.2.2, L2138-2142"),
+                "A plot of the initial torque T0 against the time taken to reach [theta2] = 1 rad. is shown in Fig. (3.7). It "
+                "shows a hyperbolic relationship[ ]between T0 and T asymptotic to T0 = 0 and T = 0.",
+                text("3.2.2, L2134-2142"),
                 "exponent of T0 in the time, mean of the two between the three torques; least T0 that turns the "
                 f"crank by 1 rad, below which it falls back, relative to {scale:.0e} dyn.cm; time at 1e12 dyn.cm "
                 f"relative to that at {plain(TORQUES[0])}",
@@ -341,7 +345,8 @@ def launch_positions() -> StudyResult:
     turns = _after(runs)
     largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
     later = turns[2].transient - max(t.transient for t in turns[:2])
-    shift = turns[2].slider.mean() / turns[1].slider.mean()
+    *lesser, shift = (abs(t.slider.mean()) for t in turns)
+    shaft = -CM_PER_METRE * table_3_1(0.0).ground_length
     return _launch_result(
         "3.8",
         "The harder the launch, the further the slider moves from its start, and the later it settles to a decay.",
@@ -360,19 +365,24 @@ def launch_positions() -> StudyResult:
             "The three responses show the slider oscillates between its initial position and the crank shaft and as "
             "would be expected the shift from its initial position is greatest in the highest input torque case.",
             text("3.2.2, L2159-2167"),
-            "greatest u, of the range of the graph; mean of u with T0 = 2e8 relative to 1e8 dyn.cm",
+            f"greatest u, of the range of the graph, and least, which is {shaft:g} cm at the shaft; size of the mean of u over "
+            "the turns after the torque, up to 1 s, with T0 = 2e8 dyn.cm relative to the greater of both others",
             f"{ALIKE_WORDS}; {SIGN}",
             (
                 *(
-                    at_most(
-                        f"greatest u; {label}",
-                        ALIKE,
-                        run["slider.position"].max() / largest,
-                        why="it swings to both sides",
-                    )
+                    case
                     for label, run in runs.items()
+                    for case in (
+                        at_most(
+                            f"greatest u; {label}",
+                            ALIKE,
+                            run["slider.position"].max() / largest,
+                            why="it swings to both sides",
+                        ),
+                        at_least(f"least u; {label}", shaft, CM_PER_METRE * run["slider.position"].min(), "cm"),
+                    )
                 ),
-                at_least("mean of u", 1.0, shift),
+                at_least("mean of u", 1.0, shift / max(lesser)),
             ),
         ),
     )
@@ -383,6 +393,7 @@ def launch_speeds_by_spring() -> StudyResult:
     rises = {label: accelerated(1e8, k) for label, k in zip(_by_spring(), STIFFNESSES)}
     free = {f"k = {plain(k)} dyn/cm": launch(1e8, k, damping=0.0) for k in STIFFNESSES}
     speeds = np.array([run["crank.speed"] for run in rises.values()])
+    loads = np.array([np.hypot(run["pin.C.fx"], run["pin.C.fy"]) for run in rises.values()])
     return _launch_result(
         "3.9",
         "The speed rises linearly, with all springs alike, until the torque no longer accelerates the crank.",
@@ -408,9 +419,13 @@ def launch_speeds_by_spring() -> StudyResult:
             "Because the speed response is the same throughout the time region in which the torque acts, it suggests "
             "similar loads and movement of slider.",
             text("3.2.2, L2187-2191"),
-            "spread of the crank speed between the springs while the torque acts, relative to its peak",
-            ALIKE_WORDS,
-            (at_most("greatest", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),),
+            "spread between the springs while the torque acts of the crank speed, relative to its peak, and of the force at "
+            "pin C, for the loads, relative to its own; the slider's movement is judged at Fig 3.10",
+            f"{ALIKE_WORDS}; {ABOUT:g}, the rule for *similar*",
+            (
+                at_most("crank speed", ALIKE, np.ptp(speeds, axis=0).max() / speeds.max()),
+                at_most("force", ABOUT, np.ptp(loads, axis=0).max() / loads.max()),
+            ),
         ),
     )
 
@@ -430,7 +445,8 @@ def launch_positions_by_spring() -> StudyResult:
         runs,
         SLIDER,
         Statement(
-            "The latter is verified in Fig. (3.10) in which the slider response is shown.",
+            "... similar loads and movement of slider. The latter is verified in Fig. (3.10) in which the slider response is "
+            "shown.",
             text("3.2.2, L2191-2195"),
             "spread of u, the movement of the slider, between the springs while the torque acts, relative to the "
             "range of the graph",
@@ -535,7 +551,7 @@ def _free_causes() -> Statement:
         text("3.3, L2253-2259"),
         "change of the mechanical energy in a turn relative to that of the crank speed squared, greatest: without it "
         f"the speed swings because the inertia changes with the position; {UNDAMPED}",
-        f"less than half; {ALIKE_WORDS}",
+        f"less than half, as *due to* says; {ALIKE_WORDS}",
         (*swings, *_undamped({label: coast(k, 0.0) for label, k in BOTH.items()}, 0.0)),
     )
 
@@ -572,14 +588,14 @@ def soft_phase_plane() -> StudyResult:
     tending = [
         at_most(f"{name}; {label}", 1.0, greatest_ratio(np.abs(x[2 : t.shown])))
         for label, t in turns.items()
-        for name, x in (("range", t.slider_range), ("mean", t.slider))
+        for name, x in (("range", t.slider_range), ("mean", t.slider), ("range of u'", t.velocity_range))
     ]
     return _phase_plane(
         "3.13",
         SOFT,
         Statement(
             "Due to sampling of output data straight-line segments appear on the curves. These segments should in "
-            "fact be smooth curves following the line pattern of the curves.",
+            "fact be smooth curves following the line pattern of the curves ...",
             text("3.3, L2266-2276"),
             why="it is said of the drawing, which we do not have",
         ),
@@ -588,8 +604,8 @@ def soft_phase_plane() -> StudyResult:
             "amplitude of the oscillation decreases and a superimposed shift on the slider position, in the form of "
             "a drift towards u=[0], is noticeable.",
             text("3.3, L2276-2287"),
-            "range and distance of the mean of u from 0 relative to the turn before, from the fourth turn on, since "
-            "the first are the transient of the release; greatest",
+            "range and distance of the mean of u from 0, and range of u', relative to the turn before, from the fourth turn "
+            "on, since the first are the transient of the release; greatest",
             SIGN,
             tuple(tending),
         ),
@@ -640,7 +656,7 @@ def stiff_phase_plane() -> StudyResult:
                     most,
                     ABOUT * HARMONIC_SPEED,
                     "rad/s",
-                    why="it goes on growing as the speed falls: the damper lowers and broadens the resonance",
+                    why=f"it goes on growing down to {most:.0f} rad/s: the damper lowers and broadens the resonance",
                 ),
             ),
         ),
@@ -660,8 +676,9 @@ def stiff_phase_plane() -> StudyResult:
             text("3.3, L2305-2307"),
             "mean crank speed at which the second harmonic over the speed squared, to which its force is "
             "proportional, is greatest, relative to half the natural frequency with the mean mass",
-            f"{lowered:.3f}, by which the damper of the thesis lowers the peak of an oscillator",
-            (near("", 1.0, resonance / half, lowered),),
+            f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator",
+            (Case(label="", computed=resonance / half, lower=1.0 - lowered, upper=1.0),),
+            "its frequency is twice the crank's, so that today it is called superharmonic",
         ),
         Statement(
             "It is however appreciated that a natural frequency of the mechanism in study is not a sharply defined "

@@ -1,4 +1,4 @@
-"""Section 4.1 to 4.4: the linearised equations (4.1) to (4.35), one by one."""
+"""Sections 4.1 to 4.4: the linearised equations (4.1) to (4.35), one by one."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def angles(parameters: FiveBarParameters, zeta: float = 0.0) -> tuple[NDArray[np
 
 
 @cache
-def datum(sigma2: float) -> Datum:
-    """Return the datum by (4.1), and crank and coupler by the closure (4.6)."""
-    _, rocker = angles(with_crank(sigma2))
-    middle = 0.5 * (rocker.max() + rocker.min())
+def datum(sigma2: float, rocker: float | None = None) -> Datum:
+    """Return the datum by (4.1) unless the rocker's angle is given, and crank and coupler by the closure (4.6)."""
+    swing = angles(with_crank(sigma2))[1]
+    middle = 0.5 * (swing.max() + swing.min()) if rocker is None else rocker
 
     def closure(x: NDArray[np.float64]) -> list[float]:
         gap = sigma2 * np.exp(1j * x[0]) - 1.0 - np.exp(1j * middle) + np.exp(1j * x[1])
@@ -101,9 +101,9 @@ def residuals() -> dict[str, float]:
     return worst
 
 
-def coefficients(sigma2: float) -> dict[str, float]:
+def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
     """Return the coefficients of (4.21) as printed, about its own datum, relative to the right ones of first order."""
-    mechanism = with_crank(sigma2)
+    mechanism = with_crank(sigma2, inertia_ratio)
     right = slider_equation(mechanism, 1.0, variant=Variant.FIRST_ORDER)
     parts = printed(ratios(mechanism), datum(sigma2))
     found = {name: _over(getattr(parts, name), parts.spring) for name in ("inertia", "stiffness", "force")}
@@ -174,6 +174,7 @@ def compute() -> StudyResult:
     small, smaller = (deviations(s) for s in SHORT)
     orders = [float(np.log2(x / y)) for x, y in zip(small, smaller)]
     own = datum(SIGMA2)
+    crank, coupler, _ = map(degrees, datum(SIGMA2, DATUM.rocker))
     left = np.log2(expansion(SHORT[0]) / expansion(SHORT[1]))
     mechanism = chapter_4(1.0)
     ways = {
@@ -201,7 +202,8 @@ def compute() -> StudyResult:
                         f"{degrees(x):.0f}",
                         degrees(y),
                         unit="deg",
-                        why="it follows from sines and cosines that were rounded",
+                        why="it follows from alpha4 that was rounded to 120 deg before (4.6) was solved: alpha3 = "
+                        f"{coupler:.2f}, alpha = {crank:.2f} deg",
                     )
                     for name, x, y in zip(("alpha", "alpha3", "alpha4"), DATUM, own)
                 ),
@@ -249,7 +251,7 @@ def compute() -> StudyResult:
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
                 "[(4.23)]",
-                text("4.3, eqs (4.22) to (4.29), L2853-2930"),
+                text("4.3, eqs (4.22) to (4.24), L2843-2869"),
                 "order of what (4.23) and (4.24) leave out of the quotient of the printed coefficients, from sigma2 "
                 f"= {SHORT[0]:g} to {SHORT[1]:g}; I4 = 1",
                 "3; 0.05, as an order is a whole number",
