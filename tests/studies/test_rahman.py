@@ -59,8 +59,8 @@ SHOWN = (
     ("1", "rahman-closure", "The iterative process", "error of S4, a4 = 10 in at S1 = 3.5 in", 5.88),
     # of an axis that is turned by 0.8 rad
     ("2", "rahman-rates", "where symbols", "angular velocity", 2.0 * sin(0.4) * 2.1),
-    ("3", "rahman-rates", "The final", "row 37f where abs(sin theta2) > 0.15, a4 = 30 in at S1 = 9 in", 83.74),
-    ("3", "rahman-rates", "The final", "row 37f where abs(sin theta2) > 0.15, alpha4 = 310 deg", 215.17),
+    ("3", "rahman-rates", "The final", "row 37f, a4 = 30 in at S1 = 9 in", 83.74),
+    ("3", "rahman-rates", "The final", "row 37f, alpha4 = 310 deg", 215.17),
     ("3", "rahman-rates", "Since rank", "coefficients with the right side", 6.0),
     # the term that is too large, by 1 - cos^2 eta2
     (
@@ -70,9 +70,9 @@ SHOWN = (
         "theta2' by eq 39",
         CRANK_IN * CRANK_SPEED * sin(2.1) * cos(1.3) * sin(0.35) ** 2 / (ROD_IN * sin(1.3)),
     ),
-    ("8", "rahman-forces", "If not satisfied", "2F2i", 1.0),
+    ("8", "rahman-forces", "If [equation (62a) is]", "2F2i", 1.0),
     ("9", "rahman-rates", "Now separating", "row 6", CRANK_IN * CRANK_SPEED * sin(2.1) * (1.0 - sin(0.35))),
-    ("9", "rahman-rates", "[equation (28a)", "alpha = 2", 2.0 * 2.0 * cos(1.8) * (1.0 - sin(1.8)) * CRANK_SPEED),
+    ("9", "rahman-rates", "S1' = alpha S1 cos", "alpha = 2", 2.0 * 2.0 * cos(1.8) * (1.0 - sin(1.8)) * CRANK_SPEED),
     ("9", "rahman-forces", "Specific gravity", "m1", 1.0 - 62.43 / 12.0**3),
 )
 
@@ -209,7 +209,7 @@ class TestMotion:
         assert strokes == pytest.approx(list(STROKES_IN.values()), abs=6e-4)
         longer = judged("R5", "When crank is placed at higher level")
         for case in OFFSETS:
-            assert longer[case.name].computed == pytest.approx(np.ptp(slider(case)) / 24.0, abs=1e-5)
+            assert longer[f"{case.name}, S1 = 3.5 in"].computed == pytest.approx(np.ptp(slider(case)) / 24.0, abs=1e-5)
         for twist, stroke in STROKES_BY_TWIST_IN.items():
             assert np.ptp(slider(Case("", 20.0, 0.0, twist))) == pytest.approx(stroke, abs=6e-3)
 
@@ -267,10 +267,10 @@ class TestBalance:
 
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
-    """Whole degrees more than ten from where the slider turns back."""
+    """Whole degrees ten or more from where the slider turns back."""
     degrees = np.degrees(THETA)
     away = np.min([np.abs((degrees - at + 180.0) % 360.0 - 180.0) for at in turning_points(case)], axis=0)
-    return (np.abs(degrees - degrees.round()) < 1e-9) & (away > 10.0)
+    return (np.abs(degrees - degrees.round()) < 1e-9) & (away > 10.0 - 1e-3)
 
 
 def second_difference(case: Case) -> FloatArray:
