@@ -213,6 +213,12 @@ class TestMotion:
         for twist, stroke in STROKES_BY_TWIST_IN.items():
             assert np.ptp(slider(Case("", 20.0, 0.0, twist))) == pytest.approx(stroke, abs=6e-3)
 
+    def test_a_load_against_the_motion_takes_more_power_with_an_offset(self) -> None:
+        """Twice the stroke in a turn, by 1 lb."""
+        strokes = [np.ptp(slider(case)) for case in (IDEAL, *OFFSETS)]
+        case = judged("R5", "So in that case")["a load of 1 lb that always acts against the motion"]
+        assert case.computed == pytest.approx(2.0 * (strokes[0] - min(strokes[1:])) * SPEED_RPM / 60.0, rel=1e-3)
+
     def test_departure_from_a_sine(self) -> None:
         """The least-squares fit of a constant, a cosine and a sine."""
         s4, basis = slider(OFFSETS[2])[:-1], np.stack([np.ones(720), C[:-1], S[:-1]], -1)
@@ -482,6 +488,19 @@ class TestMethod:
         rotation, position, _ = dependable(parameters(20.0, 232.0), 0.0)
         assert rotation.max() > 20.0
         assert position.max() > 1.0
+
+    @pytest.mark.parametrize("case", method.OUT, ids=lambda case: case.name)
+    def test_planar_estimates_miss_the_tilt_of_the_rod_most(self, case: Case) -> None:
+        """eta2 of the closed loop at theta1 = 0 is the angle of the rod to the plane of the crank."""
+        along = -slider(case, np.zeros(1))[0] * cos(np.radians(case.twist_deg)) - case.shift_in
+        assert method._estimate_error(case) == pytest.approx(np.degrees(np.arcsin(abs(along) / ROD_IN)), abs=1e-9)
+
+    def test_eqs_62_and_64_miss_the_balance_by_twice_the_inertia(self) -> None:
+        plane = Case("", 10.0, 0.0, 270.0)
+        left = judged("rahman-forces", "The force equations")
+        assert left["eq 62"].computed == pytest.approx(2.0 * MASSES_LB_S2_IN[0] * 0.5 * CRANK_IN * W * W, rel=1e-6)
+        inertia = MASSES_LB_S2_IN[2] * np.abs(second_difference(plane)[clear(plane)]).max()
+        assert left["eq 64"].computed == pytest.approx(2.0 * inertia, rel=1e-6)
 
     def test_both_mended_the_planar_forces_are_the_plants(self) -> None:
         found = method.planar_forces(erratum_5=True, erratum_6=True)
