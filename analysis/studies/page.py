@@ -49,7 +49,7 @@ def figures(numbers: Iterable[str], folder: Path) -> str:
             lines += [f"![{result.heading}]({plot})", ""]
         lines += [f"`linkwork figures {number}`", ""]
         if result.see:
-            lines += [f"Statements that concern it are judged at Fig {result.see}.", ""]
+            lines += [f"Statements that concern it are judged at Fig{'s' * (' and R' in result.see)} {result.see}.", ""]
         for statement in result.statements:
             lines += block(statement)
     return "\n".join(lines)
@@ -103,7 +103,7 @@ def sentences(page: str) -> dict[str, list[str]]:
     """Return what each study on a page is about: its statements, shortened, with their places, and where others are judged."""
     _, *parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
     return {
-        number: [f"judged at {see}" for see in re.findall(r"are judged at Fig (\S+)\.$", part, flags=re.MULTILINE)]
+        number: [f"judged at {see}" for see in re.findall(r"are judged at Figs? (.+)\.$", part, flags=re.MULTILINE)]
         + [f'"{shortened(quote)}" ({place})' for quote, _, place, _ in _STATEMENT.findall(part)]
         for number, part in zip(parts[::2], parts[1::2])
     }
@@ -114,8 +114,9 @@ def count(page: str) -> str:
     found = _STATEMENT.findall(page)
     number = Counter(outcome.lower() for *_, outcome in found)
     listed = sum(kind == "program" for _, kind, *_ in found)
+    origin = f"{listed} of them come from its program when it is run, the others from its text."
     return (
         f"Of {len(found)} statements of the thesis {number[HOLDS]} hold, {number[IN_PART]} hold in part, "
-        f"{number[FAILS]} do not hold, and {number[UNJUDGED]} cannot be judged, each with the reason. {listed or 'None'} of "
-        "them come from its program when it is run, the others from its text."
+        f"{number[FAILS]} do not hold, and {number[UNJUDGED]} cannot be judged, each with the reason. "
+        f"{origin if listed else 'All are judged from its text; its program is missing in our copy.'}"
     )

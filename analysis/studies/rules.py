@@ -18,6 +18,9 @@ SEEN_FALL = f"below {1.0 - ALIKE:g}, a fall that is seen by the rule for *the sa
 #: What a place on a graph can be read to: relative to the scale, and for a crank angle (deg).
 READ, READ_DEG = 0.02, 3.0
 
+#: "Very close" to an angle (deg), and "abnormally" high: how many times what it is compared with.
+VERY_CLOSE_DEG, ABNORMAL = 1.0, 10.0
+
 #: The rule as the pages print it.
 RULE = (
     "**Words of degree.** One rule holds on both pages. *About*, *approximately*, *nearly*, *almost*, *near*, *around*, *in "
@@ -26,6 +29,7 @@ RULE = (
     f"most {100 * SLIGHTLY:g} %, and by more than {100 * ALIKE:g} %. *Small*, *negligible*: at most {100 * SMALL:g} % of what "
     f"it is compared with. *The same*, *constant*, *linear*, *straight*, *steady*: within {100 * ALIKE:g} % of the scale, "
     f"which no one sees on a graph. A number that was read from a graph: within {100 * READ:g} % of its scale, or "
-    f"{READ_DEG:g} deg. A printed number: within half a unit of its last digit. *Increases*, *reduces*, *greater*, *sooner*: "
+    f"{READ_DEG:g} deg. *Very close*: within {VERY_CLOSE_DEG:g} deg. *Abnormally*: at least {ABNORMAL:g} times as much. A "
+    "printed number: within half a unit of its last digit. *Increases*, *reduces*, *greater*, *sooner*: "
     "the sign alone."
 )

@@ -4,7 +4,7 @@ The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, 
 shift S1 or the twist alpha4, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). The unknown is the
 force on the slider, and with it every joint force and moment. It is infinite at the dead centres, where it has no lever
 on the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a
-curve is therefore taken at whole degrees more than `CLEAR_DEG` from a dead centre.
+curve is therefore taken at whole degrees `CLEAR_DEG` or more from a dead centre.
 
 Statements of sections 3.2 and 3.3 on several figures are judged with the first of them.
 """
@@ -24,6 +24,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, POUND_FORCE, POUND_INCH, parameters
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
+from ...numerics.dual import Dual, about_i, about_j, about_k
 from ...slider_crank import CLEAR_DEG, ConstantShift, ForceTurn, GrooveShift, constant_shift, force_turn, ranges
 from ...units import INCH
 from ..rules import ABOUT, ABOUT_DEG
@@ -31,6 +32,16 @@ from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import cache, vary
+from .printed import (
+    CRANK_AT_SPEED,
+    GENERAL,
+    bodies,
+    joint_accelerations,
+    joint_forces,
+    joint_rates,
+    on_bearing,
+    on_crank,
+)
 from .table import (
     COMPONENTS,
     CONSTANT,
@@ -50,23 +61,27 @@ FloatArray = NDArray[np.float64]
 #: What stands at the head of the figures.
 FINDINGS = """**Findings.** The thesis closes the loop of a slider-crank with an offset, a shift and a twist by 3x3 dual
 matrices, and finds from it all velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Read as
-algebra, most of it is right: the operators, the accelerations, the momenta of crank and rod and their rates, the inertia
-forces, the rate of a sinusoidal shift; and in the plane, with the signs of errata 5 and 6 mended, its forces agree with
+algebra, most of it is right: the operators, the accelerations but for 38a, the momenta but for two symbols, their rates, the
+inertia
+forces, the acceleration of a sinusoidal shift; and in the plane, with the signs of errata 5 and 6 mended, its forces agree with
 Newton and Euler.
 
 Out of the plane the method fails at its root. A ball joint has three rotations, and eqs 2 and 3 give it two (erratum 1):
 the chain has one freedom, so that crank angle and shift cannot both be given. The iteration stops where its steps become
 small, on loops that are open by up to 38 deg, with the slider wrong by up to 6 in; with Davidon, Fletcher and Powell's
-steps, which the thesis names and does not print, it ends on other loops, which are open as well. The limits of S1 and
-alpha4 within which "the program converges" are those of this iteration. The mechanism works far beyond them, and its
+steps, which the thesis names and does not print, as we read them, it ends on other loops, which are open as well. The limits
+of S1 and alpha4 within which "the program converges" are, where they can be judged and but for a4 = 20 in, those of this
+iteration. The mechanism works far beyond them, and its
 greatest shift falls with the offset, where the thesis infers that it rises. The axial force on the crank, which the thesis
 puts to zero, is an unknown (erratum 7), so that 2F2k is not zero and the bearing moments 1T1i and 1T1j lack a part.
 
 Of the conclusions on the engine, the displacements are almost sinusoidal, and a shift does load the bearing by two more
-moments. The offset lengthens the stroke and does not reduce it, and saves no power. Most forces do not grow with the
-offset: at a given distance from a dead centre they fall. The spikes near 100 and 300 deg are no roundoff: they are the dead
-centres, where a given torque has no lever on the slider, and lie within 10 deg of these angles for a4 = 20 in alone. With
-the load on the slider given in place of the torque there are no spikes, and all forces grow with the offset."""
+moments. The offset lengthens the stroke and does not reduce it, and saves no power. At a given distance from a dead centre
+most forces do not grow at every step of the offset. The spikes near 100 and 300 deg are no roundoff: they are the dead
+centres, where a given torque has no lever on the slider, and lie within 10 deg of these angles for a4 = 20 in with alpha4 =
+270 deg alone. There the printed eqs 40a and 41a, and 38a with them, are unbounded out of the plane, since eq 41 divides by
+sin theta2 and row 37f is left out. With the load on the slider given in place of the torque there are no spikes, and all
+forces grow with the offset."""
 
 #: Crank angles of the curves (deg), in half degrees.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
@@ -74,6 +89,8 @@ ANGLE = "crank angle theta1 [deg]"
 #: Largest force or moment (lb, lb.in) that counts as zero.
 NOTHING = 1e-6
 ROUNDING = f"{NOTHING:g}, the rounding"
+#: How far from a dead centre greatest values are taken.
+FROM_DEAD = f"{CLEAR_DEG:g} deg or more from a dead centre"
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
 #: Ratio by which the values beside a spike exceed all values clear of the dead centres.
@@ -130,8 +147,8 @@ def position(case: Case) -> FloatArray:
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
     """Return a mask of the whole degrees that are clear of the dead centres."""
-    # an angle at exactly this distance is not clear, whatever its rounding
-    return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG + 1e-6))
+    # an angle at exactly this distance is clear, whatever its rounding
+    return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG - 1e-6))
 
 
 def greatest(case: Case, quantity: FloatArray) -> float:
@@ -169,23 +186,28 @@ def nothing(label: str, size: ArrayLike, unit: str = "", *, why: str = "") -> Ju
 def _motion() -> tuple[Statement, ...]:
     """Judge shape and stroke of the slider's motion, and its power."""
     shapes = []
-    for case in ALL:
+    for case in (IDEAL, *ALL):
         first = 2.0 * np.fft.rfft(position(case)[:-1])[1] / (ANGLES_DEG.size - 1)
         sine = (first * np.exp(1j * np.radians(ANGLES_DEG))).real
         away = np.abs(position(case) - np.mean(position(case)[:-1]) - sine).max() / (0.5 * _stroke(case))
-        shapes.append(at_most(_name(case), ABOUT, away))
-    strokes = [at_most(case.name, 1.0, _stroke(case) / _stroke(IDEAL)) for case in OFFSETS]
+        shapes.append(at_most(full_name(case), ABOUT, away))
+    strokes = [at_most(full_name(case), 1.0, _stroke(case) / _stroke(IDEAL)) for case in OFFSETS]
     loads = {"no load on the slider": "load", "a torque of 100 lb.in": "torque"}
     power = {
         words: [float(np.mean(turn(c, given).torque[:-1]) / POUND_INCH * CRANK_SPEED) for c in (IDEAL, *OFFSETS)]
         for words, given in loads.items()
     }
+    # a load of 1 lb against the motion, over two strokes a turn
+    power["a load of 1 lb that always acts against the motion"] = [
+        2.0 * _stroke(case) * CRANK_SPEED / (2.0 * np.pi) for case in (IDEAL, *OFFSETS)
+    ]
     saved = [at_least(words, NOTHING, first - min(rest), "lb.in/s") for words, (first, *rest) in power.items()]
     return (
         Statement(
             "Slider displacement curves are almost semi-sinusoidal type of graphs which seem to be quite reasonable.",
             text("section 3.3, L1125"),
-            "greatest distance of S4 from its mean and first harmonic, relative to half the stroke, in Figs R5 to R7",
+            "greatest distance of S4 from its mean and first harmonic, relative to half the stroke, in Figs R5 to R7; "
+            "semi-sinusoidal is read as sinusoidal, since S4 has no half-waves that are cut off",
             f"{ABOUT:g}, the rule for *almost*",
             tuple(shapes),
         ),
@@ -199,17 +221,18 @@ def _motion() -> tuple[Statement, ...]:
             "the offset lengthens the stroke",
         ),
         Statement(
-            "So in that case, while consuming less power the same RPM of the engine can be obtained.",
+            "So in that case [of a positive a4], while consuming less power the same RPM of the engine can be obtained.",
             text("section 3.3, L1125"),
-            "mean power at 50 rpm of the ideal case less the least of a4 = 10, 20, 30 in",
-            "more than 1e-6 lb.in/s, the rounding",
+            "mean power at 50 rpm of the ideal case less the least of a4 = 10, 20, 30 in, S1 = 3.5 in",
+            f"more than {NOTHING:g} lb.in/s, the rounding",
             tuple(saved),
-            "a motion without friction takes no power, and a given torque at a given speed takes the same at any offset",
+            "a motion without friction takes no power, a given torque at a given speed takes the same at any offset, and a "
+            "given load takes more by the longer stroke",
         ),
     )
 
 
-def _name(case: Case) -> str:
+def full_name(case: Case) -> str:
     """Return what distinguishes a case among those of all families."""
     return f"{case.name}, S1 = {case.shift_in:g} in" if case.name.startswith("a4") else case.name
 
@@ -232,6 +255,7 @@ def _forces() -> tuple[Statement, ...]:
         at_least(c.symbol, 0.0, min(after - before for before, after in pairwise(offsets_peaks(c))), c.unit)
         for c in components
     ]
+    loaded = min(after - before for c in components[:-1] for before, after in pairwise(offsets_peaks(c, "load")))
     spikes = []
     for c in components:
         stated = SPIKES.get(c.symbol, "two")
@@ -240,35 +264,37 @@ def _forces() -> tuple[Statement, ...]:
         spikes.append(replace(near(f"spikes of {c.symbol}", float(_COUNTS[stated]), count, 0.0), stated=stated))
     for case in ALL:
         away = float(np.abs(dead_centres_deg(case) - SPIKES_DEG).max())
-        spikes.append(at_most(f"{_name(case)}: distance from 100 and 300 deg", ABOUT_DEG, away, "deg"))
+        spikes.append(at_most(f"{full_name(case)}: distance from 100 and 300 deg", ABOUT_DEG, away, "deg"))
     return (
         Statement(
             "But with the increase of offset distance [a4], joint forces and torques also increase. So proper design is "
             "necessary for the safe operation of the engine, considering that factor.",
             text("section 3.3, L1125"),
-            "least gain of a component's greatest magnitude from one of a4 = 0, 10, 20, 30 in to the next, "
-            f"{CLEAR_DEG:g} deg or more from a dead centre, the torque given as in the thesis",
+            "least gain of a component's greatest magnitude from one case to the next, of the ideal one (a4 = S1 = 0) and a4 "
+            f"= 10, 20, 30 in with S1 = 3.5 in, {FROM_DEAD} (the rule for *near*; the thesis does not say how much it left "
+            "out, L1115), the torque given as in the thesis",
             "none, the sign decides",
             tuple(gains),
-            "at a given distance from a dead centre the torque pulls the rod with the same force at every a4, since crank "
-            "and rod fold at the same rate there. But the crank then points less along j and the rod less along the guide, "
-            "and the inertia forces, which grow with a4, act against the pull. With the load on the slider given in place "
-            "of the torque all components grow",
+            "the others do not grow at every step. At a given distance from a dead centre the torque pulls the rod with the "
+            "same force at every a4, since the angle between crank and rod changes there at the same rate, 1 + a1/a2 or 1 - "
+            "a1/a2 times that of the crank. But the crank then points less along j and the rod less along the guide, "
+            "and the inertia forces, which grow with a4, act against the pull. Without a load on the slider in place of the "
+            f"given torque every component but 4F4k, the load itself, grows at every step, by {loaded:.2g} lb or lb.in or more",
         ),
         Statement(
             "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
             "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
             text("section 3.3, L1125"),
-            "poles of each component in a turn, the count of the nine cases that differs most from the stated one; distance "
-            "of the poles, which are the dead centres, from 100 and 300 deg",
+            "poles of each component in a turn, the count of the nine cases that differs most from the stated one; greatest "
+            "distance of the poles, which are the dead centres, from 100 and 300 deg",
             f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*",
             tuple(spikes),
-            "3F3k is finite at the dead centres, where 4F4k has a pole as the others have, twice in a turn; the offset and "
-            "the twist move the dead centres",
+            "3F3k is finite at the dead centres, where 4F4k has a pole as the others have, twice in a turn; by the printed 69c "
+            "3F3k takes eta3'' of 41a, which is unbounded out of the plane. The offset and the twist move the dead centres",
         ),
         Statement(
-            "Hence it is very obvious that with the increase of offset the chance of fatigue failure of the links at high "
-            "speed is very large.",
+            "Hence [from the spikes] it is very obvious that with the increase of offset the chance of fatigue failure of "
+            "the links at high speed is very large.",
             text("section 3.3, L1125"),
             why="the thesis gives neither a strength nor a number of cycles, and the spikes are those of a torque that is held "
             "at the dead centres, where a real drive cannot hold it",
@@ -289,7 +315,7 @@ def _bearing_moments() -> tuple[Statement, ...]:
     unshifted = [case for case in ALL if not case.shift_in]
     errors = [
         near(
-            f"{symbol}; {_name(case)}",
+            f"{symbol}; {full_name(case)}",
             0.0,
             greatest(case, of[case] - moment_by_forces(case, symbol)),
             NOTHING,
@@ -303,6 +329,15 @@ def _bearing_moments() -> tuple[Statement, ...]:
         for symbol, of in moments.items()
         for case in unshifted
     ]
+    # eqs 69p and 69q with the printed inertia forces in a general position, at any crank angle and shift
+    rates = joint_rates(CRANK_AT_SPEED, GENERAL)
+    seconds = joint_accelerations(CRANK_AT_SPEED, GENERAL, rates)
+    forces = joint_forces(CRANK_AT_SPEED, bodies(parameters()), GENERAL, rates, seconds, TORQUE)
+    (i, j), (about_i, about_j) = on_crank(np.array(0.9), forces), on_bearing(np.array(0.9), 3.5, forces)
+    errors += [
+        nothing("1T1i by the printed 69q, S1 constant", about_i + j * 3.5, "lb.in"),
+        nothing("1T1j by the printed 69p, S1 constant", about_j - i * 3.5, "lb.in"),
+    ]
     extra = [
         at_least(symbol, NOTHING, min(greatest(c, of[c]) for c in shifted), "lb.in") for symbol, of in moments.items()
     ]
@@ -310,7 +345,7 @@ def _bearing_moments() -> tuple[Statement, ...]:
         Statement(
             "In the presence of offset distance [S1], two extra torque components [1T1i] and [1T1j] are acting at joint 1.",
             text("section 3.3, L1125-1127"),
-            "greatest magnitude, least of the six cases with a shift",
+            f"greatest magnitude {FROM_DEAD}, least of the six cases with a shift",
             f"more than {ROUNDING}",
             tuple(extra),
         ),
@@ -324,7 +359,7 @@ def _bearing_moments() -> tuple[Statement, ...]:
             "Two torque components at joint [1], i.e. [1T1i] and [1T1j] reduce to zero, when there is no crank axial offset "
             "[S1].",
             text("section 3.2, L1119"),
-            "greatest magnitude at S1 = 0, a4 = 20 in",
+            f"greatest magnitude at S1 = 0, a4 = 20 in, {FROM_DEAD}",
             ROUNDING,
             tuple(none),
             "with a twist the axial force 1F1k has a lever about the bearing",
@@ -332,10 +367,11 @@ def _bearing_moments() -> tuple[Statement, ...]:
         Statement(
             "By manual manipulation it is found that [1T1i = -1F1j S1] and [1T1j = 1F1i S1].",
             text("section 3.2, L1119"),
-            "greatest difference of the two sides",
+            "greatest difference of the two sides, on the right mechanism and by the printed equations in a general position",
             ROUNDING,
             tuple(errors),
-            "the right sides lack 1F1k a1 sin(theta1) and -1F1k a1 cos(theta1)",
+            "they follow from the printed equations, which put 1F1k to zero (erratum 7); the right sides lack 1F1k a1 "
+            "sin(theta1) and -1F1k a1 cos(theta1)",
         ),
     )
 
@@ -354,18 +390,18 @@ def _constant() -> tuple[Statement, ...]:
             "All the torque components at joint 4, i.e. [4T4i], [4T4j], and [4T4k] and the force components along joint axis "
             "(k) at joint 2, i.e. [2F2k] are found to be zero throughout one complete revolution of the crank at any offset.",
             text("section 3.2, L1117"),
-            "greatest magnitude, of 4T4 in all cases",
+            f"greatest magnitude, of 4T4 in all cases, of 2F2k {FROM_DEAD}",
             ROUNDING,
             (
                 *(nothing(symbol, moment, "lb.in") for symbol, moment in guide.items()),
-                *(nothing(f"2F2k; {_name(case)}", pin, "lb") for case, pin in size["2F2k"].items()),
+                *(nothing(f"2F2k; {full_name(case)}", pin, "lb") for case, pin in size["2F2k"].items()),
             ),
             "4T4 is zero because the slider's centre of mass is in its pin (g3 = 0); 2F2k is zero in the plane alone",
         ),
         Statement(
             "Another force component along the j-axis of joint 2, i.e. [2F2j] is constant (-8.33 lbs) throughout one complete "
             "rotation of the crank at any offset.",
-            text("section 3.2, L1117"),
+            text("section 3.2, L1117-1119"),
             "least and greatest value of the nine cases",
             "0.005 lb, half a unit of the last digit",
             tuple(
@@ -380,7 +416,7 @@ def _constant() -> tuple[Statement, ...]:
             "greatest difference of the axial force from m1 S1''; with a sinusoidal shift by eq 28 too",
             ROUNDING,
             (
-                *(nothing(_name(case), force, "lb") for case, force in size["1F1k"].items()),
+                *(nothing(full_name(case), force, "lb") for case, force in size["1F1k"].items()),
                 *(
                     near(
                         f"a4 = 10 in, sinusoidal shift of 3.5 in, alpha = {alpha:g}",
@@ -392,23 +428,44 @@ def _constant() -> tuple[Statement, ...]:
                     for alpha in (1.0, 2.0)
                 ),
             ),
-            "erratum 7: S1 is given, so that the force that it takes is an unknown; the rod pulls along the crank's axis",
+            "erratum 7: S1 is given, so that the force that it takes is an unknown; the rod pulls along the crank's axis. "
+            "That the torque is constant is an assumption of the thesis and not judged",
         ),
         Statement(
             "There are sixteen unknowns, including both forces and torques and seventeen equations. Although one equation is "
             "redundant, all seventeen equations have been used to avoid sine or cosine functions in the denominator as much as "
             "possible ...",
             text("section 2.8, L961"),
-            "unknowns, 1F1k among them: the components of joint forces and moments less the torque that is given; greatest "
-            "residual of eq 62e with the right forces and 1F1k = 0, of all cases",
+            "unknowns, 1F1k among them: the components of joint forces and moments less the torque that is given; rank of the "
+            "seventeen equations (eqs 62a to 64f without 63b, 62c mended) in them, in a general position, 16 if one is "
+            "redundant; greatest residual of eq 62e with the right forces and 1F1k = 0, of all cases",
             f"none of a count; {ROUNDING}",
             (
                 replace(near("unknowns", 16.0, len(COMPONENTS) - 1, 0.0), stated="sixteen"),
-                nothing("the redundant equation", max(size["1F1k"].values()), "lb"),
+                near("rank", 16.0, _rank(), 0.0),
+                nothing("eq 62e", max(size["1F1k"].values()), "lb"),
             ),
             "erratum 7: with 1F1k seventeen unknowns stand against seventeen equations, and none is redundant",
         ),
     )
+
+
+def _rank() -> int:
+    """Return the rank of eqs 62a to 64f without 63b in seventeen unknown components, in the general position."""
+    th2, eta2, th3, eta3, _ = (float(value) for value in GENERAL)
+    crank = about_k(Dual(0.9, 3.5)) @ about_i(Dual(0.0, CRANK_AT_SPEED.a1))
+    rod = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, CRANK_AT_SPEED.a2))
+    slider = about_k(th3) @ about_j(eta3) @ about_i(0.5 * np.pi)
+    rows = np.zeros((3, 6, 4, 6))
+    for n, matrix in enumerate((crank, rod, slider)):
+        # force and moment before the link, then those beyond it
+        turned = matrix.T
+        rows[n, :3, n, :3] = rows[n, 3:, n, 3:] = turned.real
+        rows[n, 3:, n, :3] = turned.dual
+        rows[n, :, n + 1] = np.eye(6)
+    equations = np.delete(rows.reshape(18, 24), 6 + 3, axis=0)
+    # the ball joints carry no moment, and 1T1k is given
+    return int(np.linalg.matrix_rank(np.delete(equations, [5, *range(9, 12), *range(15, 18)], axis=1)))
 
 
 def sinusoidal_axial_force(ratio: float) -> float:
@@ -444,7 +501,10 @@ def compute(number: str) -> StudyResult:
     columns |= {_dead_centre_name(case): dead_centres_deg(case) for case in cases}
     shown = ", ".join(symbols) or "displacement S4"
     if number == CONSTANT:
-        claim = "1F1k and 2F2k are zero, 2F2j is -T/a1, the moments on the slider are zero, in every case and at every angle."
+        claim = (
+            "Rahman states: 1F1k and 2F2k are zero, 2F2j is -T/a1, the moments on the slider are zero, in every case and at "
+            "every angle."
+        )
     else:
         claim = f"The {shown} over a turn of the crank for variable {family}, beside the ideal case."
     assignment = "" if number == CONSTANT else INFERRED
@@ -454,8 +514,15 @@ def compute(number: str) -> StudyResult:
         assignment=assignment,
         columns=padded(columns),
         statements=_JUDGED[number]() if number in _JUDGED else (),
-        see="" if number in ("R5", "R8", CONSTANT) else "R5" if not symbols else "R8",
+        see="" if number in ("R5", "R8", CONSTANT) else _judged_at(number, symbols),
     )
+
+
+def _judged_at(number: str, symbols: tuple[str, ...]) -> str:
+    """Return the figures at which the statements on a figure without its own, or on a torque, are judged."""
+    if not symbols:
+        return "R5"
+    return "R8" if "T" not in symbols[0] else "R8 and below" if number in _JUDGED else "R8 and R14"
 
 
 def printed(text: str) -> str:

@@ -1,6 +1,7 @@
 """Rahman's equations as printed, in pounds, inches and seconds: the iteration of section 2.6.1, and eqs 37 to 43, 46 to 69.
 
-They are kept to the letter with their errors, to be compared with correct values. A switch ``erratum_N`` mends the erratum of
+They are kept to the letter with their errors, to be compared with correct values; second dots that the scan has lost are
+restored: each term of a second rate has one second rate or two first ones. A switch ``erratum_N`` mends the erratum of
 that number in docs/rahman.md. The suffix ``_t`` of an angle's name is its rate, ``_tt`` its second rate.
 """
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import POUND_FORCE
+from linkwork.slider_crank.published import CRANK_SPEED, POUND_FORCE
 
 from ...numerics.dual import Dual, about_i, about_j, about_k, stack
 from ...slider_crank import close, settle
@@ -25,8 +26,8 @@ FloatArray = NDArray[np.float64]
 STEP_DEG, MAX_STEPS = 5.0, 200
 #: Largest change of an angle (rad) or of S4 (in) in a step that counts as small: our choice too.
 STEP = 1e-6
-#: K2x2 of the rod (in2), of effect in eq 50a alone.
-ROD_X_SQUARE = 0.5
+#: K2x2 of the rod (in2), of effect in eqs 50a and 55 alone, and the squares of the slider, in 51a and 56 alone.
+ROD_X_SQUARE, SLIDER_SQUARE = 0.5, 3.0**2 / 6.0
 #: Crank angles of the continuation (deg).
 GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
 
@@ -120,12 +121,14 @@ def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, F
 
 
 class Crank(NamedTuple):
-    """Lengths a1 and a2 (in), theta1' (rad/s) and S1' (in/s), the rates being constant."""
+    """Lengths a1 and a2 (in), theta1' (rad/s) and S1' (in/s), theta1'' (rad/s2) and S1'' (in/s2)."""
 
     a1: float
     a2: float
     speed: float
     shift_rate: float = 0.0
+    acceleration: float = 0.0
+    shift_acceleration: float = 0.0
 
 
 class Joints(NamedTuple):
@@ -136,6 +139,18 @@ class Joints(NamedTuple):
     th3: FloatArray
     eta3: FloatArray
     s4: FloatArray
+
+
+#: The crank of section 3.1 at its speed, and a configuration in general position.
+CRANK_AT_SPEED = Crank(12.0, 50.0, CRANK_SPEED)
+GENERAL = Joints(*(np.array(value) for value in (2.1, 0.35, -1.3, 0.2, 40.0)))
+
+
+def later(c: Crank, q: Joints, r: Joints, a: Joints) -> tuple[Crank, Joints, Joints]:
+    """Return crank, joints and their rates moved along the motion by 1e-20j s: derivatives without rounding error."""
+    speeds = (c.speed + 1e-20j * c.acceleration, c.shift_rate + 1e-20j * c.shift_acceleration)
+    moved = [Joints(*(x + 1e-20j * y for x, y in zip(*pair))) for pair in ((q, r), (r, a))]
+    return Crank(c.a1, c.a2, *cast("tuple[float, float]", speeds)), moved[0], moved[1]
 
 
 def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
@@ -155,12 +170,13 @@ def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
 
 
 def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
-    """Return the second rates by eqs 38a to 42a for constant theta1' and S1'.
+    """Return the second rates by eqs 38a to 42a.
 
     The bracket shared by 40 to 42 and its rate have names here.
     """
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v, a1, a2 = c.speed, c.shift_rate, c.a1, c.a2
+    wt, vt = c.acceleration, c.shift_acceleration
     bracket = a1 * w * (c2 * s3 + s2 * c3 * ce) - v * se * c3
     bracket_t = (
         a1
@@ -168,6 +184,8 @@ def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
         * (-r.th2 * s2 * s3 + r.th3 * c2 * c3 + r.th2 * c2 * c3 * ce - r.th3 * s2 * s3 * ce - r.eta2 * s2 * c3 * se)
         - v * r.eta2 * ce * c3
         + v * r.th3 * se * s3
+        + a1 * wt * (c2 * s3 + s2 * c3 * ce)
+        - vt * se * c3
     )
     top = v * c3 * se * ce - a1 * w * (s2 * c3 + c2 * s3 * ce) - a2 * w * s3
     top_t = (
@@ -177,6 +195,9 @@ def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
         * w
         * (r.th2 * c2 * c3 - r.th3 * s2 * s3 - r.th2 * s2 * s3 * ce + r.th3 * c2 * c3 * ce - r.eta2 * c2 * s3 * se)
         - a2 * w * r.th3 * c3
+        + vt * c3 * se * ce
+        - a1 * wt * (s2 * c3 + c2 * s3 * ce)
+        - a2 * wt * s3
     )
     lever, lever_t = a2 * s2 * s3, a2 * (r.th2 * c2 * s3 + r.th3 * s2 * c3)
     return Joints(
@@ -189,7 +210,7 @@ def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
         )
         / lever**2,
         s4=(
-            s3 * (v * r.eta2 * ce - a1 * w * (r.th2 * c2 * ce - r.eta2 * s2 * se))
+            s3 * (vt * se + v * r.eta2 * ce - a1 * (wt * s2 * ce + w * (r.th2 * c2 * ce - r.eta2 * s2 * se)))
             - (v * se - w * a1 * s2 * ce) * r.th3 * c3
         )
         / s3**2,
@@ -278,6 +299,83 @@ def forward_rod_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
     )
 
 
+def _forward_rates(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
+    """Return the rate of eq 35, whose terms eqs 55 and 56 share."""
+    (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
+    w, v, wt, vt = c.speed, c.shift_rate, c.acceleration, c.shift_acceleration
+    about_j2 = a.eta2 * c2 - r.eta2 * r.th2 * s2
+    about_k2 = (
+        (wt + a.th2) * ce - turning * r.eta2 * se + a.eta2 * s2 * se + r.eta2 * r.th2 * c2 * se + r.eta2**2 * s2 * ce
+    )
+    return _dual(
+        [
+            a.eta2 * s2 * ce
+            + r.eta2 * r.th2 * c2 * ce
+            - r.eta2**2 * s2 * se
+            - (wt + a.th2) * se
+            - turning * r.eta2 * ce,
+            about_j2,
+            about_k2,
+        ],
+        [
+            c.a1 * (wt * s2 * ce + w * r.th2 * c2 * ce - w * r.eta2 * s2 * se) - vt * se - v * r.eta2 * ce,
+            c.a1 * (wt * c2 - w * r.th2 * s2) + c.a2 * about_k2,
+            vt * ce
+            - v * r.eta2 * se
+            + c.a1 * (wt * s2 * se + w * r.th2 * c2 * se + w * r.eta2 * s2 * ce)
+            - c.a2 * about_j2,
+        ],
+    )
+
+
+def _to_slider(q: Joints) -> FloatArray:
+    """Return the rotation of eq 45 from frame 3 to frame 4, that of eq 3 transposed."""
+    (s3, sh), (c3, ch) = np.sin([q.th3, q.eta3]), np.cos([q.th3, q.eta3])
+    return np.array([[c3 * ch, s3 * ch, -sh], [c3 * sh, s3 * sh, ch], [s3, -c3, 0.0 * s3]])
+
+
+def forward_slider_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
+    """Return the slider's dual velocity by eq 45."""
+    rod, rotation = forward_rod_velocity(c, q, r), _to_slider(q)
+    return Dual(rotation @ (rod.real + np.array([0.0, r.eta3, r.th3])), rotation @ rod.dual)
+
+
+def _of_slider(v: Dual, mass: float, g3: float) -> Dual:
+    """Return the slider's dual momentum, or its rate, by the terms of eqs 51a and 56 in the components of eq 45."""
+    (x, y, z), (xd, yd, zd) = v.real, v.dual
+    square = SLIDER_SQUARE
+    found = _dual([xd, yd + g3 * z, zd - g3 * y], [square * x, square * y - g3 * zd, square * z + g3 * yd])
+    return cast(Dual, mass * found)
+
+
+def forward_slider_momentum(c: Crank, b: Bodies, q: Joints, r: Joints, g3: float, *, slip: bool = False) -> Dual:
+    """Return the slider's dual momentum by eq 51a; ``slip`` keeps its cos theta3 for cos eta3 (erratum 9)."""
+    mass, across = b.masses[2], forward_rod_velocity(c, q, r).dual[2]
+    wrong = mass * (np.cos(q.th3) - np.cos(q.eta3)) * across if slip else 0.0
+    found = _of_slider(forward_slider_velocity(c, q, r), mass, g3) + _dual([0.0, wrong, 0.0], [0.0, 0.0, 0.0])
+    return cast(Dual, found)
+
+
+def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, g3: float) -> tuple[Dual, Dual]:
+    """Return the rates of the dual momenta of rod and slider by eqs 55 and 56, terms gathered; the latter has cos eta3."""
+    (_, m2, m3), square, rod = b.masses, b.rod_square, _forward_rates(c, q, r, a)
+    (x, y, z), (xd, yd, zd) = rod.real, rod.dual
+    of_rod = _dual(
+        [xd, yd + b.g2 * z, zd - b.g2 * y], [ROD_X_SQUARE * x, square * y - b.g2 * zd, square * z + b.g2 * yd]
+    )
+    (s3, sh), (c3, ch) = np.sin([q.th3, q.eta3]), np.cos([q.th3, q.eta3])
+    turned = np.array(
+        [
+            [-r.th3 * s3 * ch - r.eta3 * c3 * sh, r.th3 * c3 * ch - r.eta3 * s3 * sh, -r.eta3 * ch],
+            [r.eta3 * c3 * ch - r.th3 * s3 * sh, r.th3 * c3 * sh + r.eta3 * s3 * ch, -r.eta3 * sh],
+            [r.th3 * c3, r.th3 * s3, 0.0 * s3],
+        ]
+    )
+    now, rotation = forward_rod_velocity(c, q, r), _to_slider(q)
+    real = rotation @ (rod.real + np.array([0.0, a.eta3, a.th3])) + turned @ (now.real + np.array([0.0, r.eta3, r.th3]))
+    return m2 * of_rod, _of_slider(Dual(real, rotation @ rod.dual + turned @ now.dual), m3, g3)
+
+
 def crank_momentum(c: Crank, b: Bodies) -> Dual:
     """Return the crank's dual momentum by eq 49a; with second rates in ``c`` its rate by eq 54, which has the same terms."""
     m1, w, v = b.masses[0], c.speed, c.shift_rate
@@ -341,6 +439,11 @@ def inertia_force(velocity: Dual, momentum: Dual, rate: Dual) -> Dual:
     return cast(Dual, rate + stack(turned))
 
 
+def inertia_forces(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints) -> list[Dual]:
+    """Return f1, f2 and f3 by eqs 49a, 52a, 53a, 54 and 57 to 61, at constant speed and shift."""
+    return [inertia_force(*of) for of in zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(b, q, r, a))]
+
+
 def joint_forces(
     c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, torque: float, *, erratum_5: bool = False
 ) -> dict[str, FloatArray]:
@@ -350,13 +453,14 @@ def joint_forces(
     ``erratum_5`` mends the signs of f1 and f3 in eqs 62 and 64. 1F1k is 0, as in the thesis.
     """
     (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))
-    known = zip(velocities(c, q, r), momenta(c, b, q, r), momentum_rates(b, q, r, a))
-    f1, f2, f3 = (inertia_force(*of) for of in known)
+    f1, f2, f3 = inertia_forces(c, b, q, r, a)
     if erratum_5:
         f1, f3 = -f1, -f3
     (f1x, f1y, f1z), (f2x, f2y, f2z), (f3x, f3y, f3z) = (np.moveaxis(f.real, -1, 0) for f in (f1, f2, f3))
-    (_, _, f1zd), (f2xd, f2yd, f2zd), slider_moments = (np.moveaxis(f.dual, -1, 0) for f in (f1, f2, f3))
-    f = {"f2xd": f2xd} | {f"4T4{axis}": -moment for axis, moment in zip("ijk", slider_moments)}
+    (f1xd, f1yd, f1zd), (f2xd, f2yd, f2zd), slider_moments = (np.moveaxis(f.dual, -1, 0) for f in (f1, f2, f3))
+    f = {"f1xd": f1xd, "f1yd": f1yd, "f2xd": f2xd} | {
+        f"4T4{axis}": -moment for axis, moment in zip("ijk", slider_moments)
+    }
     f["2F2k"] = -f1z + 0.0 * f2z
     f["3F3j"] = -(f2y + f2zd / c.a2)
     f["3F3k"] = f2yd / c.a2 - f2z
@@ -374,3 +478,9 @@ def on_crank(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, F
     """Return 1F1i and 1F1j by eqs 69i and 69j."""
     s, c = np.sin(angle), np.cos(angle)
     return f["along crank"] * c - f["across crank"] * s, f["along crank"] * s + f["across crank"] * c
+
+
+def on_bearing(angle: FloatArray, shift_in: float, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return 1T1i and 1T1j (lb.in) by eqs 69q and 69p, with the 1F1k = 0 of a constant shift."""
+    (i, j), s, c = on_crank(angle, f), np.sin(angle), np.cos(angle)
+    return -j * shift_in - f["f1xd"] * c + f["f1yd"] * s, i * shift_in - f["f1xd"] * s - f["f1yd"] * c
