@@ -54,8 +54,8 @@ push is straight to 4 % of its length. Searches that include known minima take h
 *What does not.* Six of the seven errors are not those of the printed linkages, with the misprints mended that we found and
 each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. Those of the two rocker
 functions are missed by half a per cent in the nearest of many readings. Nor are the linkages for ellipses and paths minima:
-a descent from each lowers its error to a twenty-fifth to a fifth, and under the same limits there are linkages with a
-fortieth to a fifth; the two rocker functions are within 5 % of the optimum. The search itself, repeated from the program, is
+a few steps of a descent at least halve their errors, and under the same limits there are linkages with a fortieth to a
+fifth of them; the two rocker functions are within 5 % of the optimum. The search itself, repeated from the program, is
 stopped by its criterion each time before it is at a minimum, none of its techniques reached the least error, and to begin
 with fewer points or parameters is no better than to begin at random.
 

@@ -96,9 +96,10 @@ class PublishedProblem:
         return self.per_si * error
 
     def error_of(self, linkage: Linkage) -> float:
-        """Return the error of a linkage in the unit of print."""
+        """Return the error of a linkage in the unit of print, infinite if its links cannot be joined."""
         if isinstance(self.task, UntimedPath):
-            return self.convert(area_between(linkage.path(turn(AREA_N)), self.task.path))
+            curve = linkage.path(turn(AREA_N))
+            return self.convert(area_between(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
         return self.convert(evaluate(self.task, linkage).error)
 
 

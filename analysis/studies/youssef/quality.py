@@ -30,8 +30,8 @@ TIMED, PATH = PROBLEMS["ellipse-a"], PROBLEMS["path-a"]
 LONGEST = max(TIMED.linkage.largest_link, PATH.linkage.largest_link)
 #: Evaluations of a simplex, number of restarts, and its size relative to the dimensions.
 EVALUATIONS, ROUNDS, SIZE = 1500, 3, 0.01
-#: Error of a linkage outside the limits (cm2), and least length in a descent (m).
-REFUSED, SHORTEST = 1e6, 1e-6
+#: Error of a linkage outside the limits (cm2); least length (m) and most steps of a descent.
+REFUSED, SHORTEST, STEPS = 1e6, 1e-6, 60
 #: What each linkage was found for.
 AIMS = {"timed": "for points in time", "path": "for the curve alone", "combined": "for both"}
 #: Number of random four-bars in the test of the constraint.
@@ -92,7 +92,7 @@ def least_combined(start: Linkage) -> Linkage:
 
 
 def below(name: str) -> float:
-    """Return the error of the minimum to which a descent from a printed linkage leads (unit of print)."""
+    """Return the error to which a descent from a printed linkage leads (unit of print)."""
     p, longest = PROBLEMS[name], PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
     bounds = dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)) | p.bounds
@@ -103,7 +103,7 @@ def below(name: str) -> float:
         found = p.error_of(Linkage.from_vector(x * unit, p.linkage.branch)) / first
         return found if np.isfinite(found) else REFUSED
 
-    options = {"ftol": 1e-4, "maxiter": 300}
+    options = {"ftol": 1e-9, "maxiter": STEPS}
     return first * float(minimize(error, p.linkage.vector / unit, method="SLSQP", bounds=limits, options=options).fun)
 
 
@@ -193,9 +193,9 @@ def compute() -> StudyResult:
                 "The method described can find a planar linkage to generate a given output. It can [deal] with any type of "
                 "planar linkage yielding in all cases a minimum.",
                 text("6.5, L5136"),
-                "error of the printed linkages, mended where they are misprinted, over that of the minimum next to each, where "
-                "a descent from it with no longer link ends",
-                f"{1.0 + ALIKE:g}, the rule for *the same*",
+                "error of the printed linkages, mended where they are misprinted, over that to which a descent towards the "
+                f"minimum next to each leads in at most {STEPS} steps, with no longer link",
+                f"{1.0 + ALIKE:g}, the rule for *the same*: at a minimum there is no descent",
                 tuple(at_most(name, 1.0 + ALIKE, ratio, why="it is no minimum") for name, ratio in ratios.items()),
                 "no other type of linkage is given",
             ),

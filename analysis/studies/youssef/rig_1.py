@@ -261,9 +261,9 @@ def compute_friction() -> StudyResult:
             Statement(
                 "The differences may be attributed to the same factors as previously described with spring A.",
                 text("8.4.1.1, L6528"),
-                why="of the three factors two, the scatter of the damping and the pins, have no size; the first, friction in the "
-                f"guide, with one coefficient for both springs takes off {b_over_a} times as much with B as with A, so that "
-                "alone it does not explain why the agreement with B is poorer",
+                why="of the three factors two, the scatter of the damping and the pins, have no size; the first, friction in "
+                f"the guide, with one coefficient for both springs takes off {b_over_a} times as much with B as with A: alone "
+                "it does not explain why the agreement with B is poorer",
             ),
         ),
     )
