@@ -95,7 +95,7 @@ def below(name: str) -> float:
     """Return the error to which a descent from a printed linkage leads (unit of print)."""
     p, longest = PROBLEMS[name], PROBLEMS[name].linkage.largest_link
     unit = np.append(np.full(7, longest), np.ones(3))
-    bounds = dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)) | p.bounds
+    bounds = {**dict.fromkeys((*LINKS, "point_distance"), (SHORTEST, longest)), **p.bounds}
     limits = [tuple(np.array(bounds.get(d, (-np.inf, np.inf))) / u) for d, u in zip(p.linkage.values(), unit)]
     first = printed_error(name)
 
