@@ -57,7 +57,7 @@ functions are missed by half a per cent in the nearest of many readings. Nor are
 a few steps of a descent at least halve their errors, and under the same limits there are linkages with a fortieth to a
 fifth of them; the two rocker functions are within 5 % of the optimum. The search itself, repeated from the program, is
 stopped by its criterion each time before it is at a minimum, none of its techniques reached the least error, and to begin
-with fewer points or parameters is no better than to begin at random.
+with fewer points or parameters leads to no lower errors than to begin at random.
 
 *Why.* The downhill simplex stops before it is at the minimum, in ten dimensions each time. And without bounds the problem has
 no solution: the longer the links, the smaller the error. With exact derivatives nearly every start ends at the same optimum
