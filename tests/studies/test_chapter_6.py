@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.studies.youssef import search
-from analysis.studies.youssef.chapter_6 import best, pairing_area, rounded, straight_error
+from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounded, straight_error
 from analysis.studies.youssef.packaging import nineteen_points
 from analysis.studies.youssef.problems import PROBLEMS, packaging_path
 from analysis.studies.youssef.quality import arguments, both, linkages
@@ -77,9 +77,13 @@ def test_nineteen_points_on_the_desired_path() -> None:
 
 
 def test_error_over_the_rounding_of_printed_digits() -> None:
-    error, *over_rounding = rounded("ellipse-a", 0.005, 0.005)
-    assert error == pytest.approx(published.CHAPTER_6_ERRORS["ellipse-a"].true, abs=5e-3)
-    assert over_rounding == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
+    assert rounded("ellipse-a")[""] == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
+
+
+def test_half_units_of_printed_digits() -> None:
+    """5.083, 2.615, 4.148 and 3.75 cm, 41.88 deg; the rest is not printed."""
+    expected = [0.0, 0.0, 5e-6, 5e-6, 5e-6, 5e-5, 0.0, 0.0, np.radians(5e-3), 0.0]
+    np.testing.assert_allclose(half_units(PROBLEMS["rocker"].linkage), expected, rtol=1e-12)
 
 
 @pytest.mark.slow

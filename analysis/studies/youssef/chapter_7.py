@@ -22,7 +22,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...numerics.fourier import FourierSeries
 from ...slider import VariationalMotion, slider_motion, variational_motion
 from ...synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution, TimedPath, turn
-from ...youssef import accessible, accessible_area
+from ...youssef import AccessibleArea, accessible, accessible_area
 from ..rules import READ
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
@@ -35,19 +35,22 @@ method, exact at each crank angle, and by a direct search for a Fourier series.
 *What stands.* Precision points may be kept while the motion between them changes. The coupler that points at the desired
 point gives the least error, exactly. Two harmonics of the slider reduce the error of all eight problems of chapter VI, that
 of the weighted rocker function fifty times where its stroke is not limited. For path (b) the printed series gives the
-stated 4.3 cm2 once A0 = 3.1 is read as 0.31 and the guide's angle is taken from the horizontal. Cams of a few centimetres
-can drive such a slider; a drive without feedback fails on a machine that is not quite as modelled, and feedback holds the
-motion to a quarter of a per cent of the stroke.
+stated 4.3 cm2 once l4 is mended as in chapter VI, A0 = 3.1 is read as 0.31, and the guide's angle is taken from the
+horizontal, where the text has it from the ground link. Cams of a few centimetres can drive such a slider; on a machine with
+twice the friction of the model, coupler and slider a tenth heavier and a load of 6 N a drive without feedback fails within
+half a turn, and feedback holds the motion to a quarter of a per cent of the stroke.
 
 *What does not.* The envelope has a hole where all curves of the family go round the same place: P reaches 24 to 85 % of
 what it encloses, by the limits of U. If the coupler cannot point at the desired point the rocker need not stand upright:
-for half of all places it hangs. The printed series for the rocker function gives the stated 4.8 deg2 in no reading: 47 deg2
-at best. Neither printed series is an optimum. A mechanism that corrects itself in trial cycles does not converge: the
-deviation falls to an eighth or a quarter, and ever more slowly.
+for half of such places it hangs. The printed series for the rocker function gives the stated 4.8 deg2 in none of the
+readings tried (of its signs, of A0 and of its argument): as printed the links cannot be joined, and at best it has 47 deg2,
+more than with the pivot fixed. Neither printed series is an optimum.
 
-*What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. With a curve of ours all that the
-thesis says of it is so, and the numbers are given, but none of it is counted as holding. Methods that are only named, as
-teach-in, latches or further inputs, have no example to judge.
+*What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. With a curve of ours most of what
+the thesis says of it comes out alike, and the numbers are given, but none of it is counted as holding. Of a mechanism that
+corrects itself neither the adjustment nor the number of trial cycles is stated: with ours the deviation falls to an eighth
+or a quarter in six cycles, ever more slowly. Methods that are only named, as teach-in, latches or further inputs, have no
+example to judge.
 """
 
 FloatArray = NDArray[np.float64]
@@ -181,10 +184,7 @@ def curve_of(result: StudyResult, name: str, label: str = "", **look: object) ->
 
 def family() -> StudyResult:
     """Compute Fig 7.2: coupler curves, isochronous curves, and the share of the enclosed area that P reaches."""
-    areas = {
-        (low, high): accessible_area(LINKAGE.to_five_bar(), (low - 1.0, high - 1.0), tolerance=1e-4)
-        for low, high in LIMITS
-    }
+    areas = {limits: reach(*limits) for limits in LIMITS}
     columns: dict[str, FloatArray] = {}
     for u in FAMILY:
         columns |= xy(f"U = {u:g}", point(TURN, u - 1.0))
@@ -236,6 +236,12 @@ def family() -> StudyResult:
             ),
         ),
     )
+
+
+@cache
+def reach(low: float, high: float) -> AccessibleArea:
+    """Return the area that P reaches with U between two limits."""
+    return accessible_area(LINKAGE.to_five_bar(), (low - 1.0, high - 1.0), tolerance=1e-4)
 
 
 def enclosed(low: float, high: float) -> float:
@@ -352,11 +358,11 @@ def two_positions() -> StudyResult:
         columns=padded(columns),
         statements=(
             Statement(
-                "This corresponds to the relation that for minimum error the coupler takes the position of a straight line "
-                "with the point p(x*, y*).",
+                "[Equation (7.12)] corresponds to the relation that for minimum error the coupler takes the position of a "
+                "straight line with the point p(x*, y*).",
                 text("7.3.1, L5628"),
                 f"error with the coupler pointing at the point less the least of {POSITIONS.size} slider positions and both "
-                f"assemblies, the most of the {least.size} random points where (7.14) has a root",
+                f"assemblies, the greatest over the {least.size} random points where (7.14) has a root",
                 "1e-3 l3, more than P moves from one position to the next",
                 (at_most("greatest difference", 1e-3, float((pointing[~missing] - least).max()), "l3"),),
             ),
@@ -421,7 +427,7 @@ def _unweighted() -> tuple[Statement, ...]:
         Statement(
             "Different initial guesses of the coefficients produced different optima.",
             text("7.3.1, L5743"),
-            why=f"{LOST}; with ours six random guesses end at {distinct} optima",
+            why=f"{LOST}; with ours six random guesses end at {distinct} different errors",
         ),
         Statement(
             "The variational method located the true global optimum which the direct search located as best as an "
@@ -442,8 +448,9 @@ def _unweighted() -> tuple[Statement, ...]:
             "corners",
         ),
         Statement(
-            "In many cases this entails a far greater effort than would otherwise be needed with a direct search.",
-            text("7.3.1, L5885"),
+            "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "
+            "greater effort than would otherwise be needed with a direct search.",
+            text("7.3.1, L5883"),
             why="the effort of neither method is stated, and in this mechanism the equations are solved in closed form",
         ),
     )

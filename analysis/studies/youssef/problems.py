@@ -5,9 +5,8 @@ ill-posed: the error tends to zero as the links grow. Each is therefore stated h
 of the printed linkage, and with a least transmission angle of 40 degrees, or, for rocker functions, whose target fixes
 this angle, with a fully turning crank.
 
->>> from analysis.synthesis import evaluate
 >>> problem = PROBLEMS["ellipse-a"]
->>> round(problem.convert(evaluate(problem.task, problem.linkage).error), 2)
+>>> round(problem.error_of(problem.linkage), 2)
 5.64
 """
 
@@ -33,6 +32,8 @@ from ...synthesis import (
     Task,
     TimedPath,
     UntimedPath,
+    area_between,
+    evaluate,
     path_from_formula,
     turn,
 )
@@ -94,6 +95,13 @@ class PublishedProblem:
         """Convert an error from SI to the unit of print."""
         return self.per_si * error
 
+    def error_of(self, linkage: Linkage) -> float:
+        """Return the error of a linkage in the unit of print, infinite if its links cannot be joined."""
+        if isinstance(self.task, UntimedPath):
+            curve = linkage.path(turn(AREA_N))
+            return self.convert(area_between(curve, self.task.path)) if np.isfinite(curve).all() else np.inf
+        return self.convert(evaluate(self.task, linkage).error)
+
 
 def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
     """Return the target ellipse about (20, 15) cm, with a given semi-axis along x and 5 cm along y, shape (n, 2) in m."""
@@ -104,8 +112,8 @@ def ellipse(semi_axis_cm: float, n: int) -> NDArray[np.float64]:
 def rocker_function(n: int, *, weighted: bool = False, mounting: bool = False) -> RockerFunction:
     """Return the function th4* = 70 + 100 |sin(th/2)| degrees at n crank angles, optionally weighted by `WEIGHT`.
 
-    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but its 35.0 is only approached,
-    at N = 24, with 60 included.
+    The window is 60 to 260 degrees with both ends. The thesis prints 60 < omega t < 260, but its 35.0 is approached most,
+    at N = 24 and within the window alone, with 60 included.
     """
     phi = turn(n)
     # in whole numbers, so that the ends of the window are exact
