@@ -578,9 +578,7 @@ def _fig_8_17() -> tuple[Statement, ...]:
             "above 800 rpm, the greatest speed that was run with it; the sign alone",
             (
                 at_least("speed", float(rig_1.STOPPED["B"]), meeting["B"], "rpm"),
-                at_most(
-                    "change of the angle", 0.0, np.subtract(*(_apart(turn("B", w)) for w in (780.0, 500.0))), "deg"
-                ),
+                at_most("change of the angle", 0.0, _apart(turn("B", 780.0)) - _apart(turn("B", 500.0)), "deg"),
             ),
         ),
     )

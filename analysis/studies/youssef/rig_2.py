@@ -84,7 +84,7 @@ def compute_resonance(number: str, spring: str) -> StudyResult:
 
 
 @cache
-def width(spring: str, linear: bool = False, **changes: float) -> float:
+def width(spring: str, linear: bool = False, /, **changes: float) -> float:
     """Return the width of the resonance (rpm), see `WIDTH`: by the full equations, or by the linear one."""
     speeds = natural_speed(spring) + np.arange(-40.0, 40.1, 5.0)
     if linear:
@@ -133,7 +133,7 @@ def _resonance() -> tuple[Statement, ...]:
                 for s in "CD"
                 for what, ratio in (
                     ("amplitude", base[s] / length(s) / linear_motion(s, BEYOND).amplitude),
-                    ("width", width(s) / width(s, linear=True)),
+                    ("width", width(s) / width(s, True)),
                 )
             ),
             "what is ignored lowers the amplitude and narrows the resonance",
