@@ -33,6 +33,8 @@ from ..study import StudyResult
 from ..variation import cache, vary
 
 LOST = "the measured curve is lost with the figure"
+#: Study of friction in the guide of rig 1, as its heading names it.
+FRICTION = "*What friction explains of the amplitudes; rig 1, springs A and B*"
 #: Relative rise of the amplitude that no one notices on a graph.
 NOTICED = ALIKE
 #: Coefficient of friction in the guide that reduces the amplitude slightly.
@@ -163,11 +165,21 @@ def rise_at(spring: str, order: int) -> float:
     return tops[0].amplitude / lows[0].amplitude - 1.0 if lows else 0.0
 
 
+def overtones(of: Turn) -> float:
+    """Return the greatest of the harmonics 3 to 6 over the greater of the first two."""
+    first, second, *higher = (harmonic(of, n) for n in range(1, 7))
+    return max(higher) / max(first, second)
+
+
 @cache
 def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
     """Return the amplitude (cm) at the speeds of `GRID` with a coefficient of friction in the guide."""
-    speeds, found = GRID[spring].tolist(), []
-    parameters, start = rig(spring, slider_friction_coefficient=coefficient), orbit(rig(spring), speeds[0]).start
+    return follow(spring, GRID[spring].tolist(), slider_friction_coefficient=coefficient)
+
+
+def follow(spring: str, speeds: Sequence[float], **changes: float) -> NDArray[np.float64]:
+    """Return the amplitude (cm) at speeds (rpm), each motion found from the one before, with changes of the rig."""
+    parameters, start, found = rig(spring, **changes), orbit(rig(spring), speeds[0]).start, []
     for speed in speeds:
         motion = orbit(parameters, speed, start)
         start = motion.start
