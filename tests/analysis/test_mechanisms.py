@@ -441,3 +441,11 @@ def test_ensemble_of_inputs_that_differ_in_kind() -> None:
 def test_a_balance_without_kinetic_energy_is_refused() -> None:
     with pytest.raises(InputError, match=r"needs the output energy\.kinetic, which a pendulum does not have"):
         simulate(demo(PENDULUM).parameters, initial=demo(PENDULUM).initial, stop_time=0.1, step=0.1, method="balanced")
+
+
+@pytest.mark.parametrize("mechanism", MECHANISMS.values(), ids=MECHANISMS)
+def test_the_default_experiment_is_run_accurately(mechanism: Mechanism) -> None:
+    start, stop, step, tolerance = mechanism.experiment
+    assert 0.0 <= start < stop
+    assert 0.0 < step <= 0.01 * (stop - start)
+    assert 1e-12 <= tolerance <= 1e-6
