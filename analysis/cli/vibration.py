@@ -399,7 +399,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
     console.print("\n".join(lines), highlight=False, soft_wrap=True)
     if friction:
         print_error(
-            "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, "
+            "note: Coulomb friction is smoothed over 1 mm/s: where it would stick, the model creeps to one place, "
             "and its multipliers are those of the creep"
         )
 

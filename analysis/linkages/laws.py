@@ -32,6 +32,8 @@ def law(value: Any, name: str) -> str:
         If a formula has anything but names, arithmetic and functions of `math`, or the rows of a table are not in order.
     """
     if isinstance(value, list):
+        if any(isinstance(number, str) for row in value if isinstance(row, list) for number in row):
+            raise ParameterError(name, value, "have rows of numbers without units: m and N, about a pin rad and N.m")
         return _table(_ROWS(value, name), name)
     try:
         tree = ast.parse(str(value), mode="eval")

@@ -185,6 +185,9 @@ class Multipliers:
         if pin in forces:
             first = 1.0 if self.owners[pin][0] == rack.gear else -1.0
             forces[pin] = forces[pin] + first * side * pull * along
+        for body, sign in ((rack.gear, -1.0), (carrier, 1.0)):
+            if (own := f"{pin} of {body}") in forces:
+                forces[own] = forces[own] + sign * side * pull * along
 
     def placed(self, coordinates: np.ndarray, guess: np.ndarray, sweeps: int = 20) -> np.ndarray:
         """Places of the bodies at coordinates of the freedoms, by Newton's method."""
