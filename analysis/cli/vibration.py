@@ -389,8 +389,10 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
     orbit = orbit_of(parameters, drive, start=start)
     turn, (_, size, unit) = orbit.turn(), swing_of(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
+    # with other cranks that turn in a ratio the period is that of all; a free crank has no speed but the mean
+    rpm = drive.speed / RAD_S_PER_RPM if drive.speed_drive else 60.0 * turn.turns / turn.period
     lines = [
-        f"{title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}",
+        f"{title} at {rpm:.6g} rpm: {orbit.verdict()}",
         f"Floquet multipliers {values}; amplitude {size * turn.amplitude:.5g} {unit}",
     ]
     friction = _friction(parameters)

@@ -30,6 +30,7 @@ from analysis import (
     steps,
     tune,
 )
+from analysis.cli.vibration import _report_verdict
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linear import find_equilibrium, linearise, linearise_along, settled_motion
 from analysis.mechanisms import MECHANISMS, register
@@ -291,3 +292,8 @@ def test_the_studio_and_the_pictures_show_both_rotors() -> None:
     assert (starts["left.speed"], starts["right.speed"]) == (20.0, 30.0)
     figures.plot(orbit_of(P, _drive(20.0, Fraction(2))))
     figures.plot(frequency_response(P, 18.0, 32.0, drive=_drive(20.0, Fraction(2)), vary="left.speed"))
+
+
+def test_the_verdict_is_said_of_the_speed_of_the_crank_of_the_drive(capsys: pytest.CaptureFixture[str]) -> None:
+    _report_verdict("both", P, _drive(4.0 * pi, Fraction(3, 2)), None)
+    assert "both at 120 rpm: stable" in capsys.readouterr().out
