@@ -233,7 +233,7 @@ class Builder:
         damping: Amount | None = None,
         free: Amount | None = None,
         friction: Amount | None = None,
-        law: str | Sequence[Sequence[float]] | None = None,
+        law: str | Sequence[Sequence[Amount]] | None = None,
         constants: Mapping[str, Amount] | None = None,
         driven: bool | None = None,
     ) -> Builder:

@@ -200,7 +200,7 @@ class Spring:
         Level of Coulomb friction (N, N.m), smooth about rest.
     law : str or list of (x, force)
         A further force that opposes the stretch x: a formula in x and its rate v such as "2e5*x**3 + 4*v", or a table,
-        which is interpolated linearly (SI). Its work counts as dissipated.
+        which is interpolated linearly, of quantities or numbers in SI. Its work counts as dissipated.
     constants : mapping of str to (float, str)
         Constants of the formula, by their names in it: values and units. They become parameters of the mechanism.
     driven : bool
@@ -214,7 +214,7 @@ class Spring:
     damping: Any = entry(files.unchanged, 0)
     free: Any = entry(files.unchanged, 0)
     friction: Any = entry(files.unchanged, 0)
-    law: str = entry(law, "")
+    law: str | tuple[tuple[Any, Any], ...] = entry(law, "")
     constants: Mapping[str, tuple[float, str]] = entry(constants, factory=dict)
     driven: bool = entry(files.flag, False)
 

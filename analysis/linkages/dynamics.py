@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from .description import BODY, GROUND, Description, Spring, given
-from .laws import with_constants
+from .laws import expression, with_constants
 from .parameters import Interface
 from .structure import Dyad, Freed, Geared, Joint, Pin, Racked, Side, Step, sliders
 from .writing import function, record, tupled
@@ -112,7 +112,8 @@ class Motion:
             if spring.law:
                 doc = f"Return the force of {name} at a stretch and its rate (N, N.m)."
                 p = ", p: Constants" if spring.constants else ""
-                text = with_constants(spring.law, spring.constants, name)
+                law = expression(spring.law, bool(self.turned(spring)), f"linkage.springs.{name}.law")
+                text = with_constants(law, spring.constants, name)
                 yield function(f"{name}_law(x: float, v: float{p}) -> float", doc, [f"return {text}"])
 
     def acting(self) -> Iterator[str]:

@@ -4,37 +4,35 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import isfinite
 from typing import Any
 
 from linkwork.errors import ParameterError
 
-from ..files import Many, Quantity, as_table
+from ..files import Many, as_table, unchanged
 from ..units import quantity
 
 #: Functions of `math` that formulas may use.
 FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs")
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
-_ROWS = Many(Many(Quantity("1"), length=2), least=2)
+_ROWS = Many(Many(unchanged, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
 #: Units that a constant of a law may have.
 _UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
 
 
-def law(value: Any, name: str) -> str:
-    """Read a force law, a formula or a table of (x, force); return it as an expression in x, v and the constants.
+def law(value: Any, name: str) -> str | tuple[tuple[Any, Any], ...]:
+    """Read a force law: a formula, or the rows (x, force) of a table, whose units depend on the joint (see `expression`).
 
     Raises
     ------
     ParameterError
-        If a formula has anything but names, arithmetic and functions of `math`, or the rows of a table are not in order.
+        If a formula has anything but names, arithmetic and functions of `math`, or a table has no rows of two.
     """
     if isinstance(value, list):
-        if any(isinstance(number, str) for row in value if isinstance(row, list) for number in row):
-            raise ParameterError(name, value, "have rows of numbers without units: m and N, about a pin rad and N.m")
-        return _table(_ROWS(value, name), name)
+        return _ROWS(value, name)
     try:
         tree = ast.parse(str(value), mode="eval")
     except (SyntaxError, ValueError, RecursionError):
@@ -57,6 +55,21 @@ def law(value: Any, name: str) -> str:
     return ast.unparse(tree)
 
 
+def expression(law: str | tuple[tuple[Any, Any], ...], about: bool, name: str) -> str:
+    """Return a force law as an expression in x, v and the constants; ``about`` tells whether x is an angle and not a length.
+
+    Raises
+    ------
+    ParameterError
+        If a row of a table is of other kinds of quantities, or the rows are not in order.
+    """
+    if isinstance(law, str):
+        return law
+    units = ("rad", "N.m") if about else ("m", "N")
+    rows = [[quantity(value, unit, name) for value, unit in zip(row, units)] for row in law]
+    return _table(rows, name)
+
+
 def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
     """Read the constants of a law, quantities of any usual dimension; return their values in SI with their units."""
     return {own: _constant(given, f"{name}.{own}") for own, given in as_table(value, name).items()}
@@ -72,7 +85,7 @@ def _constant(value: Any, name: str) -> tuple[float, str]:
 
 
 def check_law(formula: str, known: Mapping[str, Any], name: str) -> None:
-    """Raise ParameterError if a law contains a name that is not a constant, or a constant has a reserved name."""
+    """Raise ParameterError if a formula contains a name that is not a constant, or a constant has a reserved name."""
     names = {node.id for node in ast.walk(ast.parse(formula)) if isinstance(node, ast.Name)}
     if not names <= {"x", "v", *FUNCTIONS, *known}:
         raise ParameterError(name, formula, _WANTED)
@@ -93,7 +106,7 @@ def _finite(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
-def _table(rows: tuple[tuple[float, float], ...], name: str) -> str:
+def _table(rows: Sequence[Sequence[float]], name: str) -> str:
     """Return piecewise linear interpolation, extrapolated at both ends, as a straight line plus terms in abs(x - x_k)."""
     if any(b[0] <= a[0] for a, b in pairwise(rows)):
         raise ParameterError(name, [list(row) for row in rows], "have rows of rising x")

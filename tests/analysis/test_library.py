@@ -137,7 +137,7 @@ bodies.ram = { points = { R = [0, 0] }, mass = 1.0 }
 slides.guide = { body = "lever", on = "swivel", through = "S" }
 slides.way = { body = "ram", through = "W" }
 racks.teeth = { gear = "gear", rack = "lever", radius = "30 mm", offset = "120 mm" }
-springs.buffer = { at = "way", law = [[-0.1, -200.0], [0.0, 0.0], [0.1, 100.0], [0.2, 400.0]], damping = 20.0 }
+springs.buffer = { at = "way", law = [["-100 mm", "-200 N"], [0.0, 0.0], ["10 cm", "0.1 kN"], [0.2, 400.0]], damping = 20.0 }
 friction = { guide = 0.08, B = "0.5 mm" }
 freedoms.crank = { joint = "A", speed = "240 rpm" }
 [run]

@@ -330,7 +330,7 @@ MISTAKES = [
     ("springs/k", {"at": "C", "law": "y + 1"}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": [[1, 2], [0, 3]]}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": [[1, 2]]}, "linkage.springs.k.law"),
-    ("springs/k", {"at": "C", "law": [["1 mm", 2], [1, 3]]}, "rows of numbers without units: m and N"),
+    ("springs/k", {"at": "C", "law": [["1 mm", 2], [1, 3]]}, "linkage.springs.k.law"),
     ("springs/crank", {"at": "C", "stiffness": 1.0, "driven": "no"}, "linkage.springs.crank.driven"),
     ("bodies/crank/length", float("nan"), "linkage.bodies.crank.length"),
     ("bodies/crank/length", "50", "linkage.bodies.crank.length"),

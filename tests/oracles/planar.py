@@ -7,6 +7,7 @@ equations, and accelerations and joint forces follow from one linear system.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi
@@ -23,6 +24,15 @@ _UNITS = pint.UnitRegistry()
 def number(value: Any) -> float:
     """A number in SI of an entry that may be a text with a unit."""
     return float(_UNITS.Quantity(value).to_base_units().magnitude) if isinstance(value, str) else float(value)
+
+
+def interpolated(rows: list[list[float]], x: Any) -> Any:
+    """The line through the rows about x, the first and the last one beyond them."""
+    lines = [y0 + (y1 - y0) / (x1 - x0) * (x - x0) for (x0, y0), (x1, y1) in pairwise(rows)]
+    found = lines[0]
+    for (knot, _), line in zip(rows[1:], lines[1:]):
+        found = casadi.if_else(x > knot, line, found)
+    return found
 
 
 class Solution(NamedTuple):
@@ -233,7 +243,10 @@ class Multipliers:
                 x = casadi.atan2(casadi.sin(x), casadi.cos(x))
             known = {own: value for own, (value, _) in s.constants.items()}
             functions = {"fabs": casadi.fabs, "tanh": casadi.tanh}
-            law = eval(s.law, {"x": x, "v": v, **functions, **known}) if s.law else 0.0
+            if isinstance(s.law, tuple):
+                law = interpolated([[number(value) for value in row] for row in s.law], x)
+            else:
+                law = eval(s.law, {"x": x, "v": v, **functions, **known}) if s.law else 0.0
             slow = FRICTION_RATE if about else FRICTION_SPEED
             law += number(s.friction) * casadi.tanh(v / slow)
             pull = number(s.stiffness) * x + number(s.damping) * v + law - forces.get(name, 0.0)
