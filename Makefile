@@ -44,7 +44,7 @@ lint: $(DEV)
 	$(BIN)/lint-imports
 	$(BIN)/python docs/generate.py --check
 
-# what the pages repeat of the code, then their site, in build/site; FIGURES=1 computes the theses' figures and pictures too (an hour)
+# what the pages repeat of the code, then their site, in build/site; FIGURES=1 computes the theses' figures and pictures too (a quarter of an hour)
 docs: $(DEV)
 	$(BIN)/python docs/generate.py $(if $(FIGURES),--figures)
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees docs build/site

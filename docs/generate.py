@@ -2,7 +2,7 @@
 
 python docs/generate.py             fills the tables between the markers of docs/*.md
 python docs/generate.py --check     writes nothing, and fails if a table is out of date
-python docs/generate.py --figures   fills the pages of the theses too, and draws the pictures (about an hour)
+python docs/generate.py --figures   fills the pages of the theses too, and draws the pictures (a quarter of an hour on two cores)
 python docs/generate.py --figures 3 R   fills only chapter III of Youssef's thesis, and Rahman's
 
 A table stands between the lines ``<!-- TABLE SUBJECT: begin -->`` and ``<!-- TABLE SUBJECT: end -->``. `TABLES` has the
