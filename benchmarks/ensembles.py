@@ -64,6 +64,15 @@ def kernels_timed(spent: list[float]) -> Iterator[None]:
         compiled.run, lanes.run_in_lanes = kernels
 
 
+def integration_time(run: Callable[[], object], repeats: int) -> float:
+    """Return the shortest CPU time (s) that the compiled solver takes within a run of one mechanism."""
+    spent: list[float] = []
+    with kernels_timed(spent):
+        for _ in range(repeats):
+            run()
+    return min(spent)
+
+
 def measured(runs: list[Callable[[], object]]) -> list[tuple[float, float, float]]:
     """Return for each the shortest CPU time, that within the compiled solver, and time by the clock (s), taken in turn."""
     times = []

@@ -27,7 +27,7 @@ from analysis.figures.style import COLOURS
 from benchmarks import engines
 from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, best_time
 from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
-from benchmarks.ensembles import kernels_timed, without_lanes
+from benchmarks.ensembles import integration_time, without_lanes
 from benchmarks.solvers import by_multipliers
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -55,18 +55,11 @@ def in_process(case: Case, of: str) -> list[Point]:
     def run(tolerance: float) -> Any:
         return simulate(case.parameters, inputs, initial=start, samples=case.times, tolerance=tolerance)
 
+    time_of = best_time if of == "whole" else integration_time
     points = []
     for tolerance in TOLERANCES.tolist():
         error = relative_error(case, run(tolerance)["slider.position"])
-        if of == "whole":
-            seconds = best_time(partial(run, tolerance), 40)
-        else:
-            spent: list[float] = []
-            with kernels_timed(spent):
-                for _ in range(40):
-                    run(tolerance)
-            seconds = min(spent)
-        points.append(Point(error, seconds))
+        points.append(Point(error, time_of(partial(run, tolerance), 40)))
     return points
 
 

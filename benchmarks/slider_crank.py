@@ -18,6 +18,7 @@ from analysis import Inputs, Trajectory, simulate
 from analysis.cli.common import say, show_table
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
 from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, TOLERANCES, best_time, loosest, right_hand_side
+from benchmarks.ensembles import integration_time
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
 
@@ -66,8 +67,8 @@ def runs() -> None:
     """Measure and print the runs in time."""
     tolerance, off, _ = loosest(lambda tolerance: error(in_process(tolerance)["slider.position"]), TOLERANCES)
     whole = best_time(partial(in_process, tolerance), 30)
-    statistics = [in_process(tolerance).statistics for _ in range(30)]
-    inner = min(s["seconds_integrating"] for s in statistics)
+    inner = integration_time(partial(in_process, tolerance), 30)
+    steps = int(in_process(tolerance).statistics["steps"])
     others = []
     for method in SCIPY_METHODS:
         choice = loosest(lambda setting, m=method: error(by_scipy(m, setting)), TOLERANCES)
@@ -79,7 +80,7 @@ def runs() -> None:
         [
             (name, f"{e:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
             for name, e, seconds in (
-                (f"in process, the integration ({int(statistics[0]['steps'])} steps)", off, inner),
+                (f"in process, the integration ({steps} steps)", off, inner),
                 ("in process, the whole call of simulate", off, whole),
                 (f"SciPy, plain-Python right-hand side, best method ({best[2]})", best[1], best[0]),
             )

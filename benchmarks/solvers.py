@@ -22,6 +22,7 @@ from analysis import Event, Inputs, TorsionBar, simulate
 from benchmarks import engines
 from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, TOLERANCES, best_time, loosest, right_hand_side
 from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
+from benchmarks.ensembles import integration_time
 from linkwork.five_bar.parameters import InitialState
 from tests.oracles.multipliers import SpeedDrive, simulate_redundant
 
@@ -53,9 +54,9 @@ def in_process(case: Case) -> tuple[list[Timing], str]:
     found = loosest(lambda tolerance: relative_error(case, run(tolerance)["slider.position"]), TOLERANCES)
     assert found.reached, "the in-process solver does not reach the accuracy"
     whole = best_time(lambda: run(found.setting), 50)
-    statistics = [run(found.setting).statistics for _ in range(50)]
-    inner = min(s["seconds_integrating"] for s in statistics)
-    steps, evaluations = int(statistics[0]["steps"]), int(statistics[0]["evaluations"])
+    inner = integration_time(lambda: run(found.setting), 50)
+    statistics = run(found.setting).statistics
+    steps, evaluations = int(statistics["steps"]), int(statistics["evaluations"])
     bare = right_hand_side(case.parameters, inputs, _states(case)) * evaluations
     note = f"tolerance {found.setting:.1e}, {steps} steps, {evaluations} evaluations"
     timings = [

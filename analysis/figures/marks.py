@@ -183,12 +183,13 @@ def place_marks(figure: Figure) -> Figure:
     for axis in figure.axes:
         texts = [text for text in axis.texts if isinstance(text, Annotation)]
         moved = [(text, _MOVES[gid]) for gid in _MOVES for text in texts if text.get_gid() == gid]
-        scene = _Scene.of(axis) if moved else None
+        if not moved:
+            continue
+        scene = _Scene.of(axis)
         placed: dict[Annotation, Bbox] = {}
         leaders: dict[Annotation, Path] = {}
         # the first may have to make way for those after it
         for text, (move, first, second) in 2 * moved:
-            assert scene is not None
             placed.pop(text, None)
             leaders.pop(text, None)
             placed[text] = _place(text, move, product(first, second), scene, [*placed.values()], [*leaders.values()])

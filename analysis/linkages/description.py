@@ -15,7 +15,7 @@ from linkwork.errors import LinkworkError, ParameterError
 
 from .. import files
 from ..files import Kinds, Many, Quantity, Table, entry
-from .laws import constants, law
+from .laws import Law, constants, law
 from .sections import SECTIONS
 
 GROUND = "ground"
@@ -214,7 +214,7 @@ class Spring:
     damping: Any = entry(files.unchanged, 0)
     free: Any = entry(files.unchanged, 0)
     friction: Any = entry(files.unchanged, 0)
-    law: str | tuple[tuple[Any, Any], ...] = entry(law, "")
+    law: Law = entry(law, "")
     constants: Mapping[str, tuple[float, str]] = entry(constants, factory=dict)
     driven: bool = entry(files.flag, False)
 

@@ -7,12 +7,15 @@ import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import isfinite
-from typing import Any
+from typing import Any, TypeAlias
 
 from linkwork.errors import ParameterError
 
 from ..files import Many, as_table, unchanged
 from ..units import quantity
+
+#: A formula, or the rows (x, force) of a table as they were given.
+Law: TypeAlias = str | tuple[tuple[Any, Any], ...]
 
 #: Functions of `math` that formulas may use.
 FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs")
@@ -23,7 +26,7 @@ _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.joi
 _UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
 
 
-def law(value: Any, name: str) -> str | tuple[tuple[Any, Any], ...]:
+def law(value: Any, name: str) -> Law:
     """Read a force law: a formula, or the rows (x, force) of a table, whose units depend on the joint (see `expression`).
 
     Raises
@@ -55,7 +58,7 @@ def law(value: Any, name: str) -> str | tuple[tuple[Any, Any], ...]:
     return ast.unparse(tree)
 
 
-def expression(law: str | tuple[tuple[Any, Any], ...], about: bool, name: str) -> str:
+def expression(law: Law, about: bool, name: str) -> str:
     """Return a force law as an expression in x, v and the constants; ``about`` tells whether x is an angle and not a length.
 
     Raises
@@ -84,8 +87,9 @@ def _constant(value: Any, name: str) -> tuple[float, str]:
     raise ParameterError(name, value, f"be a quantity with a unit, as of {', '.join(_UNITS[1:])}")
 
 
-def check_law(formula: str, known: Mapping[str, Any], name: str) -> None:
+def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
     """Raise ParameterError if a formula contains a name that is not a constant, or a constant has a reserved name."""
+    formula = law if isinstance(law, str) else ""
     names = {node.id for node in ast.walk(ast.parse(formula)) if isinstance(node, ast.Name)}
     if not names <= {"x", "v", *FUNCTIONS, *known}:
         raise ParameterError(name, formula, _WANTED)

@@ -91,7 +91,7 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
         if spring.bodies and not (set(spring.bodies) <= {*d.bodies, GROUND} and len(set(spring.bodies)) == 2):
             known = ", ".join((*d.bodies, GROUND))
             yield f"{where}.bodies", f"are {' and '.join(spring.bodies)}", f"they must be two of {known}"
-        check_law(spring.law if isinstance(spring.law, str) else "x", spring.constants, f"linkage.{where}.law")
+        check_law(spring.law, spring.constants, f"linkage.{where}.law")
         acts = map(given, (spring.stiffness, spring.damping, spring.friction))
         if not (any(acts) or spring.law or spring.driven):
             yield where, "does nothing", "it must have a stiffness, damping, friction or law, or be driven"

@@ -13,7 +13,6 @@ from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
 from .description import BODY, GROUND, Body, Description, LinkageError, Spring, given
-from .laws import expression
 from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
@@ -398,7 +397,6 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
             yield Parameter(
                 f"{name}.{own}", in_unit, text, number, rule, role, of if role in ("stiffness", "damping") else ""
             )
-    expression(spring.law, about, f"{where}.law")
     for own, (number, in_unit) in spring.constants.items():
         text = f"Constant {own.replace('_', ' ')} of the law of {name}"
         yield Parameter(f"{name}.{own}", in_unit, text, number, "free", "spring")

@@ -26,11 +26,13 @@ _WEIGHTS = {
 }
 #: Functions that may have a reason to refuse: those that compute, with the values that the probe chose, for example.
 _MAY_REFUSE = (
-    *("EnterInitializationMode", "ExitInitializationMode", "DoStep", "CompletedIntegratorStep", "SetContinuousStates"),
+    *("DoStep", "CompletedIntegratorStep"),
     *("NewDiscreteStates", "UpdateDiscreteStates", "EvaluateDiscreteStates"),
     *("GetDerivatives", "GetContinuousStateDerivatives", "GetEventIndicators"),
     *("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"),  # of use after Discard and Pending only
 )
+#: States before a run, in which all is computed from start values that the probe chose.
+_BEFORE = ("instantiated", "ready", "initialization")
 _STATES = 3
 
 
@@ -163,8 +165,7 @@ class Walk:
             text = f"{full} returned {STATUS[status] if status < len(STATUS) else status} for a legal call"
             self.note(WRONG, f"{name}: strange status", text)
         elif status == ERROR:
-            # before the start of a run all is computed from start values, which the probe chose
-            may = name in _MAY_REFUSE or name.startswith("Set") or state in ("instantiated", "ready", "initialization")
+            may = name in _MAY_REFUSE or name.startswith("Set") or state in _BEFORE
             severity = QUESTIONABLE if may else WRONG
             said = f" ({self.session.messages[-1]})" if self.session.messages else ""
             self.note(

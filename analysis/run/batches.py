@@ -200,8 +200,10 @@ def _integrate(
     of the channel that was not finite, the number of steps, state and channels at the end. ``samples`` get the samples, NaN
     after the end of a run.
     """
+    from ..numerics.vectors import LANES
     from . import compiled, lanes
     from . import records as k
+    from .equations import machine
 
     mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
     m, n = prepared.x.shape[0], len(settings.times)
@@ -212,7 +214,8 @@ def _integrate(
     )
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded)
-    problem = problem_of(encoded, settings, _switched(mechanism, batch.p))
+    switched = _switched(mechanism, batch.p)
+    problem = problem_of(encoded, settings, switched)
     state = k.State(np.zeros(m, dtype=k.CARRY), prepared.x.copy(), np.zeros((m, len(mechanism.channels))))
     carries = state.carries
     carries["begin"] = settings.times[0]
@@ -222,7 +225,7 @@ def _integrate(
     watch = k.watch_nothing(mechanism.size)
     todo, steps, span = status == k.RUNNING, carries["steps"], np.ptp(settings.times)
     fits = _fits(batch, settings)
-    code = lanes.code_of(mechanism, _switched(mechanism, batch.p))
+    code = machine(mechanism, switched, LANES).addresses
     while todo.any() and not heard:
         arguments = problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL
         if (todo & fits).any():

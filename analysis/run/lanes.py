@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE
-from linkwork.mechanism import Mechanism
 
 from ..numerics.codegen import copy, evaluate, inline, inner, kernel, part
 from ..numerics.references import refer
@@ -37,7 +36,7 @@ from .compiled import (
     sample_step,
     take,
 )
-from .equations import CLEARANCE, DERIVATIVE, machine
+from .equations import CLEARANCE, DERIVATIVE
 from .locating import end_at, locate_events
 from .records import PROBLEM, RUNNING, SAMPLES, STATE, WATCH, Problem, Room, Samples, State, Watch
 from .sources import ADDRESSES, SOURCE, Source
@@ -46,7 +45,7 @@ from .stepping_in_lanes import errors_in_lanes, interpolants_in_lanes, interpola
 
 
 class Lanes(NamedTuple):
-    """Work arrays: addresses of the functions in lanes; of each lane its run or -1, where that is, whether the step is the last
+    """Work arrays: addresses of the equations in lanes; of each lane its run or -1, where that is, whether the step is the last
     of its interval, what became of it; and in lanes the state, its end and that at a stage, modes, channels, constants, scales,
     step size, error, fraction of the step, stages, interpolant, clearance; and a row for each lane, the state at the
     fraction."""
@@ -76,11 +75,6 @@ class Lanes(NamedTuple):
 _BETWEEN, _ENTERED, _INSIDE = range(3)
 # What became of a step
 _IDLE, _REJECTED, _ACCEPTED, _SAMPLED = range(4)
-
-
-def code_of(mechanism: Mechanism, switched: bool) -> NDArray[np.int64]:
-    """Return the addresses of the equations in lanes."""
-    return machine(mechanism, switched, LANES).addresses
 
 
 @part
@@ -360,7 +354,7 @@ def _run(lanes, work, most, budget):
 def run_in_lanes(code, fits, problem, source, batch, watch, state, samples, status, most, budget):
     """Integrate the runs of a batch that fit and whose status is RUNNING, as `compiled.run` does one after the other.
 
-    ``code`` are the addresses of `code_of`.
+    ``code`` are the addresses of the equations in lanes, see `equations.machine`.
     """
     states, channels = state.x.shape[1], state.u.shape[1]
     room = make_room(states, problem.outputs, channels)

@@ -16,7 +16,7 @@ from ..numerics.vectors import LANES, fused, greater, load, root, size, spread, 
 from .stepping import E3, E5, FROM, ROW, STAGES, WEIGHT
 
 #: In the place of a sum of squares that is zero.
-LEAST = 1e-300
+_LEAST = 1e-300
 # stages that the error and the interpolant need, which are few of the first ones, with their weights
 _OF_ERROR = np.flatnonzero((E3 != 0.0) | (E5 != 0.0))
 _E3, _E5 = E3[_OF_ERROR], E5[_OF_ERROR]
@@ -49,7 +49,7 @@ def errors_in_lanes(x, y, k, h, scale, errors):
         weight = 1.0 / (load(scale, i) + greater(size(load(x, i)), size(end)))
         e3, e5, valid = e3 * weight, e5 * weight, fused(0.0, end, valid)
         sum3, sum5 = fused(e3, e3, sum3), fused(e5, e5, sum5)
-    bottom = greater(float(n) * (sum5 + 0.01 * sum3), 0.0 * step + LEAST)
+    bottom = greater(float(n) * (sum5 + 0.01 * sum3), 0.0 * step + _LEAST)
     store(errors, 0, step * sum5 / root(bottom) + valid)
 
 
