@@ -34,6 +34,7 @@ from linkwork.wrapper import (
     PHASES,
     RUNNING,
     TERMINATED,
+    end_in_order,
     end_library_in_order,
     keep_namespace,
     outlive_exception,
@@ -101,6 +102,7 @@ class LinkworkSlave(Fmi2Slave):
             # put there by the wrapper at each instantiation; everything is imported by now
             if self.resources in sys.path:
                 sys.path.remove(self.resources)
+            outlive_exception(self)
         self._names = [v.name for v in self.variables]
         self._kinds = [v.kind for v in self.variables]
         self._causalities = [v.causality for v in self.variables]
@@ -193,6 +195,8 @@ class LinkworkSlave(Fmi2Slave):
 
     def terminate(self) -> None:
         # whatever the phase: a master that cleans up does no harm
+        if self._wrapped and self._phase != TERMINATED:
+            end_in_order(self)
         self._phase = TERMINATED
 
     def _refuse(self, status: int, sentence: str) -> bool:

@@ -21,6 +21,7 @@ from linkwork.wrapper import (
     INSTANTIATED,
     RUNNING,
     TERMINATED,
+    end_in_order,
     end_library_in_order,
     keep_namespace,
     outlive_exception,
@@ -92,6 +93,7 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
         self._wrapped = "logger" in keywords
         if self._wrapped:
             end_library_in_order(self.resources, type(self).__name__)
+            outlive_exception(self)
         self.description = (type(self).__doc__ or "").strip().partition("\n")[0]
         self.count = 0
         self.author = "Linkwork"
@@ -219,6 +221,8 @@ class Controller(Fmi2Slave):  # type: ignore[misc]
 
     def terminate(self) -> None:
         """End the run; whatever the phase, a master that cleans up does no harm."""
+        if self._wrapped and self.phase != TERMINATED:
+            end_in_order(self)
         self.phase = TERMINATED
 
     def _get_fmu_state(self) -> dict[str, Any]:

@@ -461,6 +461,44 @@ def test_interrupt_in_a_step_ends_the_run_and_not_the_process(fmu: Path, tmp_pat
     assert set(run_in_process(interrupt, fmu, tmp_path)) <= {4, "raised"}
 
 
+def escape(fmu: str, folder: str) -> list[Any]:
+    """Exceptions that a slave cannot catch, one a run; what the next calls return, and how many slaves are left."""
+    import gc
+
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    found, kind = [], None
+    for _ in range(20):
+        for terminated in (False, True):
+            instance = fmu.instantiate().start()
+            kind = kind or next(k for k in map(type, gc.get_objects()) if k.__name__ == fmu.identifier)
+            kept = kind.do_step
+
+            def interrupted(self, *arguments):
+                raise KeyboardInterrupt
+
+            kind.do_step = interrupted
+            found.append(instance.step(0.0, 0.1))
+            kind.do_step = kept
+            found.append(len(instance.outputs()) > 20)
+            if terminated:
+                found.append(instance.terminate())
+            instance.free()
+    for _ in range(20):
+        instance = fmu.instantiate().start()
+        instance.terminate()
+        instance.free()
+    gc.collect()
+    return [found, sum(type(one).__name__ == fmu.identifier for one in gc.get_objects())]
+
+
+def test_exception_that_a_slave_cannot_catch_leaves_it_usable(fmu: Path, tmp_path: Path) -> None:
+    found, left = run_in_process(escape, fmu, tmp_path)
+    assert found == [4, True, 4, True, 0] * 20
+    assert left == 0
+
+
 def refuse_in_percent(fmu: str, folder: str) -> list[Any]:
     """A refused step whose sentence carries printf conversions."""
     from bare_master import Fmu
