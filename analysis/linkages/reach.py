@@ -25,7 +25,9 @@ class Reach(NamedTuple):
     unit : str
         Unit of its coordinate, rad or m.
     low, high : float
-        Ends of the range (rad, m): limits of assembly, or the ends of a turn.
+        Ends of the range (rad, m): limits of assembly, or the ends of a turn; of a slide, the ends of the search.
+    open : (bool, bool)
+        Whether no limit was met up to the low and to the high end.
     turns : bool
         Whether the freedom can make a whole turn.
     least : float
@@ -36,6 +38,7 @@ class Reach(NamedTuple):
     unit: str
     low: float
     high: float
+    open: tuple[bool, bool]
     turns: bool
     least: float
 
@@ -69,18 +72,22 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         except (ArithmeticError, ValueError):
             return -1.0 - LIMIT_SINE
 
-    ends, least = [], margin(middle) + LIMIT_SINE
+    ends, free, least = [], [], margin(middle) + LIMIT_SINE
     for sign in (-1.0, 1.0):
         before = middle
         for q in middle + sign * most * np.arange(1, samples + 1) / samples:
             value = margin(float(q))
             if value < 0.0:
                 before = float(brentq(lambda c: max(margin(c), -1.0), before, float(q), xtol=1e-9 * most))
+                free.append(False)
                 break
             least, before = min(least, value + LIMIT_SINE), float(q)
+        else:
+            free.append(True)
         ends.append(before)
-    whole = bool(period) and ends[1] - ends[0] > period * (1.0 - 1e-9)
-    return Reach(freedom, unit, ends[0], ends[1], whole, least)
+    turn = period or (2.0 * pi if unit == "rad" else 0.0)
+    whole = bool(turn) and ends[1] - ends[0] > turn * (1.0 - 1e-9)
+    return Reach(freedom, unit, ends[0], ends[1], (free[0], free[1]), whole, least)
 
 
 class DeadCentre(NamedTuple):

@@ -15,7 +15,7 @@ import pytest
 
 import analysis.synthesis as syn
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
-from analysis.linkages import Package, dead_centres, described, load_linkage, load_package, reach
+from analysis.linkages import Package, dead_centres, described, linkage, load_linkage, load_package, reach
 from analysis.linkages.structure import Pin
 from analysis.mechanisms import mechanism_of
 from analysis.numerics.fourier import FourierSeries
@@ -432,6 +432,12 @@ def test_ranges_of_motion():
     # O C = 2 x 90 cos(angle/2) mm is at least 200 - 80 mm, where upper and inner link are in line
     assert not found.turns
     assert found.high == pytest.approx(2.0 * np.arccos(120.0 / 180.0), abs=1e-4)
+    assert found.open == (False, False)
+    # an arm that nothing stops turns, though it is not driven round
+    assert reach(load_linkage(FOLDER / "bistable.toml")).turns
+    cart = linkage("reach-of-a-cart", ground={"A": (0, 0)}).body("cart", points={"P": (0, 0)}, mass="1 kg")
+    found = reach(cart.slide("G", body="cart", through="A").freedom("cart", "G", driven=False).mechanism())
+    assert (found.low, found.high, found.open, found.turns) == (-1.0, 1.0, (True, True), False)
 
 
 def test_dead_centres():
