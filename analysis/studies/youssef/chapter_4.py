@@ -255,7 +255,7 @@ def compute_second() -> StudyResult:
                 "solution is dominant and the second harmonic may be neglected in comparison.",
                 text("4.5.1, L3162-3168; the same in L3210-3214"),
                 "second harmonic relative to the first at the same speed, greatest of the three I4 over ranges of speeds that "
-                "are ours; at its own resonance it is without bound, so that there with the damper of 5.3.2",
+                "are ours; about its own resonance, where without a damper it has no bound, with that of 5.3.2",
                 f"{SMALL:g}, the rule for *negligible*",
                 (
                     *(
@@ -440,7 +440,7 @@ def _curves() -> tuple[Statement, ...]:
             "The resonance curves are similar to a second order linear system",
             text("4.5.3 d, L3206-3208"),
             "greatest distance from the amplitude of one mass on a spring, with the means of M and K and the first "
-            f"harmonic of F, relative to the peak; omega_c = {DAMPERS[0]:g} 1/s, 27 to 35 rad/s",
+            f"harmonic of F, relative to the peak; omega_c = {DAMPERS[0]:g} 1/s, 27 to 35 rad/s, a range of ours",
             f"{ABOUT:g}, the rule for *similar*",
             tuple(at_most(label, ABOUT, found["one mass"]) for label, found in both.items()),
         ),

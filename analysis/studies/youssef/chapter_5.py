@@ -213,11 +213,12 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             formulas(),
         ),
         Statement(
-            "THIS PROG. INV[E]STIG[A]TES STABILITY IN ABSENCE [O]F DAMPING",
+            "THIS PROG. INV[E]STIGATES STABILITY IN ABSENCE [O]F DAMPING",
             listing("appendix 3, L8638"),
-            "boundaries in lambda_k^2: by the listing, run with I4 set to each and sigma3 = 1 (it has 0.5 and 0.8 to 1.2), by "
-            "the right linear equation, which the thesis is about, and by the true periodic motion",
-            f"{SMALL:g} of the width, the rule for *small*: the next order, which (5.16) leaves out",
+            "boundaries in lambda_k^2: by the listing to the letter, with its sine for a cosine and 149 deg (errata 19, 20), "
+            "run with each I4 and sigma3 = 1 (it has I4 = 0.5, sigma3 = 0.8 to 1.2), by the right linear equation, which the "
+            "thesis is about, and by the true periodic motion",
+            f"{SMALL:g} of the width by either of the latter, the rule for *small*: the next order, which (5.16) leaves out",
             tuple(listed),
             "M' zeta' is missing, first-order terms are halved, and (5.16) has lost 1/k0",
         ),
@@ -251,7 +252,7 @@ def judge_crank(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...]:
         Statement(
             "The width of the region increases with increase of [sigma2].",
             text("5.3.1, L3876; the same in L3938-3942"),
-            "growth of the width with sigma2, least",
+            "growth of the width from one sigma2 to the next, least; true periodic motion, sigma2 = 0.01 to 0.1",
             SIGN,
             (at_least("", 0.0, np.diff(widths(true)).min()),),
         ),
@@ -542,7 +543,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
             "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
             text("5.3.2, L3923-3929"),
-            "greatest omega_c that removes the region of the right linear equation, by its width",
+            "greatest omega_c that removes the region of the right linear equation, estimated from its width without a damper",
             SIGN,
             (
                 at_most("Fig 5.2", "0.45", removing_estimate(with_crank(0.1)), "1/s"),
@@ -560,8 +561,9 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "Viscous damping had a stabilising effect. It was also possible to choose a value for this damping "
             "making the linkage under study completely stable for all ranges of speeds.",
             text("5.3.3 c, L3952-3958"),
-            f"omega_c that removes regions 1 to 4 at I4 = 1.5, by their widths; greatest multiplier with {STATED:g} 1/s and a "
-            f"thousand times as much beyond the zeroth boundary, at {crank_speed(0.5 * zeroth):.0f} rad/s",
+            "omega_c that removes regions 1 to 4 at I4 = 1.5, estimated from their widths without a damper; greatest "
+            f"multiplier with {STATED:g} 1/s and a thousand times as much beyond the zeroth boundary, at "
+            f"{crank_speed(0.5 * zeroth):.0f} rad/s",
             "none, stability decides",
             (
                 at_most("omega_c", "0.45", max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)), "1/s"),

@@ -648,27 +648,33 @@ def _fig_8_18() -> tuple[Statement, ...]:
             text(f"{section}, L6814; again L6968"),
             "second harmonic over the first, and greatest of the harmonics 3 to 6 over the greater of the two, the most from "
             "300 to 1000 rpm",
-            f"{SMALL:g}, the rule for *small*",
+            f"at most 1, as *dominant* says of the first; {SMALL:g}, the rule for *small*",
             tuple(
-                at_most(f"spring {s}, {words}", SMALL, ratio[s], why=why)
+                at_most(f"spring {s}, {words}", bound, ratio[s], why=why)
                 for s in "CD"
-                for words, ratio in (("second harmonic", most), ("higher ones", higher))
+                for words, bound, ratio in (
+                    ("the first dominant", 1.0, most),
+                    ("the second small", SMALL, most),
+                    ("the higher ones small", SMALL, higher),
+                )
             ),
         ),
         Statement(
             "It also indicates that the steady state behaviour is similar to a second order [damped] mass-spring system "
-            "described by [m u'' + mu u' + k u = F0 Sin (wt + phi)].",
+            "described by [m x'' + mu x' + k x = F0 Sin (wt + phi)].",
             text(f"{section}, L6820; again L6970"),
             "F0, the force on a damped mass-spring system of the mean effective mass that gives the first harmonic, from 300 "
-            "to 1000 rpm: the most over the least; and the spread of F0 over the square of the speed, relative to its mean",
+            "to 1000 rpm: the most over the least, as the equation has it; and, as under an unbalance, the spread of F0 "
+            "over the square of the speed, relative to its mean",
             f"{ABOUT:g}, the rule for *similar*",
             (
+                *(at_most(f"spring {s}, the equation: F0", 1.0 + ABOUT, times) for s, times in zip("CD", growth)),
                 *(
-                    at_most(f"spring {s}, F0", 1.0 + ABOUT, times, why="it grows with the speed, as of an unbalance")
-                    for s, times in zip("CD", growth)
+                    at_most(f"spring {s}, such a system: F0 over the square", ABOUT, value)
+                    for s, value in zip("CD", spread)
                 ),
-                *(at_most(f"spring {s}, F0 over the square", ABOUT, value) for s, value in zip("CD", spread)),
             ),
+            "F0 grows with the speed, as of an unbalance",
         ),
     )
 

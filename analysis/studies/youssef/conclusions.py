@@ -35,7 +35,7 @@ from .regions import axis, crank_speed, equation, hill, removing_estimate
 from .rig_2 import RANGE, length, linear_motion
 from .rigs import LOST, amplitude, overtones, turn
 from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
-from .series_2 import error_of, out_of_reach, path_motion, reduced
+from .series_2 import error_of, out_of_reach, path_motion, reduced, reduced_further
 
 NUMBER = "conclusions"
 OMEGA_K = sqrt(SQUARE_OF_OMEGA_K)
@@ -165,6 +165,8 @@ def kinematics() -> tuple[Statement, ...]:
     a, b = PROBLEMS["path-a"], PROBLEMS["path-b"]
     still = a.convert(evaluate(a.task, b.linkage).error)
     other = slider_motion(a.task, b.linkage, SliderUnknown(harmonics=3, stroke=0.25), search=Search(starts=4)).best
+    better = reduced_further()
+    beaten = [reduced()[n] * printed_error(n) > our_error(n) for n in better]
     ratios = {f"Fig {n}": printed_error(row.problem) / our_error(row.problem) for n, row in TABLE.items()}
     kept = [row for row in TABLE.values() if share_of_stated(row.problem) <= 1.0 + ABOUT]
     missed = sorted(share_of_stated(row.problem) for row in TABLE.values() if row not in kept)
@@ -188,10 +190,15 @@ def kinematics() -> tuple[Statement, ...]:
             "[A] proper control of the slider enabled modifications and more accurate generation of outputs than could "
             "otherwise be obtained.",
             text("9.1, L7012"),
-            "error with two harmonics of the slider over that with the pivot fixed, as in Fig 7.11, the most of the eight "
-            "problems of chapter VI",
+            "error with two harmonics of the slider over that with the pivot fixed: *otherwise* is read as with the same "
+            "links, those printed (Fig 7.11) and the best that we find with the pivot fixed",
             SEEN_FALL,
-            (at_most("most of eight problems", 1.0 - ALIKE, max(reduced().values())),),
+            (
+                at_most("printed links, most of eight problems", 1.0 - ALIKE, max(reduced().values())),
+                at_most("best links, most of seven problems", 1.0 - ALIKE, max(better.values())),
+            ),
+            f"in {sum(beaten)} of the seven problems the best links with the pivot fixed are more accurate than those printed "
+            "with the slider",
         ),
         Statement(
             "However, the control of this second input produced changes that were limited by an envelope dictated by the "

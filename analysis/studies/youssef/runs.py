@@ -133,3 +133,8 @@ def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, flo
 def greatest_ratio(values: NDArray[np.float64]) -> float:
     """Return the greatest ratio of a value to its predecessor."""
     return float((values[1:] / values[:-1]).max())
+
+
+def from_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Return the distance of an arc from (0, 0) to (1, 1) from the nearest line, midway between the chord and its parallel."""
+    return 0.5 * float(np.ptp(y - x))
