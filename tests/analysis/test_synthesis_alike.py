@@ -9,6 +9,9 @@ import pytest
 
 import analysis.synthesis as syn
 from analysis.synthesis.result.alike import grouped
+from analysis.synthesis.search.polish import distinct
+from analysis.synthesis.search.start import Answer, make_start
+from analysis.synthesis.task.task import normal_form
 
 SIZES = {"pivot_x": 0.1, "pivot_y": 0.05, "crank_length": 0.05, "coupler_length": 0.16, "point_distance": 0.09}
 ANGLES = {"ground_angle": 0.4, "crank_phase": 1.1, "point_angle": 0.7}
@@ -84,3 +87,16 @@ def test_the_ellipse_is_traced_by_one_linkage_in_four_places() -> None:
     assert columns["rank"] == [float(k) for k in range(1, len(found.every) + 1)]
     assert columns["variant of"].count(1.0) == len(variants)
     assert len(columns["variant of"]) == len(found.every) > len(found.solutions)
+
+
+@pytest.mark.parametrize("name", [*SIZES, *ANGLES, "output_angle"])
+def test_answers_of_slider_cranks_that_differ_in_one_number_are_two(name: str) -> None:
+    """And one without an offset is the same one seen from the other side of its guide."""
+    task = syn.TimedPath(points=SLIDER.path(PHI))
+    normal = normal_form(task)
+    slider = replace(SLIDER, ground_length=0.0)
+    turned = replace(slider, ground_angle=0.4 + np.pi, crank_phase=1.1 - np.pi, branch=-1)
+    np.testing.assert_allclose(turned.path(PHI), slider.path(PHI), atol=1e-12)
+    other = replace(slider, **{name: getattr(slider, name) + 0.02})
+    answers = [Answer.unjoined(make_start(linkage, normal)) for linkage in (slider, turned, other)]
+    assert [id(one) for one in distinct(answers, 3)] == [id(answers[0]), id(answers[2])]
