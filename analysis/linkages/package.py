@@ -6,9 +6,9 @@ import hashlib
 import importlib
 import re
 import sys
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
-from traceback import extract_tb
+from traceback import extract_tb, walk_tb
 
 from linkwork import planar
 from linkwork.errors import AssemblyError, LinkworkError
@@ -239,10 +239,15 @@ class Package:
             made.modules[-1].places(made.state(start.initial), start.parameters.constants())
         except (ValueError, ArithmeticError) as error:
             lines = [at.line or "" for at in extract_tb(error.__traceback__) if at.name == "places"]
+            *_, (frame, _) = walk_tb(error.__traceback__)
+            found, sizes = frame.f_locals, ""
+            if frame.f_code.co_name == "pin_pin_pin":
+                apart, one, other = (sqrt(found[square]) for square in ("dd", "aa", "bb"))
+                sizes = f", {one:.6g} m and {other:.6g} m long between pins that are {apart:.6g} m apart"
             for dyad in self.structure.dyads:
                 if any(f"margin_{dyad.inner.name} =" in line for line in lines):
                     bodies = " and ".join(f"linkage.bodies.{side.body}" for side in dyad.sides)
-                    return f", {bodies}, joined at {dyad.inner.name}"
+                    return f", {bodies}, joined at {dyad.inner.name}{sizes}"
         return ""
 
     def _check_motion(self, made: Mechanism) -> None:

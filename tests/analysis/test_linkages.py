@@ -352,7 +352,8 @@ MISTAKES = [
     (
         "bodies/rocker/length",
         "10 mm",
-        "crank angle 0 rad (0.0000 deg): they do not reach each other, linkage.bodies.coupler and ",
+        "they do not reach each other, linkage.bodies.coupler and linkage.bodies.rocker, joined at C, 0.15 m and 0.01 m long "
+        "between pins that are 0.1 m apart: ",
     ),
     ("bodies", {"crank": {"bar": ["A", "B"], "length": 1.0}}, "linkage.bodies have no mass"),
     ("ground", {}, "linkage.ground"),
