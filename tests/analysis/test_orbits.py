@@ -21,6 +21,7 @@ from analysis.periodic import (
     largest_multipliers,
     orbit_of,
 )
+from analysis.periodic.motion.orbit import _time
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics
@@ -283,3 +284,13 @@ def test_row_of_orbits_is_the_orbits_one_by_one() -> None:
     assert np.isnan(values[~good]).all()
     with pytest.raises(InputError, match="one kind"):
         largest_multipliers(rows[:2], [Drive(speed=SPEED), Drive(motor=MOTOR)])
+
+
+@pytest.mark.parametrize(("turns", "n"), [(1, 65), (2, 65), (2, 64), (4, 64)])
+def test_time_of_a_motion_of_several_turns(turns: int, n: int) -> None:
+    """By a speed whose inverse has a mean and one wave over the period."""
+    way = 2.0 * pi * turns
+    angle = np.arange(n) * (way / n)
+    time, period = _time(1.0 / (0.1 + 0.03 * np.cos(angle / turns)), way)
+    np.testing.assert_allclose(time, 0.1 * angle + 0.03 * turns * np.sin(angle / turns), atol=1e-14)
+    assert period == pytest.approx(0.1 * way, rel=1e-14)
