@@ -343,7 +343,7 @@ def _bearing_moments() -> tuple[Statement, ...]:
     ]
     return (
         Statement(
-            "In the presence of offset distance [S1], two extra torque components [1T1i] and [1T1j] are acting at joint 1.",
+            "In the presence of offset distance [S1], two extra torque components [1T1i] and [1T1j] are acting at joint [1].",
             text("section 3.3, L1125-1127"),
             f"greatest magnitude {FROM_DEAD}, least of the six cases with a shift",
             f"more than {ROUNDING}",

@@ -371,7 +371,7 @@ def closure() -> StudyResult:
             "possible and then solve the whole problem.",
             text("abstract, L45"),
             "shares of the shifts at which the crank turns fully, 0 to 48 in by 2 in at a4 = 0, 10, 20, 30 in; the iteration "
-            "from the planar estimate at every 30 deg",
+            "as printed, by Newton and Raphson, from the planar estimate at every 30 deg",
             f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
             (
                 at_most("a solution is possible, and the iteration does not settle", 0.0, missed),
@@ -445,7 +445,7 @@ def closure() -> StudyResult:
             "displacements, ... the method will not converge.",
             conclusions,
             "share of the angles, by 30 deg, at which the iteration settles from planar estimates of theta2 and theta3 that "
-            "are off by 60, 120 and 180 deg, either way",
+            "are off by 60, 120 and 180 deg, our choice: the one by as much as the other, the opposite way",
             "none of a share",
             (
                 at_most("in the plane, a4 = 0, 10, 20, 30 in", 0.0, settled),
@@ -479,7 +479,7 @@ def closure() -> StudyResult:
             "Another great disadvantage is that matrix A may become singular. Fortunately it never happened while "
             "running the program.",
             conclusions,
-            "least singular value of A relative to its greatest",
+            "least singular value of A relative to its greatest, where the iteration ends",
             ROUNDING,
             (
                 nothing(
@@ -488,6 +488,11 @@ def closure() -> StudyResult:
                 *(
                     at_least(f"never: over the turn, {case.name}", NOTHING, least)
                     for case, least in zip((_PLANE, *OPEN), singular)
+                ),
+                at_least(
+                    f"never: least of the {len(OUT)} cases of the figures out of the plane",
+                    NOTHING,
+                    min(_conditions(case)[0] for case in OUT),
                 ),
             ),
         ),

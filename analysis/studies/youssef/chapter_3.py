@@ -153,7 +153,7 @@ def drift_result() -> StudyResult:
     runs = {mu: drift(mu) for mu in DAMPINGS}
     tables = {mu: table_3_1(0.0, mu) for mu in DAMPINGS}
     settling = {mu: -log(ALIKE) * mean_effective_mass(p) / p.slider_damping / PERIOD for mu, p in tables.items()}
-    accelerates = "it accelerates"
+    accelerates = "the drift accelerates, and the swing about it grows"
     shapes = [
         at_most(_mu(mu), ALIKE, run.unsteadiness, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]
     ]
@@ -569,10 +569,11 @@ def torque_result() -> StudyResult:
                 "recorded.",
                 text("3.2.1, L1993-2001"),
                 "distance between the curves as it is seen, square to them, on a graph as wide as it is high, "
-                "relative to its size; spread of the extremes between the springs, relative to the peak",
+                "relative to its size, farther than 10 deg, the rule for *near*, from an extreme; spread of the extremes "
+                "between the springs, relative to the greatest torque in size at k = 1e6 dyn/cm",
                 f"{ALIKE_WORDS}; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
                 (
-                    at_most("distance of the curves farther than 10 deg from an extreme", ALIKE, elsewhere),
+                    at_most("distance of the curves", ALIKE, elsewhere),
                     *(
                         Case(
                             label=f"spread of the {name} torque",

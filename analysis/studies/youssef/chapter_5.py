@@ -341,10 +341,12 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
             text("5.3.1, L3898-3900"),
-            "greatest width relative to that of each; the range of I4 in Fig 5.1 is not said",
+            "greatest width of the true periodic motion, angles held, relative to that of each; on the same ground link it is "
+            f"{widths(found[SAME_GROUND]).max() / widths(found['true orbit']).max():.1f} times as great; the range of I4 in "
+            "Fig 5.1 is not said",
             SIGN,
             tuple(at_most(name, 1.0, widths(found["true orbit"]).max() / x) for name, x in others.items()),
-            "it is so at I4 = 0.5, which the listing has (L8641)",
+            "with the angles held it is so at I4 = 0.5, which the listing has (L8641)",
         ),
         Statement(
             "In all the above examples the second region of instability was so small within the values of [sigma2], "
@@ -583,7 +585,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "any extra work.",
             text("5.2.2, L3730-3734"),
             "boundaries by (5.35) cut after the ninth term, as the thesis has it (L3930), less those with more terms, of the "
-            "region's width; right equation, I4 = 1",
+            "region's width; right equation without a damper, I4 = 1",
             f"{SMALL:g}, the rule for *small*",
             tuple(at_most(f"region {n}", SMALL, x, why=more) for n, x in nine_terms().items()),
         ),

@@ -314,7 +314,7 @@ def _weighted() -> tuple[Statement, ...]:
             "giving the straight line portion of the output a weighting of unity and the remainder a weighting of zero.",
             text("6.4.2 B, L4981"),
             "rms distance of the best linkage from 13 points of a line of 100 mm, passed within 60 deg of crank rotation, "
-            "all others weighted zero",
+            "all others weighted zero: an example of ours, the thesis gives none",
             f"{100.0 * ALIKE:g} mm, {ALIKE:g} of its length: the rule for *straight*",
             (at_most("distance", 100.0 * ALIKE, straight_error(), "mm"),),
         ),

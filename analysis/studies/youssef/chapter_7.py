@@ -347,9 +347,18 @@ def two_positions() -> StudyResult:
     missing = in_line(ROTATION, places)[1] < 0.0
     crank_pins = LINKAGE.crank_length * np.exp(1j * ROTATION)
     pointing = np.abs(np.abs(places - crank_pins) - LINKAGE.point_distance)
+    hangs = "there it hangs, th4 = -90 deg, and none that is upright can be assembled"
     least = np.array([nearest(phi, z) for phi, z in zip(ROTATION[~missing].tolist(), places[~missing].tolist())])
     anywhere = variational_motion(LINKAGE, ROTATION, targets, assemblies=(1, -1), closed=False)
-    standing = np.sin(anywhere.rocker_angle[anywhere.kind == "perpendicular"]) > 0.999
+    outside = anywhere.kind == "perpendicular"
+    above, standing = targets[outside, 1] > 0.0, np.sin(anywhere.rocker_angle[outside]) > 0.999
+    chosen = np.flatnonzero(outside)[above]
+    phi, pins, wanted = ROTATION[chosen], crank_pins[chosen][:, None], places[chosen]
+    arms = by_equations(phi, wanted)[0] + 1j * LINKAGE.rocker_length - pins
+    reached = pins + LINKAGE.point_distance / LINKAGE.coupler_length * arms
+    by_7_15 = np.abs(reached - wanted[:, None]).min(axis=1) - [
+        nearest(*at) for at in zip(phi.tolist(), wanted.tolist())
+    ]
     return StudyResult(
         number="7.5",
         claim="The coupler points at the desired point, the rocker in either of two positions; else the rocker is upright.",
@@ -371,9 +380,18 @@ def two_positions() -> StudyResult:
                 "pi/2] and the value of U is recomputed from (7.7) to give [(7.15)].",
                 text("7.3.1, L5685"),
                 f"share of upright rockers at the least error, of the {standing.size} points of {ROTATION.size} random "
-                "ones, no farther from A than l3 along either axis, where (7.14) has no root",
-                "none: *must surely be*",
-                (near("upright", 1.0, standing.mean(), 0.0, why="for the others it hangs, th4 = -90 deg"),),
+                "ones, no farther from A than l3 along either axis, where (7.14) has no root; error with U by (7.15), th4 = "
+                f"pi/2, less the least of {POSITIONS.size} slider positions and both assemblies, greatest",
+                "none: *must surely be*; 1e-3 l3, more than P moves from one position to the next",
+                (
+                    near(
+                        f"upright, the {above.sum()} points above the slider's line", 1.0, standing[above].mean(), 0.0
+                    ),
+                    near(
+                        f"upright, the {(~above).sum()} points below it", 1.0, standing[~above].mean(), 0.0, why=hangs
+                    ),
+                    at_most("error by (7.15), above the line", 1e-3, by_7_15.max(), "l3"),
+                ),
             ),
         ),
     )

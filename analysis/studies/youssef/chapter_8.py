@@ -491,6 +491,7 @@ def _fig_8_15() -> tuple[Statement, ...]:
 def _fig_8_16() -> tuple[Statement, ...]:
     counted = {speed: peaks(turn("B", speed)) for speed in SPEEDS["B"]}
     top, (lowest, _) = near_fraction("B", 2)[0], between(motions("B").minima(), 600.0, 800.0)
+    shown = max(SPEEDS["B"], key=lambda speed: amplitude(turn("B", speed)))
     fractions = [(s, order, part) for s in "AB" for order, part in ((3, "a third"), (4, "a quarter"))]
     meets = {order: f"harmonic {order} meets the natural frequency there" for order in (3, 4)}
     hidden = max(rise(s, rig_1.STRONG, n) for s in "AB" for n in (3, 4))
@@ -517,7 +518,8 @@ def _fig_8_16() -> tuple[Statement, ...]:
                     top,
                     5.0,
                     "rpm",
-                    why=f"half the natural frequency is {natural_speed('B') / 2.0:.0f} rpm",
+                    why=f"of the six speeds that the thesis shows the greatest is at {shown:g}; half the natural frequency is "
+                    f"{natural_speed('B') / 2.0:.0f} rpm",
                 ),
                 near("maximum over half the natural frequency", 1.0, 2.0 * top / natural_speed("B"), ALIKE),
                 at_most(
@@ -543,9 +545,9 @@ def _fig_8_16() -> tuple[Statement, ...]:
             f"but so much friction changes the amplitudes more than slightly: see {FRICTION}; no figure is for a speed so low",
         ),
         Statement(
-            "This suggested [a slider] solution based on the first and second harmonics, and that the third and higher "
+            "This suggested a slider solution based on the first and second harmonics, and that the third and higher "
             "harmonics are small in comparison.",
-            text("8.4.1.2, L6774"),
+            text("8.4.1.2, L6774-6779"),
             "greatest of the harmonics 3 to 6 over the greater of the first and second",
             f"{SMALL:g}, the rule for *small*",
             tuple(

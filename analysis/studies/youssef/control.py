@@ -245,8 +245,8 @@ def compute() -> StudyResult:
                 "The second input could be a slider as discussed in this chapter or could be another link resulting in a "
                 "five bar loop.",
                 text("7.4, L6013"),
-                why="no example is given; `linkwork slider-motion` with a `[strategy]` follows the steps: a four-bar, a "
-                "slider, a fifth link",
+                why="with a slider it is what Figs 7.11 and 7.12 show; with a fifth link no example is given; `linkwork "
+                "slider-motion` with a `[strategy]` follows the steps: a four-bar, a slider, a fifth link",
             ),
             Statement(
                 "The computer program shown in Appendix 5, can cope with the above defined strategy producing optimum "
