@@ -509,7 +509,7 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
         fast = slider_equation(chapter_4(1.5, omega_c), crank_speed(0.5 * zeroth))
         falling[omega_c] = np.abs(hill_multipliers(fast.homogeneous().stiffened(fast.spring))).max()
     by_listing = worst["listing of appendix 4"]
-    more = "the higher regions need more terms, which is extra work"
+    more = "the higher regions need more terms, whose elements the listing writes out one by one (L8821-8864)"
     return (
         Statement(
             "It is clearly seen that regions of instability of the above system will resemble those obtained for the "
