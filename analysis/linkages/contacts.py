@@ -60,7 +60,6 @@ class Contacts:
                 slot = self.motion.description.slots.get(name)
                 # the block of a slot has no mass: its friction acts on the body that has the pin
                 at = f"b.at_{slot.pin}" if slot else f"b.{second}_frame.origin"
-                second = self.motion.owner(slot.pin) if slot else second
                 one, other = (f"force({r} * b.{name}_line.c, {r} * b.{name}_line.s, {at})" for r in (rub, f"-{rub}"))
                 on = {first: one, second: other}
             wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .description import GROUND, given
+from .description import given
 from .parameters import Interface, size
 from .structure import Freed, Geared, Pin, on_one_body, sliders
 from .writing import function, quoted
@@ -64,7 +64,7 @@ class Picture:
             # the pitch point divides the line of centres so that both gears have one velocity there
             share = f"p.{name}_ratio * (p.{name}_ratio - 1.0) / ((p.{name}_ratio - 1.0) ** 2 + 1e-12)"
             for wheel, bearing, part in zip(gear.bodies, pins, (share, f"({share} - 1.0)"), strict=True):
-                tick = f"arm(b.{wheel}_frame.turn, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
+                tick = f"arm({self.interface.turn(wheel, 'b.')}, {part} * ({x1} - {x0}), {part} * ({y1} - {y0}))"
                 joints.append(self.tick(name, wheel, bearing, tick))
                 parts.append(f'Part("gear", ("{bearing}", "{name}{wheel}Tick"), "pitch circle of {wheel}")')
         parts += [f'Part("pivot", ("{own}",), "bearing {own}")' for own in d.ground if own in self.structure.joints]
@@ -99,7 +99,7 @@ class Picture:
         names = {p.name for p in self.interface.parameters}
         for body, points in self.interface.points.items():
             if own in points:
-                bar = self.description.bodies[body].bar if body != GROUND else ()
+                bar = self.description.bodies[body].bar if body in self.description.bodies else ()
                 found = [f"{body}.length"] if bar and own == bar[1] else [f"{body}.{own}_{axis}" for axis in "xy"]
                 turned = [
                     f"initial.{self.interface.drives[step.freedom].name}_angle"

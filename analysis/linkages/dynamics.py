@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain, count
 from typing import NamedTuple
 
 from .description import BODY, GROUND, Description, Spring, given
@@ -34,14 +35,14 @@ class Motion:
         self.description, self.structure, self.interface = interface.description, interface.structure, interface
         self.n = len(interface.drives)
         self.along = springs_at(self.description, interface)
-        self.bodies = tuple(self.description.bodies)
+        self.bodies = self.structure.bodies
         self.reactions: list[Reaction] = []
         #: in the order in which their forces are computed
         self.racked = [step for step in reversed(self.structure.steps) if isinstance(step, Racked)]
 
     def owner(self, own: str) -> str:
         """Return the body that has a point: a moving one if there is one, otherwise the ground."""
-        having = [body for body in self.bodies if own in self.interface.points[body]]
+        having = [body for body in self.description.bodies if own in self.interface.points[body]]
         return having[0] if having else GROUND
 
     # What acts
@@ -63,7 +64,7 @@ class Motion:
             else:
                 if turned := self.turned(spring):
                     first, second = turned
-                    angle = f"p.{name}_c, p.{name}_s" if free else "1.0, 0.0"
+                    angle = f"p.{name}_COS, p.{name}_SIN" if free else "1.0, 0.0"
                     one, other = self.interface.turn(first, "b."), self.interface.turn(second, "b.")
                     rows.append(f"{stretch} = angle_between({one}, {other}, {angle})")
                     rows.append(f"{rate} = {other}.w - {one}.w")
@@ -207,11 +208,13 @@ class Motion:
         """Write the function that computes all joint forces, from the last dyad back to the ground."""
         rows = [f"on_{body} = needed(m[{n}], e, wrenches[{n}])" for n, body in enumerate(self.bodies)]
         rows += [f"on_{body} = Wrench(0.0, 0.0, 0.0)" for body in self.structure.bodies if body not in self.bodies]
-        taken: dict[str, int] = {}
+        taken: set[str] = set()
 
         def reaction(joint: Joint, by: str, on: str, force: str) -> None:
-            taken[joint.name] = taken.get(joint.name, 0) + 1
-            name = joint.name if taken[joint.name] == 1 else f"{joint.name}{taken[joint.name]}"
+            # the forces in a pin of several bodies are C, C2, C3, but for names that other joints have
+            further = (f"{joint.name}{n}" for n in count(2) if f"{joint.name}{n}" not in self.structure.joints)
+            name = next(n for n in chain([joint.name], further) if n not in taken)
+            taken.add(name)
             self.reactions.append(Reaction(name, joint, by, on))
             rows.append(f"in_{name} = {force}")
 
@@ -230,7 +233,7 @@ class Motion:
             if isinstance(step, Freed):
                 supported(step.joint, step.parent, step.body)
             elif isinstance(step, Geared):
-                toothed(step, "on_teeth", self._mesh(step))
+                toothed(step, "mesh_force", self._mesh(step))
                 supported(step.pin, step.parent, step.body)
             elif isinstance(step, Racked):
                 toothed(step, f"in_{step.rack}", self._teeth(step))

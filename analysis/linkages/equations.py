@@ -57,7 +57,7 @@ class Places:
         """Return the direction of a body's guide line from that of the body; with sign -1, the body's from the line's."""
         if not joint.inclined:
             return turn
-        return f"inclined({turn}, p.{joint.name}_c, {'-' if sign < 0 else ''}p.{joint.name}_s)"
+        return f"inclined({turn}, p.{joint.name}_COS, {'-' if sign < 0 else ''}p.{joint.name}_SIN)"
 
     def freed(self, step: Freed, lead: str = "") -> None:
         """Write the pose of a body that a freedom joins to a known one, in the ground or relative to the body ``lead``."""
@@ -191,7 +191,7 @@ class Places:
             result = self.point(body, to, f"{body}_in_{side.body}")
             if (sx, sy) != ("0.0", "0.0"):
                 result = f"minus({result}, fixed({sx}, {sy}, {self.n}))"
-        return f"turned(held(p.{axes}_c, -p.{axes}_s, {self.n}), {result})" if axes else result
+        return f"turned(held(p.{axes}_COS, -p.{axes}_SIN, {self.n}), {result})" if axes else result
 
     def line(self, side: Side) -> tuple[str, str]:
         """Write the line along which a side slides; return the variables of its origin and direction."""

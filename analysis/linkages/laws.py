@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import isfinite
+from math import isfinite, tau
 from typing import Any, TypeAlias
 
 from linkwork.errors import ParameterError
@@ -23,6 +24,8 @@ _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, as
 _ROWS = Many(Many(unchanged, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
 #: Units that a constant of a law may have.
+#: Angles at which a law is compared with itself a turn further (rad).
+_ANGLES = (-2.0, -0.7, 0.3, 1.9)
 _UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
 
 
@@ -97,6 +100,21 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
         if own in ("x", "v", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
             where = f"{name.rpartition('.')[0]}.constants.{own}"
             raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
+
+
+def periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
+    """Return whether a force law about a pin has the period of a turn."""
+    if not isinstance(law, str):
+        return False
+    names = {name: getattr(math, name) for name in FUNCTIONS} | {name: value for name, (value, _) in known.items()}
+    code = compile(law, "law", "eval")
+    try:
+        turns = [
+            [eval(code, {"__builtins__": {}}, names | {"x": x + way, "v": 1.0}) for x in _ANGLES] for way in (0.0, tau)
+        ]
+    except (ArithmeticError, ValueError):
+        return False
+    return all(abs(b - a) <= 1e-9 * max(map(abs, turns[0])) for a, b in zip(*turns))
 
 
 def with_constants(formula: str, known: Mapping[str, Any], prefix: str) -> str:

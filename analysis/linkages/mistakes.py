@@ -74,6 +74,12 @@ def _gears(d: Description, owners: Mapping[str, set[str]]) -> Found:
         if rack.radius == 0.0:
             yield f"racks.{name}.radius", "is 0", "it must not be zero"
 
+    joints = {*owners, *d.slides, *d.slots}
+    for table in ("gears", "racks"):
+        for name in getattr(d, table):
+            if name in joints:
+                yield f"{table}.{name}", "has the name of a point, a slide or a slot", "it must have another"
+
 
 def _slots(d: Description, owners: Mapping[str, set[str]]) -> Found:
     for name, slot in d.slots.items():
@@ -98,7 +104,13 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _freedoms(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    for name, freedom in d.freedoms.items():
+    for number, (name, freedom) in enumerate(d.freedoms.items()):
+        if name in d.torques and not (number == 0 if freedom.driven is None else freedom.driven):
+            yield (
+                "torques",
+                f"has {name}, and the freedom {name} has an input {name}.torque",
+                "one must have another name",
+            )
         slide = d.slides.get(freedom.joint)
         joined = owners.get(freedom.joint, set()) if slide is None else {slide.on, slide.body}
         if name in d.bodies and len(joined) == 2 and name not in joined:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from .description import given
 from .dynamics import Motion
+from .parameters import turn_of
 from .structure import Pin, Slider, sliders
 from .symbols import symbol
 from .variables import display
@@ -84,7 +85,7 @@ class Outputs:
                 yield Output(f"{name}.length", "m", f"Length of {name}", "*POSITION", f"s.{name}_stretch{free}")
             elif spring.at and name not in self.motion.along and self.motion.turned(spring):
                 text = f"Angle of {spring.at} from that at which {name} is free"
-                yield Output(f"{spring.at}.turn", "rad", text, "*POSITION", f"s.{name}_stretch")
+                yield Output(turn_of(self.description, name), "rad", text, "*POSITION", f"s.{name}_stretch")
             elif spring.bodies:
                 text = f"Angle by which {name} is twisted"
                 yield Output(f"{name}.turn", "rad", text, "*POSITION", f"s.{name}_stretch")

@@ -6,7 +6,7 @@ import hashlib
 import importlib
 import re
 import sys
-from math import isfinite, sqrt
+from math import degrees, isfinite, pi, remainder, sqrt, tau
 from pathlib import Path
 from traceback import extract_tb, walk_tb
 
@@ -17,7 +17,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import MECHANISMS, register
 from ..numerics.cache import code_folder, put
 from .contacts import Contacts
-from .description import Description, LinkageError
+from .description import GROUND, Description, LinkageError, given
 from .drawing import Picture
 from .dynamics import Motion
 from .equations import Places
@@ -223,6 +223,7 @@ class Package:
                 f"{error}{self._apart(made)}: the start in linkage.freedoms{signs} or the lengths must be others"
             ) from None
         self._check_motion(made)
+        self._check_twists(made)
         MECHANISMS.pop(name, None)
         try:
             register(made)
@@ -259,9 +260,34 @@ class Package:
                 return
         except (ValueError, TypeError, ArithmeticError):
             pass
-        laws = [f"the law of linkage.springs.{name}" for name, s in self.description.springs.items() if s.law]
+        springs = self.description.springs.items()
+        laws = [f"the law of linkage.springs.{name}" for name, s in springs if s.law]
+        places = made.modules[-1].places(x, p)
+        for name, spring in springs:
+            if spring.between:
+                (one, other) = (getattr(places, f"at_{own}") for own in spring.between)
+                if one.x == other.x and one.y == other.y:
+                    laws.append(f"the length of linkage.springs.{name}, which has no direction at 0 m,")
         causes = " or ".join((*laws, "a mass or inertia in linkage.bodies"))
         raise LinkageError(f"the accelerations at the start are no finite numbers: {causes} must be another")
+
+    def _check_twists(self, made: Mechanism) -> None:
+        """Raise LinkageError if a torsion spring whose turns nothing counts is twisted by more than half a turn."""
+        start = made.published[made.name]
+        places = made.modules[-1].places(made.state(start.initial), start.parameters.constants())
+        for name, spring in self.description.springs.items():
+            bodies = () if name in self.motion.along else self.motion.turned(spring)
+            if not bodies or not given(spring.free):
+                continue
+            one, other = (0.0 if b == GROUND else planar.angle_of(getattr(places, f"{b}_frame").turn) for b in bodies)
+            free, angle = getattr(start.parameters, f"{name}_free_angle"), remainder(other - one, tau)
+            shorter = remainder(angle - free, tau)
+            if abs(angle - free) > pi + 1e-9:
+                raise LinkageError(
+                    f"linkage.springs.{name}.free is {degrees(free):.6g} deg, and the angle at the start "
+                    f"{degrees(angle):.6g} deg: where no freedom counts the turns a spring is twisted the shorter way, here by "
+                    f"{degrees(shorter):.6g} deg; it must be {degrees(angle - shorter):.6g} deg, or the pin a freedom"
+                )
 
     def _equations(self) -> str:
         motion = self.motion

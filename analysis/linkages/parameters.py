@@ -12,7 +12,8 @@ from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 
 from ..files import Quantity, unknown_name
-from .description import BODY, GROUND, Body, Description, LinkageError, Spring, given
+from .description import BODY, GROUND, Body, Description, LinkageError, given
+from .laws import periodic
 from .structure import Dyad, Freed, Geared, Pin, Racked, Slider, Structure
 
 
@@ -153,10 +154,20 @@ def freedoms(description: Description, structure: Structure) -> tuple[Drive, ...
                 Quantity(rate_unit)(table.speed, f"{where}.speed"),
                 inputs,
                 bool(inputs) and given(table.speed),
-                _turns_back(description, structure, len(found)) if turns else 0,
+                _turns_back(description, structure, len(found))
+                if turns and not _wound(description, table.joint)
+                else 0,
             )
         )
     return tuple(found)
+
+
+def _wound(description: Description, pin: str) -> bool:
+    """Return whether a spring about a pin is wound up turn by turn."""
+    springs = [spring for spring in description.springs.values() if spring.at == pin]
+    return any(
+        given(spring.stiffness) or (spring.law and not periodic(spring.law, spring.constants)) for spring in springs
+    )
 
 
 def _turns_back(description: Description, structure: Structure, freedom: int) -> int:
@@ -241,7 +252,7 @@ def interface(description: Description, structure: Structure) -> Interface:
     found += _friction(description, structure)
     by_joint = {drive.joint: drive for drive in drives}
     for name, spring in description.springs.items():
-        found += _spring(name, spring, structure, by_joint.get(spring.at))
+        found += _spring(name, description, structure, by_joint.get(spring.at))
     if description.gravity:
         found.append(Parameter("gravity", "m/s2", "Acceleration of gravity", description.gravity, role="gravity"))
         direction = description.gravity_direction
@@ -261,7 +272,9 @@ def _joined(description: Description, structure: Structure) -> Iterator[Paramete
             yield Parameter(f"{joint.name}.direction", "rad", text, table.direction, "free")
     for name, gear in description.gears.items():
         first, second = gear.bodies
-        yield Parameter(f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free")
+        yield Parameter(
+            f"{name}.ratio", "1", f"Speed of the {second} by that of the {first}", gear.ratio, "free", "ratio"
+        )
         text = f"Angle of the {second} where that of the {first} is zero"
         yield Parameter(f"{name}.phase", "rad", text, gear.phase, "free")
     for name, rack in description.racks.items():
@@ -363,9 +376,16 @@ def _mass(name: str, body: Body) -> _Mass | None:
     return _Mass(body.mass, (centre[0], centre[1]), body.inertia)
 
 
-def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
+def turn_of(description: Description, name: str) -> str:
+    """Return the name of the angle of a torsion spring: that of its pin, or its own if the pin has several or it has none."""
+    pin = description.springs[name].at
+    alone = sum(spring.at == pin for spring in description.springs.values()) == 1
+    return f"{pin if pin and alone else name}.turn"
+
+
+def _spring(name: str, description: Description, structure: Structure, drive: Drive | None) -> Iterator[Parameter]:
     """Yield the parameters of a spring that are given."""
-    where = f"linkage.springs.{name}"
+    where, spring = f"linkage.springs.{name}", description.springs[name]
     if (bool(spring.between), bool(spring.at), bool(spring.bodies)).count(True) != 1:
         raise LinkageError(
             f"{where} is between {spring.between or 'nothing'}, at {spring.at or 'nothing'} and of the bodies "
@@ -382,7 +402,9 @@ def _spring(name: str, spring: Spring, structure: Structure, drive: Drive | None
         if spring.between
         else drive.coordinate
         if drive
-        else f"{spring.at or name}.{'turn' if about else 'position'}"
+        else turn_of(description, name)
+        if about
+        else f"{spring.at}.position"
     )
     rows = (
         ("stiffness", spring.stiffness, "N.m/rad" if about else "N/m", f"Stiffness of {name}", "", "stiffness"),

@@ -6,7 +6,7 @@ from math import pi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
@@ -72,22 +72,30 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
         except (ArithmeticError, ValueError):
             return -1.0 - LIMIT_SINE
 
-    ends, free, least = [], [], margin(middle) + LIMIT_SINE
+    ends, free, least = [], [], margin(middle)
     for sign in (-1.0, 1.0):
-        before = middle
-        for q in middle + sign * most * np.arange(1, samples + 1) / samples:
-            value = margin(float(q))
-            if value < 0.0:
-                before = float(brentq(lambda c: max(margin(c), -1.0), before, float(q), xtol=1e-9 * most))
+        places = (middle + sign * most * np.arange(samples + 1) / samples).tolist()
+        values = [margin(places[0])]
+        for n, q in enumerate(places[1:], 1):
+            values.append(margin(q))
+            lowest, at = values[n], q
+            if n > 1 and values[n - 2] >= values[n - 1] <= values[n]:
+                # the limit may lie between two places, where a sine goes through zero
+                bounds = sorted((places[n - 2], q))
+                dip = minimize_scalar(margin, bounds=bounds, method="bounded", options={"xatol": 1e-9 * most})
+                if dip.fun < min(values[n - 1 :]):
+                    lowest, at = float(dip.fun), float(dip.x)
+            if lowest < 0.0:
                 free.append(False)
+                ends.append(float(brentq(lambda c: max(margin(c), -1.0), places[max(n - 2, 0)], at, xtol=1e-9 * most)))
                 break
-            least, before = min(least, value + LIMIT_SINE), float(q)
+            least = min(least, lowest)
         else:
             free.append(True)
-        ends.append(before)
+            ends.append(places[-1])
     turn = period or (2.0 * pi if unit == "rad" else 0.0)
     whole = bool(turn) and ends[1] - ends[0] > turn * (1.0 - 1e-9)
-    return Reach(freedom, unit, ends[0], ends[1], (free[0], free[1]), whole, least)
+    return Reach(freedom, unit, ends[0], ends[1], (free[0], free[1]), whole, least + LIMIT_SINE)
 
 
 class DeadCentre(NamedTuple):

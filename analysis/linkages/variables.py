@@ -40,17 +40,17 @@ class Variables:
     # Parameters
 
     def constants(self) -> dict[str, str]:
-        """Return the constants of the equations, as expressions in the parameters."""
+        """Return the constants of the equations, as expressions in the parameters; no constant of a law has capitals."""
         found = {p.field: f"self.{p.field}" for p in self.interface.parameters}
         for name, joint in sliders(self.structure).items():
             if joint.inclined:
-                found |= {f"{name}_c": f"cos(self.{name}_direction)", f"{name}_s": f"sin(self.{name}_direction)"}
+                found |= {f"{name}_COS": f"cos(self.{name}_direction)", f"{name}_SIN": f"sin(self.{name}_direction)"}
         freed = {drive.joint for drive in self.interface.drives}
         for name, spring in self.description.springs.items():
             pinned = spring.at and spring.at not in freed and isinstance(self.structure.joints[spring.at], Pin)
             about = spring.bodies or pinned
             if about and given(spring.free):
-                found |= {f"{name}_c": f"cos(self.{name}_free_angle)", f"{name}_s": f"sin(self.{name}_free_angle)"}
+                found |= {f"{name}_COS": f"cos(self.{name}_free_angle)", f"{name}_SIN": f"sin(self.{name}_free_angle)"}
         if self.description.gravity:
             direction = "self.ground_gravity_direction"
             found |= {"gx": f"self.gravity * cos({direction})", "gy": f"self.gravity * sin({direction})"}
@@ -127,7 +127,8 @@ class Variables:
             if body.section is not None:
                 yield f'"{name}.mass": {quoted(body.section.origin(body.mass is not None))}'
             elif body.mass is not None:
-                yield f'"{name}.mass": "as given"'
+                still = ", without a moment of inertia" if body.bar and body.inertia is None else ""
+                yield f'"{name}.mass": "as given{still}"'
 
     def freedoms(self) -> Iterator[str]:
         """Yield the freedoms."""

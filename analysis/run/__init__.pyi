@@ -1,3 +1,4 @@
+from .angles import repeats as repeats
 from .arguments import at_its_speed as at_its_speed
 from .arguments import driven as driven
 from .arguments import published_set as published_set

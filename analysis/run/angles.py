@@ -47,7 +47,7 @@ class WholeTurns:
         period[: len(self._periods)] = self._periods
         for way in (period, TURNS * period):
             less = np.fmod(x, way, out=x.copy(), where=way > 0.0)
-            if self._repeats(less, u, way):
+            if repeats(self._mechanism, self._p, self._modes, less, u, way):
                 break
         else:
             self._never = True
@@ -76,16 +76,25 @@ class WholeTurns:
         """Return the indices of the outputs that are coordinates."""
         return [self._mechanism.output_names.index(freedom.coordinate) for freedom in self._mechanism.freedoms]
 
-    def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> bool:
-        """Return whether the mechanism behaves the same at x and after the displacement ``way``."""
-        equations, p = self._mechanism.equations, self._p
-        acting = equations.applied(self._modes, tuple(u.tolist()), p)
 
-        def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
-            state = tuple(y.tolist())
-            values = np.array(equations.outputs(state, acting, 0.0, p))
-            values[self._columns] = 0.0
-            return np.append(values, equations.derivative(state, acting, p))
+def repeats(
+    mechanism: Mechanism,
+    p: Any,
+    modes: Sequence[float],
+    x: NDArray[np.float64],
+    u: NDArray[np.float64],
+    way: NDArray[np.float64],
+) -> bool:
+    """Return whether a mechanism with the constants p behaves the same at the state x and after the displacement ``way``."""
+    equations = mechanism.equations
+    acting = equations.applied(modes, tuple(u.tolist()), p)
+    coordinates = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
 
-        here = seen(x)
-        return bool(np.allclose(seen(x + way), here, rtol=1e-7, atol=1e-9 * float(np.abs(here).max())))
+    def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
+        state = tuple(y.tolist())
+        values = np.array(equations.outputs(state, acting, 0.0, p))
+        values[coordinates] = 0.0
+        return np.append(values, equations.derivative(state, acting, p))
+
+    here = seen(x)
+    return bool(np.allclose(seen(x + way), here, rtol=1e-7, atol=1e-9 * float(np.abs(here).max())))

@@ -50,6 +50,7 @@ ROLES = {
     "friction": ("parameter", "level or coefficient of dry friction, which changes fast about rest"),
     "spring": ("parameter", "length, position or angle at which a spring is free, or a constant of its law"),
     "centre of mass": ("parameter", "coordinate of a centre of mass"),
+    "ratio": ("parameter", "ratio of a gear pair, on which the common period of all bodies depends"),
     "gravity": ("parameter", "acceleration of gravity, or a direction that it has"),
     "drive": ("output", "torque or force with which a freedom is driven"),
     "joint force": ("output", "component of the force in a joint, in the order of the axes"),

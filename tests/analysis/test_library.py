@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import tomllib
 from collections.abc import Iterable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,16 @@ from analysis.linkages.structure import Pin
 from analysis.mechanisms import mechanism_of
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, frequency_response, orbit_of
+from analysis.periodic.motion.discretisation import operating_point
 from analysis.probe import probe
 from analysis.run import Inputs, Trajectory, case_from, compare, cosimulate, load_case, simulate
 from analysis.studio import page_of, state_of
 from analysis.studio.tables import tables_of
 from analysis.synthesis.result.described import description, drives
+from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
-from tests.oracles.planar import Multipliers
+from linkwork.parameters import field_name
+from tests.oracles.planar import Multipliers, Solution
 
 from .test_studio import _drag, _opened, _shown, in_browser
 
@@ -65,9 +69,10 @@ def tables_in(path: Path) -> dict[str, Any]:
 
 
 def same_joint_forces(
-    package: Package, outputs: dict[str, float], oracle: Multipliers, forces: Any, q: np.ndarray
+    package: Package, outputs: dict[str, float], oracle: Multipliers, solution: Solution, q: np.ndarray
 ) -> None:
     """Compare with their signs the forces in all pins, by body, and in all slides, across their lines and as moments."""
+    forces = solution.forces
     scale = 1e-8 * (1.0 + max(np.abs(force).max() for force in forces.values()))
     pins: dict[tuple[str, str], np.ndarray] = {}
     for r in package.motion.reactions:
@@ -80,7 +85,9 @@ def same_joint_forces(
         found = [sign * outputs[f"{r.name}.force"], sign * outputs[f"{r.name}.moment"]]
         wanted = forces[r.joint.name]
         np.testing.assert_allclose(found[: len(wanted)], wanted, atol=scale, err_msg=r.name)
-    for (name, body), force in oracle.on_bodies(forces, q).items():
+    springs, slots = package.description.springs.items(), package.description.slots
+    pulls = {s.at: -outputs[f"{name}.exerted_force"] for name, s in springs if s.at in slots}
+    for (name, body), force in oracle.on_bodies(solution, pulls, q).items():
         np.testing.assert_allclose(pins.pop((name, body)), force, atol=scale, err_msg=f"{name} on {body}")
     # the massless blocks of slots
     assert {body for _, body in pins} <= set(package.description.slots)
@@ -119,7 +126,7 @@ def test_a_linkage_of_the_library_moves_as_with_multipliers(path):
         np.testing.assert_allclose(m.accelerations, wanted.accelerations, atol=1e-8 * scale)
         np.testing.assert_allclose(m.loads, wanted.loads, atol=1e-8 * (1.0 + np.abs(wanted.loads).max()))
         outputs = dict(zip(made.output_names, made.equations.outputs(x, i, 0.0, p)))
-        same_joint_forces(package, outputs, oracle, wanted.forces, q)
+        same_joint_forces(package, outputs, oracle, wanted, q)
 
 
 #: A rack that is a lever between a crank and a swivel, whose pin in the ground its gear shares; the gear moves a ram.
@@ -144,10 +151,54 @@ freedoms.crank = { joint = "A", speed = "240 rpm" }
 revolutions = 1.0
 """
 
+#: A spring and friction in a slot; constants of a law that are called like a cosine and a sine.
+SLOTTED_LEVER = """
+[linkage]
+name = "slotted-lever"
+gravity = "9.81 m/s^2"
+ground = { A = [0, 0], E = [0, "200 mm"] }
+bodies.crank = { bar = ["A", "B"], length = "50 mm", mass = 0.1, inertia = 3e-5 }
+bodies.lever = { points = { E = [0, 0], K = ["10 mm", "5 mm"] }, mass = 0.5, cog = ["80 mm", 0], inertia = 2e-3 }
+slots.S = { pin = "B", on = "lever", through = "K", direction = "4 deg" }
+springs.tab = { at = "S", stiffness = "500 N/m", free = "150 mm", damping = "5 N*s/m" }
+springs.return.at = "E"
+springs.return.free = "-70 deg"
+springs.return.law = "c*x + s*x**3"
+springs.return.constants = { c = "0.5 N*m/rad", s = "0.1 N*m/rad" }
+springs.stop = { at = "E", free = "-1.4 rad", law = "200*(x + fabs(x))" }
+friction = { S = 0.15 }
+freedoms.crank = { joint = "A", speed = "120 rpm" }
+[run]
+revolutions = 1.0
+"""
 
-def test_a_rack_that_is_a_lever_moves_as_with_multipliers(tmp_path):
-    path = tmp_path / "lever-rack.toml"
-    path.write_text(LEVER_RACK, encoding="utf-8")
+#: A pendulum on a gear that is called like a tooth force; three bodies on a pin, beside a slide that is called like the second.
+GEARED_PENDULUM = """
+[linkage]
+name = "geared-pendulum"
+gravity = "9.81 m/s^2"
+ground = { A = [0, 0], E = ["90 mm", 0], F = ["150 mm", "-40 mm"], G = ["20 mm", "-120 mm"] }
+bodies.crank = { bar = ["A", "B"], length = "40 mm", mass = 0.2, inertia = 1e-4 }
+bodies.teeth = { points = { E = [0, 0], Q = ["25 mm", 0] }, mass = 0.3, cog = ["5 mm", 0], inertia = 1e-4 }
+bodies.pendulum = { bar = ["Q", "R"], length = "60 mm", mass = 0.1, inertia = 3e-5 }
+bodies.coupler = { bar = ["B", "C"], length = "150 mm", mass = 0.2, inertia = 4e-4 }
+bodies.arm = { bar = ["F", "C"], length = "100 mm", mass = 0.2, inertia = 2e-4 }
+bodies.rod = { bar = ["C", "D"], length = "260 mm", mass = 0.1, inertia = 3e-4 }
+bodies.ram = { points = { D = [0, 0] }, mass = 0.4 }
+gears.zz = { bodies = ["crank", "teeth"], ratio = -2.0, phase = "20 deg" }
+slides.C2 = { body = "ram", through = "G" }
+springs.tie = { at = "Q", stiffness = "0.5 N*m/rad", damping = 1e-3 }
+freedoms.crank = { joint = "A", speed = "90 rpm" }
+freedoms.pendulum = { joint = "Q", start = "-60 deg" }
+[run]
+revolutions = 1.0
+"""
+
+
+@pytest.mark.parametrize("text", [LEVER_RACK, SLOTTED_LEVER, GEARED_PENDULUM], ids=lambda text: text.split('"')[1])
+def test_a_linkage_beside_the_library_moves_as_with_multipliers(text, tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(text, encoding="utf-8")
     test_a_linkage_of_the_library_moves_as_with_multipliers(path)
 
 
@@ -198,6 +249,16 @@ def test_a_foot_is_flat_on_the_ground(name, span, height):
     found = run(name)
     x, y = 1e3 * found["P.x"], 1e3 * found["P.y"]
     assert np.ptp(x[y < y.min() + height]) > span
+
+
+def test_another_ratio_with_another_period_is_refused():
+    """One with the same period is not."""
+    made, drive = load_linkage(FOLDER / "geared-five-bar.toml"), Drive(torque=0.1)
+    known, (name,) = made.first_set.parameters, made.names("ratio")
+    for value in (-1.5, -0.25, -2.01):
+        with pytest.raises(InputError, match="describe it with its own ratio"):
+            operating_point(replace(known, **{field_name(name): value}), drive)
+    assert operating_point(replace(known, **{field_name(name): -3.0}), drive).flow.base == 1
 
 
 def test_gears_turn_at_their_ratio():
@@ -438,6 +499,14 @@ def test_ranges_of_motion():
     cart = linkage("reach-of-a-cart", ground={"A": (0, 0)}).body("cart", points={"P": (0, 0)}, mass="1 kg")
     found = reach(cart.slide("G", body="cart", through="A").freedom("cart", "G", driven=False).mechanism())
     assert (found.low, found.high, found.open, found.turns) == (-1.0, 1.0, (True, True), False)
+    # the block runs off along its line where the slot of the arm is parallel to it, which no place need hit
+    slotted = linkage("slotted-arm", ground={"A": (0, 0), "O": (0, "100 mm")}).body(
+        "arm", points={"A": (0, 0)}, mass=1.0
+    )
+    slotted.body("block", points={"P": (0, 0)}, mass=1.0, inertia=1e-3).slide("G", body="block", through="O")
+    slotted.slot("S", pin="P", on="arm", through="A").freedom("arm", "A", start="90.2 deg", driven=False)
+    found = reach(slotted.mechanism())
+    assert (np.rad2deg(found.low), np.rad2deg(found.high)) == pytest.approx((0.0, 180.0), abs=0.1)
 
 
 def test_dead_centres():

@@ -19,8 +19,9 @@ from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
 from analysis.mechanisms import check
+from analysis.periodic import find_orbit
 from analysis.run import Inputs, Trajectory, load_case, simulate
-from linkwork.errors import LinkworkError
+from linkwork.errors import InputError, LinkworkError
 from tests.oracles.planar import Multipliers
 from tests.random_linkages import KINDS, random_linkage
 
@@ -383,6 +384,12 @@ MISTAKES = [
     ("springs/k", {"at": "C", "law": "sin(x, v)"}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": "1e999*x"}, "linkage.springs.k.law"),
     ("springs/k", {"at": "C", "law": "sqrt(-1 - x*x)"}, "the law of linkage.springs.k"),
+    (
+        "springs/k",
+        {"at": "D", "stiffness": 1.0, "free": "-150 deg"},
+        "linkage.springs.k.free is -150 deg, and the angle at",
+    ),
+    ("gears/C", {"bodies": ["crank", "rocker"], "ratio": -1}, "linkage.gears.C has the name of a point"),
 ]
 
 
@@ -534,3 +541,50 @@ def test_pins_and_drives_of_the_builder(tmp_path):
         built.drive("ram")
     with pytest.raises(LinkworkError, match="body wheel, of the pin A"):
         built.pin("A", wheel=(0, 0))
+
+
+def wheel(name: str, **changes: Any) -> Any:
+    """A driven wheel with a pendulum on its rim."""
+    built = linkage(name, ground={"A": (0, 0)}, **changes.pop("more", {}))
+    built.body("drum", points={"A": (0, 0), "Q": ("0.1 m", 0)}, mass=1.0, inertia=0.02)
+    built.body("pendulum", bar=("Q", "R"), length="0.1 m", mass=0.1, inertia=1e-4)
+    built.freedom("drum", "A", speed="600 rpm").freedom("pendulum", "Q", start=0.2)
+    return built.spring("wind", at="A", **changes)
+
+
+def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
+    """A law with the period of a turn does."""
+    with pytest.raises(InputError, match="wound has no freedom that turns without end"):
+        find_orbit(wheel("wound", stiffness="0.01 N*m/rad").mechanism().first_set.parameters, speed=10.0)
+    with pytest.raises(InputError, match="wound-law has no freedom that turns without end"):
+        find_orbit(wheel("wound-law", law="0.01*x + sin(x)").mechanism().first_set.parameters, speed=10.0)
+    assert wheel("latched", law="a*sin(2*x + 0.3)", constants={"a": "0.1 N*m"}).mechanism().cyclic == (0,)
+
+
+def test_springs_without_a_length_are_named() -> None:
+    built = wheel("drawn", stiffness="0.01 N*m/rad").body("cart", points={"C": (0, 0)}, mass=1.0)
+    built.slide("G", body="cart", through="A").freedom("cart", "G", driven=False)
+    built.spring("k", between=("A", "C"), stiffness="10 N/m")
+    with pytest.raises(LinkworkError, match=r"the length of linkage\.springs\.k, which has no direction at 0 m"):
+        built.mechanism()
+
+
+def test_a_freedom_and_a_body_have_one_torque() -> None:
+    built = wheel("twice", stiffness="0.01 N*m/rad", more={"torques": ["pendulum"]})
+    with pytest.raises(LinkworkError, match=r"linkage\.torques has pendulum, and the freedom pendulum has an input"):
+        built.mechanism()
+
+
+def test_a_slot_may_have_its_pin_at_the_origin_and_a_ring_gear_may_stand_still() -> None:
+    """Both are drawn."""
+    planet = linkage("planet-in-a-ring", ground={"A": (0, 0)}).body("arm", bar=("A", "B"), length="40 mm", mass=0.1)
+    planet.body("planet", points={"B": (0, 0), "P": ("15 mm", 0)}, mass=0.1, inertia=1e-5)
+    planet.gear("ring", bodies=("ground", "planet"), ratio=3.0).freedom("arm", "A", speed="60 rpm")
+    slotted = linkage("slot-at-an-origin", ground={"A": (0, 0), "O": (0, "100 mm")})
+    slotted.body("block", points={"P": (0, 0)}, mass=1.0).body("arm", points={"A": (0, 0)}, mass=1.0, inertia=1e-3)
+    slotted.slide("G", body="block", through="O").slot("S", pin="P", on="arm", through="A")
+    slotted.freedom("block", "G", driven=False)
+    for made in (planet.mechanism(), slotted.mechanism()):
+        known = made.first_set
+        p = known.parameters.constants()
+        assert np.isfinite(made.drawing.positions(made.state(known.initial), made.idle(p), p)).all()

@@ -36,12 +36,16 @@ def interpolated(rows: list[list[float]], x: Any) -> Any:
 
 
 class Solution(NamedTuple):
-    """Accelerations of the freedoms, loads on them, kinetic energy; by joint (x, y) of a pin, (across, couple) of a slide."""
+    """Accelerations of the freedoms, loads on them, kinetic energy; by joint (x, y) of a pin, (across, couple) of a slide.
+
+    ``friction`` is the force along each slot that has some.
+    """
 
     accelerations: np.ndarray
     loads: np.ndarray
     forces: dict[str, np.ndarray]
     kinetic: float
+    friction: dict[str, float]
 
 
 class Multipliers:
@@ -128,6 +132,10 @@ class Multipliers:
             s = self.d.slides[joint]
             normal, start = self.line(s)
             x, y, _ = casadi.vertsplit(self.pose(s.body))
+            return normal[1] * (x - start[0]) - normal[0] * (y - start[1])
+        if joint in self.d.slots:
+            slot = self.d.slots[joint]
+            (normal, start), (x, y) = self.line(slot), self.at(self.moving(slot.pin), slot.pin)
             return normal[1] * (x - start[0]) - normal[0] * (y - start[1])
         first, second = self.owners[joint]
         return self.pose(second)[2] - self.pose(first)[2]
@@ -264,19 +272,14 @@ class Multipliers:
         inertia_of = casadi.jacobian(momentum, self.v)
         return casadi.Function("f", [self.q, self.v], [jacobian, drift, inertia_of, force, kinetic])
 
-    def rubbing(self, q: np.ndarray, v: np.ndarray) -> dict[str, np.ndarray]:
-        """Friction of each joint in all coordinates for a force of 1 N in it."""
+    def rubbing(self, q: np.ndarray, v: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
+        """Friction of each joint for a force of 1 N in it: along its coordinate, and in all coordinates."""
         found = {}
         for name, value in self.d.friction.items():
-            if name in self.d.slots:
-                (normal, start), slot = self.line(self.d.slots[name]), self.d.slots[name]
-                x, y = self.at(self.moving(slot.pin), slot.pin)
-                measure = normal[1] * (x - start[0]) - normal[0] * (y - start[1])
-            else:
-                measure = self.coordinate(name)
-            slow = FRICTION_RATE if name in self.owners else FRICTION_SPEED
+            measure, slow = self.coordinate(name), FRICTION_RATE if name in self.owners else FRICTION_SPEED
             along = np.asarray(casadi.Function("g", [self.q], [casadi.jacobian(measure, self.q)])(q)).ravel()
-            found[name] = -number(value) * np.tanh(along @ v / slow) * along
+            rub = -number(value) * float(np.tanh(along @ v / slow))
+            found[name] = rub, rub * along
         return found
 
     def solve(
@@ -322,16 +325,23 @@ class Multipliers:
                 self.pull(joints, q, rack, float(joints[name][0]))
             sizes = {name: np.hypot(FRICTION_FORCE, joints[name][0]) for name in rubbing}
             sizes |= {name: np.hypot(sizes[name], joints[name][1]) for name in rubbing.keys() & self.owners.keys()}
-            before, rubbed = rubbed, sum((sizes[name] * rub for name, rub in rubbing.items()), np.zeros(len(q)))
+            before, rubbed = rubbed, sum((sizes[name] * rub for name, (_, rub) in rubbing.items()), np.zeros(len(q)))
             if np.abs(rubbed - before).max() <= 1e-14 * np.abs(rubbed).max(initial=0.0):
                 break
         accelerations = along @ solution[: len(q)] + d[size:, 0]
         all_loads = loads.copy()
         all_loads[held] = multipliers[size:]
-        return Solution(accelerations, all_loads, joints, float(energy[0, 0]))
+        along_slots = {name: float(sizes[name]) * rubbing[name][0] for name in rubbing.keys() & self.d.slots.keys()}
+        return Solution(accelerations, all_loads, joints, float(energy[0, 0]), along_slots)
 
-    def on_bodies(self, forces: Mapping[str, np.ndarray], q: np.ndarray) -> dict[tuple[str, str], np.ndarray]:
-        """Force of each pin on each of its bodies (x, y), of all the others together; those of slots among them."""
+    def on_bodies(
+        self, solution: Solution, pulls: Mapping[str, float], q: np.ndarray
+    ) -> dict[tuple[str, str], np.ndarray]:
+        """Force of each pin on each of its bodies (x, y), of all the others together; those of slots and their friction too.
+
+        ``pulls`` are the forces of springs along slots, which act on their blocks.
+        """
+        forces = solution.forces
         found: dict[tuple[str, str], np.ndarray] = {}
 
         def add(own: str, body: str, force: np.ndarray) -> None:
@@ -344,7 +354,9 @@ class Multipliers:
                 add(own, body, -force)
         for name, slot in self.d.slots.items():
             normal = casadi.Function("n", [self.q], [casadi.vertcat(*self.line(slot)[0])])(q)
-            add(slot.pin, self.owners[slot.pin][0], float(forces[name][0]) * np.asarray(normal).ravel())
+            x, y = np.asarray(normal).ravel()
+            across, along = float(forces[name][0]), solution.friction.get(name, 0.0) + pulls.get(name, 0.0)
+            add(slot.pin, self.owners[slot.pin][0], np.array([across * x + along * y, across * y - along * x]))
         return found
 
     def run(

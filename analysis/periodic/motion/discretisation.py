@@ -24,11 +24,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import AssemblyError, LinkworkError
+from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
 
 from ...mechanisms import MECHANISMS, Parameters, mechanism_of
-from ...run import takes_published
+from ...run import repeats, takes_published
 from . import collocation, kernels
 from .drive import Direction, Drive, is_smooth, scale_in
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, Flow
@@ -202,10 +203,38 @@ class OperatingPoint:
 
 
 def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
-    """Return a mechanism and its drive in numbers; raises InputError if the drive does not suit the mechanism."""
+    """Return a mechanism and its drive in numbers.
+
+    Raises InputError if the drive does not suit the mechanism, or if other ratios of gears than those of its description have
+    another period.
+    """
     mechanism = mechanism_of(parameters)
     constants = np.array(parameters.constants())
-    return OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)
+    point = OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)
+    known = mechanism.first_set.parameters
+    for name, field in ((name, field_name(name)) for name in mechanism.names("ratio")):
+        if getattr(parameters, field) != getattr(known, field) and not _repeats(point):
+            raise InputError(
+                f"{name} is {getattr(parameters, field)}: the period of a {mechanism.name} is that of the ratio in its "
+                f"description, {getattr(known, field)}, after which this one is not the same; describe it with its own ratio"
+            )
+    return point
+
+
+def _repeats(point: OperatingPoint) -> bool:
+    """Return whether a mechanism is the same after a period; it is where its bodies cannot be joined, which others report."""
+    mechanism, flow, rates = point.mechanism, point.flow, len(point.mechanism.freedoms)
+    modes, u = tuple(map(float, flow.modes)), point.vector[: flow.inputs]
+    way = np.zeros(mechanism.size)
+    way[flow.crank] = flow.period
+    way[list(flow.others)] = flow.period * point.vector[flow.held + rates :]
+    x = np.array(mechanism.state(mechanism.first_set.initial))
+    try:
+        return all(
+            repeats(mechanism, point.parameters.constants(), modes, x + share * way, u, way) for share in (0.1, 0.37)
+        )
+    except (ArithmeticError, ValueError):
+        return True
 
 
 def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> OperatingPoint:

@@ -55,7 +55,9 @@ def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
     """
     cranks = cranks_of(mechanism)
     if not cranks:
-        raise InputError(f"a {mechanism.name} has no freedom that turns: it has no periodic motions over an angle")
+        raise InputError(
+            f"a {mechanism.name} has no freedom that turns without end: it has no periodic motions over an angle"
+        )
     if len(cranks) == 1 and not name:
         return cranks[0]
     for crank in cranks:
