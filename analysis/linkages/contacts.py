@@ -57,9 +57,7 @@ class Contacts:
             else:
                 rows.append(f"{slip} = {self.interface.travel(joint)}[1]")
                 rows.append(f"{rub} = p.{name}_friction_coefficient * tanh({slip} / FRICTION_SPEED)")
-                slot = self.motion.description.slots.get(name)
-                # the block of a slot has no mass: its friction acts on the body that has the pin
-                at = f"b.at_{slot.pin}" if slot else f"b.{second}_frame.origin"
+                at = f"b.{second}_frame.origin"
                 one, other = (f"force({r} * b.{name}_line.c, {r} * b.{name}_line.s, {at})" for r in (rub, f"-{rub}"))
                 on = {first: one, second: other}
             wrenches = "".join(f"{on.get(body, 'none')}, " for body in self.motion.bodies)

@@ -151,7 +151,7 @@ class Motion:
             turned = self.turned(spring)
             first, second = turned or self.structure.joints[spring.at].bodies
             for body, sign in ((second, "-"), (first, "")):
-                if body == GROUND or body not in on:
+                if body == GROUND:
                     continue
                 if turned:
                     on[body].append(f"torque({sign}{name}_force)")
@@ -207,7 +207,6 @@ class Motion:
     def forces(self) -> Iterator[str]:
         """Write the function that computes all joint forces, from the last dyad back to the ground."""
         rows = [f"on_{body} = needed(m[{n}], e, wrenches[{n}])" for n, body in enumerate(self.bodies)]
-        rows += [f"on_{body} = Wrench(0.0, 0.0, 0.0)" for body in self.structure.bodies if body not in self.bodies]
         taken: set[str] = set()
 
         def reaction(joint: Joint, by: str, on: str, force: str) -> None:
