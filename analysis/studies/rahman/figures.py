@@ -351,7 +351,7 @@ def _bearing_moments() -> tuple[Statement, ...]:
         ),
         Statement(
             "So extra precaution should be taken by designer, so that engine does not fail, and the manufacturer should pay "
-            "special attention to minimize this tolerance error.",
+            "special attention to minimize this tolerance error [of S1].",
             text("section 3.3, L1127"),
             why="advice, not a finding; the table of recommendations says what helps to follow it",
         ),
@@ -413,7 +413,8 @@ def _constant() -> tuple[Statement, ...]:
             "Axial force [1F1k] acts on the crank at joint 1 and equals mass of the crank times its axial acceleration, and "
             "torque [1T1k] is applied constantly.",
             text("section 2.8, L945"),
-            "greatest difference of the axial force from m1 S1''; with a sinusoidal shift by eq 28 too",
+            "greatest difference of the axial force from m1 S1'', 10 deg or more from a dead centre; with a sinusoidal shift "
+            "by eq 28, amplitude and alpha ours, too",
             ROUNDING,
             (
                 *(nothing(full_name(case), force, "lb") for case, force in size["1F1k"].items()),

@@ -21,7 +21,7 @@ from ...slider_crank import Settled, assembly_margin, close, constant_shift, gre
 from ...slider_crank.closure import Rows, chain, equations, freedoms, planar, residuals
 from ...slider_crank.dual_dynamics import Binor
 from ...units import INCH
-from ..rules import ABNORMAL, ABOUT_DEG, SMALL, VERY_CLOSE_DEG
+from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
 from ..statements import Case as Judged
 from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
@@ -315,15 +315,24 @@ def _estimates() -> float:
     return worst
 
 
-def _conditions(case: Case) -> tuple[float, float]:
-    """Return A's least singular value relative to its greatest, and the greatest entry of V, where the iteration ends."""
+def _system(case: Case, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return A and V of eq 23 at the angles of the grid."""
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
-    unknowns = followed(case).unknowns[:, 0] * [1.0, 1.0, 1.0, 1.0, INCH]
-    matrix, right = equations(
-        *chain(parameters(case.offset_in, case.twist_deg), angle, shift, unknowns), INCH, "printed"
-    )
-    singular = np.linalg.svd(matrix, compute_uv=False)
-    return float(np.min(singular[:, -1] / singular[:, 0])), float(np.abs(right).max())
+    unknowns = unknowns * [1.0, 1.0, 1.0, 1.0, INCH]
+    return equations(*chain(parameters(case.offset_in, case.twist_deg), angle, shift, unknowns), INCH, "printed")
+
+
+def _condition(case: Case) -> float:
+    """Return A's least singular value relative to its greatest where the iteration ends."""
+    singular = np.linalg.svd(_system(case, followed(case).unknowns[:, 0])[0], compute_uv=False)
+    return float(np.min(singular[:, -1] / singular[:, 0]))
+
+
+def _unmet(case: Case) -> float:
+    """Return the greatest entry of A Delta - V at the first correction from the angle before."""
+    matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
+    delta = np.linalg.pinv(matrix) @ right[..., None]
+    return float(np.abs(matrix @ delta - right[..., None]).max())
 
 
 def _at_right_angles() -> float:
@@ -357,7 +366,7 @@ def closure() -> StudyResult:
                 GRID_DEG, sparse, rotation
             )
             columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(GRID_DEG, sparse, error)
-    singular, unmet = np.transpose([_conditions(case) for case in (_PLANE, *OPEN)])
+    singular, unmet = np.transpose([(_condition(case), _unmet(case)) for case in (_PLANE, *OPEN)])
     missed, wrong = _detected()
     planes = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
     close_by = np.concatenate([found.steps for found in _ended(20.0, planes)])
@@ -414,13 +423,15 @@ def closure() -> StudyResult:
             f"turn: {', '.join(combined)}. Out of the plane the loop of eqs 2 and 3 cannot close (erratum 1)",
         ),
         Statement(
-            "[Delta = (A'A)^-1 A'V] which is exactly same as [Delta = A^-1 V].",
+            "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
+            "A^-1 V].",
             text("section 2.6.1, eq 23a, L457-463"),
             "whether Delta so found solves eq 23, A Delta = V, as it would by an inverse of A (L457 gives the name A^-1 to "
-            "(A'A)^-1 A'): greatest entry of A Delta - V where the iteration ends",
+            "(A'A)^-1 A'): greatest entry of A Delta - V at the first correction from the angle before, greatest of the turn, "
+            "lengths in inches",
             ROUNDING,
             tuple(nothing(case.name, entry) for case, entry in zip((_PLANE, *OPEN), unmet)),
-            "erratum 1: out of the plane A'V = 0 there, and V is not",
+            "six rows for five unknowns: in the plane eq 23 is met only once the loop is closed, out of it never (erratum 1)",
         ),
         Statement(
             "The iterative process is continued until the absolute values of all error terms are less than or equal "
@@ -492,7 +503,7 @@ def closure() -> StudyResult:
                 at_least(
                     f"never: least of the {len(OUT)} cases of the figures out of the plane",
                     NOTHING,
-                    min(_conditions(case)[0] for case in OUT),
+                    min(map(_condition, OUT)),
                 ),
             ),
         ),
@@ -637,6 +648,16 @@ def _printed_rates() -> tuple[Statement, ...]:
     )
 
 
+#: What the printed equations of the accelerations give.
+EQUATIONS = {
+    "th2": "theta2'' by 38a",
+    "th3": "theta3'' by 39a",
+    "eta2": "eta2'' by 40a",
+    "eta3": "eta3'' by 41a",
+    "s4": "S4'' by 42a",
+}
+
+
 def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[str, float]:
     """Return the greatest second rates within 10 deg of a dead centre, relative to those elsewhere, by eqs 38a to 42a."""
     found = joint_accelerations(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))
@@ -673,8 +694,7 @@ def _dead_centres() -> tuple[Statement, ...]:
         ended = settle(p, angles, shift, rows="printed", start=start, max_steps=MAX_STEPS)
         ratios = _near_dead_centres(shifted, joints(ended.unknowns / [1.0, 1.0, 1.0, 1.0, INCH]), ANGLES_DEG[:-1])
         high += [
-            at_least(f"{words}, {full_name(shifted)}", ABNORMAL, ratios[name])
-            for name, words in (("eta2", "eta2'' by 40a"), ("eta3", "eta3'' by 41a"))
+            at_least(f"{words}, {full_name(shifted)}", ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()
         ]
     place = text("section 3.2, L1115")
     return (
@@ -685,13 +705,13 @@ def _dead_centres() -> tuple[Statement, ...]:
             "crank, i.e. near 100 degrees and 300 degrees.",
             place,
             "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at "
-            "which sin theta2 vanishes, which stands in the denominators of 40a and 41a; least magnitude of sin theta3, "
-            "which stands in all five",
-            f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {SMALL:g}, the rule for *small*",
+            "which sin theta2 vanishes, which stands in the denominators of 40a and 41a; least distance of theta3 from 0 or "
+            "half a turn, since its sine stands in all five",
+            f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
             (
                 near("sines and cosines in denominators", 0.0, 0, 0.0),
                 *zeros,
-                at_most("least of sin theta3", SMALL, least),
+                at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(least)), "deg"),
             ),
             "theta2 is 0 or half a turn at the dead centres, which the offset moves; sin theta3 does not vanish, so "
             "that 39a and 42a stay finite. Out of the plane 40a and 41a are unbounded, and with them 38a, because eq 41 "

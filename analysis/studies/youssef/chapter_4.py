@@ -186,9 +186,10 @@ def compute_first() -> StudyResult:
                         for ratio in sorted(DAMPED_RATIOS)
                     ),
                     Case(
-                        label="third ratio",
+                        label="further ratios",
                         computed=None,
-                        why=f"the third ratio is not named; beyond I4 = {last:.2f} it would not hold",
+                        why="no ratio is named for these figures; 0.5 and 1 are those of Fig 4.6 and 4.7; beyond "
+                        f"I4 = {last:.2f} it would not hold",
                     ),
                 ),
             ),
@@ -204,7 +205,8 @@ def compute_first() -> StudyResult:
                 "Fig. (4.3) and fig. (4.4) also show that the amplitude of oscillation decreases with decrease of I4 "
                 "and that as I4 increases it widens the region of resonance.",
                 text("4.5.1, L3156-3162; the same in L3197-3201"),
-                "amplitude and width, above levels of the amplitude that are ours, relative to those at the next smaller I4",
+                "amplitude, away from the resonance, and width, above levels of the amplitude, relative to those at the next "
+                "smaller I4; speeds and levels are ours",
                 SIGN,
                 (*growth(1), *growth(2)),
             ),
@@ -236,7 +238,7 @@ def compute_second() -> StudyResult:
         columns=columns,
         statements=(
             Statement(
-                "Resonance occurs below the value of w = [omega_k] and w = [omega_k/2]. How much below depends on "
+                "Resonance occurs below the value of [omega] = [omega_k] and [omega] = [omega_k/2]. How much below depends on "
                 "the value of I4.",
                 text("4.5.3 a, L3188-3195"),
                 "upper root of the determinant at the three I4, which falls with I4",

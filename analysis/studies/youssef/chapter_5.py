@@ -352,8 +352,8 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "In all the above examples the second region of instability was so small within the values of [sigma2], "
             "[sigma3] and I4 it was negligible.",
             text("5.3.1, L3902-3906"),
-            "width of the second region relative to that of the first, by the right linear equation, greatest of "
-            "each figure",
+            "width of the second region in lambda_k^2, as the figures have it, relative to that of the first, by the right "
+            "linear equation, greatest of each figure",
             f"{SMALL:g}, the rule for *negligible*",
             tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
             "the terms of first order largely cancel in the width of the first",

@@ -262,7 +262,8 @@ def _bounded() -> tuple[Statement, ...]:
 def _rocker() -> tuple[Statement, ...]:
     usual = {name: len(PROBLEMS[name].task.rotation) for name in ("rocker", "rocker-weighted")}  # type: ignore[arg-type, union-attr]
     least = (
-        f"{our_error(name):.2f} for {printed_error(name):.2f} deg2 of the printed linkage at {n} angles"
+        f"at {n} angles, {'weighted' if 'weighted' in name else 'unweighted'}, the printed linkage has "
+        f"{printed_error(name):.2f} deg2, and the least that we find is {our_error(name):.2f}"
         for name, n in usual.items()
     )
     return (
@@ -273,7 +274,7 @@ def _rocker() -> tuple[Statement, ...]:
             f"error of the printed linkages, of all readings {ROUNDED}",
             HALF,
             (as_stated("unweighted", "700.0", "rocker"), as_stated("weighted", "35.0", "rocker-weighted")),
-            f"the least that we find are {' and '.join(least)}",
+            "; ".join(least),
         ),
     )
 

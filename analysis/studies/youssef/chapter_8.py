@@ -532,10 +532,10 @@ def _fig_8_16() -> tuple[Statement, ...]:
         ),
         Statement(
             "In both cases of springs A and B it was [noticed] that no noticeable effects on the amplitude of vibrations "
-            "were observed at [w = wn/3, wn/4], where wn is the natural frequency.",
+            "were observed at [w = wn/4, wn/3], where wn is the natural frequency.",
             text("8.4.1.2, L6770"),
-            "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where there is no "
-            "maximum",
+            "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no maximum is "
+            "found in the steps of the curve",
             f"{NOTICED:g}, the rule for *the same*",
             tuple(
                 at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, rise_at(s, n), why=meets[n])

@@ -241,12 +241,13 @@ def compute() -> StudyResult:
                     ),
                     near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
                 ),
+                "G1 and Q1 vanish under these conditions; the terms with the coupler's mass and with r4 are not judged",
             ),
             Statement(
                 "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
                 "least a factor [...] in the worst cases.",
                 text("4.3, L2797-2801"),
-                why="the factor cannot be read",
+                why="the factor cannot be read, and Q1 is our reading",
             ),
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "

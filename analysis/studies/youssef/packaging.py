@@ -130,9 +130,9 @@ def compute() -> StudyResult:
                 "Optimisation is then performed to find the optimum linkage from which 72 actual output points are "
                 "calculated.",
                 text("6.4.3, L5113"),
-                why="the nineteen points are lost; with points of ours, and a travel of "
-                f"{CM_PER_METRE * part.travel:.0f} cm, which is less than AB, the printed linkage has "
-                f"{areas['printed'] / areas['ours']:.2f} times the error of ours, and with the ten points of the program "
+                why="the nineteen points are lost; with points of ours the printed linkage has "
+                f"{areas['printed'] / areas['ours']:.2f} times the error of our linkage, whose straight travel, "
+                f"{CM_PER_METRE * part.travel:.0f} cm, is less than AB; with the ten points of the program "
                 f"{exact / p.convert(ours.error):.2f} times",
             ),
         ),

@@ -111,7 +111,8 @@ def _resonance() -> tuple[Statement, ...]:
     }
     return (
         Statement(
-            "The experimental and theoretical curves agree in the region of speed leading up to resonance at w = [wn].",
+            "The experimental and theoretical curves agree in the region of speed leading up to resonance at [omega = "
+            "omega_n].",
             text(f"{section}, L6837"),
             why=LOST,
         ),
@@ -155,7 +156,7 @@ def _resonance() -> tuple[Statement, ...]:
             "Figs. (8.19) and (8.20) also show a natural frequency in the region of 585 RPM with spring C and in the region "
             "of 825 RPM with spring D.",
             text(f"{section}, L6861"),
-            "speed of the greatest amplitude",
+            "speed of the greatest amplitude by the full equations; the measured curves are lost with the figures",
             f"{100 * ABOUT:g} %, the rule for *in the region of*",
             tuple(
                 near(f"spring {s}", NATURAL[s][0], near_fraction(s, 1)[0], ABOUT * float(NATURAL[s][0]), "rpm")
@@ -302,9 +303,10 @@ def compute_harmonics() -> StudyResult:
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "
                 "Fig. (8.21). These are smaller than those corresponding to the first harmonic by a factor in magnitude of 50 "
                 "and hence are in agreement with the experiment.",
-                text("8.4.2.2, L6875-6885"),
+                text("8.4.2.2, L6877-6885"),
                 "greatest first harmonic over greatest second one, each at its own speed: by the linear equation, corrected, "
-                "as the curves are said of the linear theory, and by the full ones",
+                "as the thesis's curves are those of the linear theory, and by the full ones; what the experiment showed is "
+                "judged at L6871",
                 f"{100 * ABOUT:g} %, the rule for *about*, as no digit after 50 is given",
                 tuple(ratios),
                 f"at resonance itself, where the second is not greatest, the full equations have {' and '.join(together)}; "

@@ -215,15 +215,15 @@ def moved_rocker() -> StudyResult:
                 "This [4.8 for 35.0 degrees2] presents an enormous reduction which would have been even more if terms in "
                 "equation (7.19) were considered.",
                 text("7.3.2, L5969"),
-                "error over that with the pivot fixed: with the printed series, as above, and the least with two harmonics; "
-                "least with three harmonics over that with two",
+                "error over that with the pivot fixed: with the printed series, as above, and the least with two harmonics, "
+                "the stroke not bounded; least with three harmonics over that with two",
                 f"0.15 for *enormous*: 4.8 over 35.0 is 0.14; {fewer}",
                 (
                     at_most(
                         "printed series",
                         0.15,
                         nearest / kept,
-                        why="it is not the series of the stated error",
+                        why="the printed series does not give the stated 4.8",
                     ),
                     at_most("two harmonics", 0.15, errors[2] / kept),
                     at_most("three harmonics", 1.0 - ALIKE, errors[3] / errors[2]),
