@@ -55,8 +55,8 @@ cycle. With the stiffest the least position comes at 5 deg, not at 0, u rises 1.
 and the spring's force is not dominant; a spring stiffer still does not make the slope constant. The torque varies with
 the spring at its least value, but not because the slider's accelerations differ: they make 3 % of the difference. T0
 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the slider swings to
-both sides of its start. The second harmonic near 27 rad/s goes on growing down to 22 rad/s. And Milne's method, which the thesis takes for as stable as Hamming's, is
-weakly unstable."""
+both sides of its start. The second harmonic near 27 rad/s goes on growing down to 22 rad/s. And Milne's method, which
+the thesis takes for as stable as Hamming's, is weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)

@@ -350,8 +350,15 @@ def dynamics() -> tuple[Statement, ...]:
                     for name, run in fastest.items()
                 ),
                 *(
-                    near(f"{when}; {name}", 360.0, of(spacings(run)), ABOUT_DEG, "deg", why="a transient comes first")
-                    for when, of in (("first maxima", lambda x: x[0]), ("last maxima", lambda x: x[-2:].mean()))
+                    near(
+                        f"{when}; {name}",
+                        360.0,
+                        spacings(run)[part].mean(),
+                        ABOUT_DEG,
+                        "deg",
+                        why="a transient comes first",
+                    )
+                    for when, part in (("first maxima", slice(1)), ("last maxima", slice(-2, None)))
                     for name, run in launches.items()
                 ),
             ),
