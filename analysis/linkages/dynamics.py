@@ -210,8 +210,9 @@ class Motion:
         taken: set[str] = set()
 
         def reaction(joint: Joint, by: str, on: str, force: str) -> None:
-            # the forces in a pin of several bodies are C, C2, C3, but for names that other joints have
-            further = (f"{joint.name}{n}" for n in count(2) if f"{joint.name}{n}" not in self.structure.joints)
+            # the forces in a pin of several bodies are C, C2, C3, but for names that other joints and racks have
+            others = {*self.structure.joints, *self.description.racks}
+            further = (f"{joint.name}{n}" for n in count(2) if f"{joint.name}{n}" not in others)
             name = next(n for n in chain([joint.name], further) if n not in taken)
             taken.add(name)
             self.reactions.append(Reaction(name, joint, by, on))

@@ -24,9 +24,9 @@ _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, as
 _ROWS = Many(Many(unchanged, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
 #: Units that a constant of a law may have.
+_UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
 #: Angles at which a law is compared with itself a turn further (rad).
 _ANGLES = (-2.0, -0.7, 0.3, 1.9)
-_UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
 
 
 def law(value: Any, name: str) -> Law:
@@ -112,7 +112,7 @@ def periodic(law: Law, known: Mapping[str, tuple[float, str]]) -> bool:
         turns = [
             [eval(code, {"__builtins__": {}}, names | {"x": x + way, "v": 1.0}) for x in _ANGLES] for way in (0.0, tau)
         ]
-    except (ArithmeticError, ValueError):
+    except (ArithmeticError, ValueError, TypeError):
         return False
     return all(abs(b - a) <= 1e-9 * max(map(abs, turns[0])) for a, b in zip(*turns))
 

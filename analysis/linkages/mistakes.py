@@ -104,13 +104,7 @@ def _springs(d: Description, owners: Mapping[str, set[str]]) -> Found:
 
 
 def _freedoms(d: Description, owners: Mapping[str, set[str]]) -> Found:
-    for number, (name, freedom) in enumerate(d.freedoms.items()):
-        if name in d.torques and not (number == 0 if freedom.driven is None else freedom.driven):
-            yield (
-                "torques",
-                f"has {name}, and the freedom {name} has an input {name}.torque",
-                "one must have another name",
-            )
+    for name, freedom in d.freedoms.items():
         slide = d.slides.get(freedom.joint)
         joined = owners.get(freedom.joint, set()) if slide is None else {slide.on, slide.body}
         if name in d.bodies and len(joined) == 2 and name not in joined:

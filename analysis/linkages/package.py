@@ -282,7 +282,8 @@ class Package:
             one, other = (0.0 if b == GROUND else planar.angle_of(getattr(places, f"{b}_frame").turn) for b in bodies)
             free, angle = getattr(start.parameters, f"{name}_free_angle"), remainder(other - one, tau)
             shorter = remainder(angle - free, tau)
-            if abs(angle - free) > pi + 1e-9:
+            # both usual readings of an angle, in (-pi, pi] and in [0, 2 pi)
+            if min(abs(angle - free), abs(angle % tau - free)) > pi + 1e-9:
                 raise LinkageError(
                     f"linkage.springs.{name}.free is {degrees(free):.6g} deg, and the angle at the start "
                     f"{degrees(angle):.6g} deg: where no freedom counts the turns a spring is twisted the shorter way, here by "

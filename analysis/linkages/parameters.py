@@ -260,6 +260,13 @@ def interface(description: Description, structure: Structure) -> Interface:
     found += _assemblies(description, structure)
     _check_names(found)
     loads = tuple(_loads(description, structure, points))
+    own = {f"{drive.table or drive.name}.{drive.load}": drive.name for drive in drives}
+    for load in loads:
+        if load.name in own:
+            raise LinkageError(
+                f"the input {load.name} is that of linkage.freedoms.{own[load.name]} and of a body or a spring: one must have "
+                "another name"
+            )
     return Interface(description, structure, tuple(found), drives, loads, points, centres)
 
 
@@ -377,7 +384,7 @@ def _mass(name: str, body: Body) -> _Mass | None:
 
 
 def turn_of(description: Description, name: str) -> str:
-    """Return the name of the angle of a torsion spring: that of its pin, or its own if the pin has several or it has none."""
+    """Return the name of the angle of a torsion spring: that of its pin; its own with several at the pin, or between bodies."""
     pin = description.springs[name].at
     alone = sum(spring.at == pin for spring in description.springs.values()) == 1
     return f"{pin if pin and alone else name}.turn"
@@ -421,7 +428,7 @@ def _spring(name: str, description: Description, structure: Structure, drive: Dr
             )
     for own, (number, in_unit) in spring.constants.items():
         text = f"Constant {own.replace('_', ' ')} of the law of {name}"
-        yield Parameter(f"{name}.{own}", in_unit, text, number, "free", "spring")
+        yield Parameter(f"{name}.{own}", in_unit, text, number, "free", "law")
 
 
 def _check_names(found: list[Parameter]) -> None:
@@ -436,6 +443,6 @@ def _check_names(found: list[Parameter]) -> None:
 
 def size(found: Interface) -> tuple[float, float]:
     """Return the greatest coordinate of a point (m) and the mass of all bodies (kg), each 1 if there is none."""
-    lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "friction")]
+    lengths = [abs(p.value) for p in found.parameters if p.unit == "m" and p.role not in ("spring", "law", "friction")]
     masses = [p.value for p in found.parameters if p.unit == "kg"]
     return max(lengths, default=1.0) or 1.0, sum(masses) or 1.0

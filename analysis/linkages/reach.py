@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ class Reach(NamedTuple):
     unit : str
         Unit of its coordinate, rad or m.
     low, high : float
-        Ends of the range (rad, m): limits of assembly, or the ends of a turn; of a slide, the ends of the search.
+        Ends of the range (rad, m): limits of assembly, or the ends of a turn or of the search.
     open : (bool, bool)
         Whether no limit was met up to the low and to the high end.
     turns : bool
@@ -74,25 +74,27 @@ def reach(mechanism: Mechanism, freedom: int = 0, *, most: float | None = None, 
 
     ends, free, least = [], [], margin(middle)
     for sign in (-1.0, 1.0):
-        places = (middle + sign * most * np.arange(samples + 1) / samples).tolist()
-        values = [margin(places[0])]
-        for n, q in enumerate(places[1:], 1):
+        # one place more to either side, so that a dip in the first or the last interval is seen
+        places = (middle + sign * most * np.arange(-1, samples + 2) / samples).tolist()
+        values = [margin(places[0]), least]
+        for n, q in enumerate(places[2:], 2):
             values.append(margin(q))
-            lowest, at = values[n], q
-            if n > 1 and values[n - 2] >= values[n - 1] <= values[n]:
+            lowest, at = (values[n], q) if n <= samples + 1 else (inf, q)
+            if values[n - 2] > values[n - 1] <= values[n]:
                 # the limit may lie between two places, where a sine goes through zero
                 bounds = sorted((places[n - 2], q))
                 dip = minimize_scalar(margin, bounds=bounds, method="bounded", options={"xatol": 1e-9 * most})
-                if dip.fun < min(values[n - 1 :]):
+                if dip.fun < min(values[n - 1], lowest) and 0.0 <= sign * (dip.x - middle) <= most:
                     lowest, at = float(dip.fun), float(dip.x)
             if lowest < 0.0:
+                before = places[max(n - 2, 1)]
+                ends.append(float(brentq(lambda c: max(margin(c), -1.0), before, at, xtol=1e-9 * most)))
                 free.append(False)
-                ends.append(float(brentq(lambda c: max(margin(c), -1.0), places[max(n - 2, 0)], at, xtol=1e-9 * most)))
                 break
             least = min(least, lowest)
         else:
             free.append(True)
-            ends.append(places[-1])
+            ends.append(places[samples + 1])
     turn = period or (2.0 * pi if unit == "rad" else 0.0)
     whole = bool(turn) and ends[1] - ends[0] > turn * (1.0 - 1e-9)
     return Reach(freedom, unit, ends[0], ends[1], (free[0], free[1]), whole, least + LIMIT_SINE)

@@ -379,12 +379,12 @@ def _solve(description: Description, found: Mapping[str, Joint], freed: list[str
             return steps, unknown
         steps.append(step)
         known |= dict.fromkeys(new)
-        if not isinstance(step, Dyad):
+        if not isinstance(step, Dyad) and step.body in linear:
             # what freedoms join to a gear or a rack comes with it
             hung = [own for own in _tree(step.body, found, freed) if own.body not in known]
             steps += hung
             known |= dict.fromkeys(own.body for own in hung)
-            linear |= {own.body for own in hung} if step.body in linear else set()
+            linear |= {own.body for own in hung}
     return steps, []
 
 

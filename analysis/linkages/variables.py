@@ -100,7 +100,9 @@ class Variables:
 
     def placing(self) -> list[str]:
         """Return the parameters that determine the poses of the bodies at the start."""
-        names = [p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and not p.role]
+        names = [
+            p.name for p in self.interface.parameters if p.unit in ("m", "rad", "1", "") and p.role in ("", "ratio")
+        ]
         return [*names, *(f"initial.{s.name}" for s in self.starts[: len(self.interface.drives)])]
 
     def links(self) -> Iterator[str]:

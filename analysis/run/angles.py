@@ -74,7 +74,12 @@ class WholeTurns:
     @property
     def _columns(self) -> list[int]:
         """Return the indices of the outputs that are coordinates."""
-        return [self._mechanism.output_names.index(freedom.coordinate) for freedom in self._mechanism.freedoms]
+        return coordinates_of(self._mechanism)
+
+
+def coordinates_of(mechanism: Mechanism) -> list[int]:
+    """Return the indices of the outputs that are coordinates."""
+    return [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
 
 
 def repeats(
@@ -88,7 +93,7 @@ def repeats(
     """Return whether a mechanism with the constants p behaves the same at the state x and after the displacement ``way``."""
     equations = mechanism.equations
     acting = equations.applied(modes, tuple(u.tolist()), p)
-    coordinates = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
+    coordinates = coordinates_of(mechanism)
 
     def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
         state = tuple(y.tolist())

@@ -18,7 +18,7 @@ from ..periodic import crank_of, damping_name, of_the_motor, stiffness_name
 #: Sections of parameters by role, and by unit; all others are dimensions.
 _SECTIONS = {
     "gravity": "Gravity",
-    **dict.fromkeys(("stiffness", "damping", "friction", "spring"), "Spring, damper, friction"),
+    **dict.fromkeys(("stiffness", "damping", "friction", "spring", "law"), "Spring, damper, friction"),
     **dict.fromkeys(("centre of mass", "kg", "kg.m2"), "Masses"),
 }
 DRIVE = "Drive and loads"

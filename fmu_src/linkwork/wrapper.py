@@ -48,17 +48,22 @@ def outlive_exception(slave: Any) -> None:
     """Keep an instance usable over one more exception.
 
     After one the wrapper gives up its references to instance, class and log, and gives them up again when the master frees the
-    instance; one more reference each makes the second time harmless. A slave takes them before it raises an exception, and at
-    its start for one that it cannot catch: an interrupt from the keyboard may come before the first statement of a method.
+    instance; one more reference each, kept in reserve, makes the second time harmless. A slave takes them at its start, for an
+    exception that it cannot catch, since an interrupt from the keyboard may come before the first statement of a method, and
+    again before it raises one when they are used up.
     """
-    for kept in (slave, type(slave), slave.log_queue):
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+    if not _in_reserve(slave):
+        for kept in (slave, type(slave), slave.log_queue):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
 
 
 def end_in_order(slave: Any) -> None:
-    """Give up at the end of a run the references that a slave took at its start, if no exception has used them up."""
-    kept = (slave, type(slave), slave.log_queue)
-    # the log is known to the slave, the wrapper, the reference of the start, and here to `kept` and the call
-    if sys.getrefcount(kept[2]) >= 5:
-        for one in kept:
-            ctypes.pythonapi.Py_DecRef(ctypes.py_object(one))
+    """Give up the references in reserve at the end of a run; an instance that is freed without one keeps them."""
+    if _in_reserve(slave):
+        for kept in (slave, type(slave), slave.log_queue):
+            ctypes.pythonapi.Py_DecRef(ctypes.py_object(kept))
+
+
+def _in_reserve(slave: Any) -> bool:
+    # the log is known to the slave, the wrapper, the reserve and this call
+    return sys.getrefcount(slave.log_queue) >= 4

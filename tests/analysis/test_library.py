@@ -255,10 +255,12 @@ def test_another_ratio_with_another_period_is_refused():
     """One with the same period is not."""
     made, drive = load_linkage(FOLDER / "geared-five-bar.toml"), Drive(torque=0.1)
     known, (name,) = made.first_set.parameters, made.names("ratio")
+    assert name in made.position_parameters
     for value in (-1.5, -0.25, -2.01):
-        with pytest.raises(InputError, match="describe it with its own ratio"):
+        with pytest.raises(InputError, match="describe it with its own values"):
             operating_point(replace(known, **{field_name(name): value}), drive)
-    assert operating_point(replace(known, **{field_name(name): -3.0}), drive).flow.base == 1
+    for value in (-3.0, -25.0, 15.0, 1.0):
+        assert operating_point(replace(known, **{field_name(name): value}), drive).flow.base == 1
 
 
 def test_gears_turn_at_their_ratio():
@@ -504,9 +506,11 @@ def test_ranges_of_motion():
         "arm", points={"A": (0, 0)}, mass=1.0
     )
     slotted.body("block", points={"P": (0, 0)}, mass=1.0, inertia=1e-3).slide("G", body="block", through="O")
-    slotted.slot("S", pin="P", on="arm", through="A").freedom("arm", "A", start="90.2 deg", driven=False)
-    found = reach(slotted.mechanism())
-    assert (np.rad2deg(found.low), np.rad2deg(found.high)) == pytest.approx((0.0, 180.0), abs=0.1)
+    slotted.slot("S", pin="P", on="arm", through="A")
+    for start in (90.2, 0.2, 179.8):
+        slotted.tables["name"] = f"slotted-arm-{10 * start:.0f}"
+        found = reach(slotted.freedom("arm", "A", start=f"{start} deg", driven=False).mechanism())
+        assert (np.rad2deg(found.low), np.rad2deg(found.high)) == pytest.approx((0.0, 180.0), abs=0.1)
 
 
 def test_dead_centres():

@@ -7,6 +7,7 @@ import inspect
 import itertools
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -558,7 +559,12 @@ def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
         find_orbit(wheel("wound", stiffness="0.01 N*m/rad").mechanism().first_set.parameters, speed=10.0)
     with pytest.raises(InputError, match="wound-law has no freedom that turns without end"):
         find_orbit(wheel("wound-law", law="0.01*x + sin(x)").mechanism().first_set.parameters, speed=10.0)
-    assert wheel("latched", law="a*sin(2*x + 0.3)", constants={"a": "0.1 N*m"}).mechanism().cyclic == (0,)
+    made = wheel("latched", law="a*sin(n*x + 0.3)", constants={"a": "0.1 N*m", "n": 2.0}).mechanism()
+    assert made.cyclic == (0,)
+    with pytest.raises(InputError, match=r"wind\.n is 2\.5: the period of a latched is that of its description"):
+        find_orbit(replace(made.first_set.parameters, wind_n=2.5), speed=10.0)
+    # where the law has no value at some angle it is none of them
+    assert not wheel("rooted", law="tanh(x**1.5)").mechanism().cyclic
 
 
 def test_springs_without_a_length_are_named() -> None:
@@ -571,7 +577,9 @@ def test_springs_without_a_length_are_named() -> None:
 
 def test_a_freedom_and_a_body_have_one_torque() -> None:
     built = wheel("twice", stiffness="0.01 N*m/rad", more={"torques": ["pendulum"]})
-    with pytest.raises(LinkworkError, match=r"linkage\.torques has pendulum, and the freedom pendulum has an input"):
+    with pytest.raises(
+        LinkworkError, match=r"input pendulum\.torque is that of linkage\.freedoms\.pendulum and of a body"
+    ):
         built.mechanism()
 
 
@@ -588,3 +596,17 @@ def test_a_slot_may_have_its_pin_at_the_origin_and_a_ring_gear_may_stand_still()
         known = made.first_set
         p = known.parameters.constants()
         assert np.isfinite(made.drawing.positions(made.state(known.initial), made.idle(p), p)).all()
+
+
+def test_a_spring_near_half_a_turn_is_twisted_little() -> None:
+    """By 4 degrees each, whether its angle is read as 179 or as -179 degrees."""
+    for name, start in (("near-one", "179 deg"), ("near-other", "181 deg")):
+        built = linkage(name, ground={"A": (0, 0)}).body("drum", points={"A": (0, 0)}, mass=1.0, inertia=0.02)
+        built.spring(
+            "tie", bodies=("ground", "drum"), stiffness="1 N*m/rad", free="175 deg" if "one" in name else "185 deg"
+        )
+        made = built.freedom("drum", "A", start=start, driven=False).mechanism()
+        known = made.first_set
+        p = known.parameters.constants()
+        found = dict(zip(made.output_names, made.equations.outputs(made.state(known.initial), made.idle(p), 0.0, p)))
+        assert abs(found["tie.turn"]) == pytest.approx(np.deg2rad(4.0))

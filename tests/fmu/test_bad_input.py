@@ -489,13 +489,17 @@ def escape(fmu: str, folder: str) -> list[Any]:
         instance = fmu.instantiate().start()
         instance.terminate()
         instance.free()
+        # a good one, and one whose initialisation fails
+        instance = fmu.instantiate()
+        found += [instance.set("crank.length", -1.0), instance.setup(), instance.enter() or instance.exit()]
+        instance.free()
     gc.collect()
     return [found, sum(type(one).__name__ == fmu.identifier for one in gc.get_objects())]
 
 
 def test_exception_that_a_slave_cannot_catch_leaves_it_usable(fmu: Path, tmp_path: Path) -> None:
     found, left = run_in_process(escape, fmu, tmp_path)
-    assert found == [4, True, 4, True, 0] * 20
+    assert found == [4, True, 4, True, 0] * 20 + [0, 0, 4] * 20
     assert left == 0
 
 

@@ -18,6 +18,7 @@ deviations grow about `AIM` times over each piece (`choose_pieces`).
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -205,36 +206,35 @@ class OperatingPoint:
 def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     """Return a mechanism and its drive in numbers.
 
-    Raises InputError if the drive does not suit the mechanism, or if other ratios of gears than those of its description have
-    another period.
+    Raises InputError if the drive does not suit the mechanism, or if a gear ratio or a force law was changed so that the period
+    is another.
     """
     mechanism = mechanism_of(parameters)
     constants = np.array(parameters.constants())
     point = OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)
-    known = mechanism.first_set.parameters
-    for name, field in ((name, field_name(name)) for name in mechanism.names("ratio")):
-        if getattr(parameters, field) != getattr(known, field) and not _repeats(point):
-            raise InputError(
-                f"{name} is {getattr(parameters, field)}: the period of a {mechanism.name} is that of the ratio in its "
-                f"description, {getattr(known, field)}, after which this one is not the same; describe it with its own ratio"
-            )
+    known, names = mechanism.first_set.parameters, (*mechanism.names("ratio"), *mechanism.names("law"))
+    changed = [name for name in names if getattr(parameters, field_name(name)) != getattr(known, field_name(name))]
+    if changed and not _repeats(point):
+        values = " and ".join(f"{name} is {getattr(parameters, field_name(name))}" for name in changed)
+        raise InputError(
+            f"{values}: the period of a {mechanism.name} is that of its description, after which this one is not the same; "
+            "describe it with its own values"
+        )
     return point
 
 
 def _repeats(point: OperatingPoint) -> bool:
-    """Return whether a mechanism is the same after a period; it is where its bodies cannot be joined, which others report."""
+    """Return whether a mechanism is the same after a period; so counts one that can be joined at none of the angles tried."""
     mechanism, flow, rates = point.mechanism, point.flow, len(point.mechanism.freedoms)
-    modes, u = tuple(map(float, flow.modes)), point.vector[: flow.inputs]
+    modes, u, p = tuple(map(float, flow.modes)), point.vector[: flow.inputs], point.parameters.constants()
     way = np.zeros(mechanism.size)
     way[flow.crank] = flow.period
     way[list(flow.others)] = flow.period * point.vector[flow.held + rates :]
-    x = np.array(mechanism.state(mechanism.first_set.initial))
-    try:
-        return all(
-            repeats(mechanism, point.parameters.constants(), modes, x + share * way, u, way) for share in (0.1, 0.37)
-        )
-    except (ArithmeticError, ValueError):
-        return True
+    x, found = np.array(mechanism.state(mechanism.first_set.initial)), []
+    for share in (0.1234, 0.3719, 0.6283, 0.8871):
+        with suppress(ArithmeticError, ValueError):
+            found.append(repeats(mechanism, p, modes, x + share * way, u, way))
+    return all(found)
 
 
 def _unpickle(mechanism: Mechanism, parameters: Parameters, drive: Drive) -> OperatingPoint:
