@@ -134,7 +134,8 @@ class Motion:
                 lost.append(f"{name}_resistance * s.{name}_rate")
             total = " + ".join(filter(None, (pulls, f"{name}_resistance" if resists else ""))) or "0.0"
             if spring.driven:
-                drive = next(load for load in self.interface.loads if load.name.partition(".")[0] == name)
+                named = f"{name}.{'torque' if self.turned(spring) else 'force'}"
+                drive = next(load for load in self.interface.loads if load.name == named)
                 total += f" - i.{drive.field}"
                 gained.append(f"i.{drive.field} * s.{name}_rate")
             rows.append(f"{name}_force = {total}")

@@ -260,13 +260,11 @@ def interface(description: Description, structure: Structure) -> Interface:
     found += _assemblies(description, structure)
     _check_names(found)
     loads = tuple(_loads(description, structure, points))
-    own = {f"{drive.table or drive.name}.{drive.load}": drive.name for drive in drives}
-    for load in loads:
-        if load.name in own:
-            raise LinkageError(
-                f"the input {load.name} is that of linkage.freedoms.{own[load.name]} and of a body or a spring: one must have "
-                "another name"
-            )
+    inputs = [*(f"{drive.table or drive.name}.{drive.load}" for drive in drives), *(load.name for load in loads)]
+    for name in inputs:
+        if inputs.count(name) > 1:
+            places = "linkage.freedoms, linkage.torques and linkage.springs"
+            raise LinkageError(f"two inputs would be called {name}: one of those in {places} must have another name")
     return Interface(description, structure, tuple(found), drives, loads, points, centres)
 
 

@@ -577,10 +577,22 @@ def test_springs_without_a_length_are_named() -> None:
 
 def test_a_freedom_and_a_body_have_one_torque() -> None:
     built = wheel("twice", stiffness="0.01 N*m/rad", more={"torques": ["pendulum"]})
-    with pytest.raises(
-        LinkworkError, match=r"input pendulum\.torque is that of linkage\.freedoms\.pendulum and of a body"
-    ):
+    with pytest.raises(LinkworkError, match=r"two inputs would be called pendulum\.torque"):
         built.mechanism()
+
+
+def test_a_cylinder_called_like_a_body_has_its_own_force() -> None:
+    built = wheel("own-force", damping=0.1, more={"torques": ["drum"]}).body("cart", points={"C": (0, 0)}, mass=1.0)
+    built.slide("G", body="cart", through="A").freedom("cart", "G", start="0.5 m", driven=False)
+    made = built.spring("drum", between=("A", "C"), driven=True).mechanism()
+    known, u = made.first_set, dict.fromkeys(made.input_names, 0.0)
+    p, x = known.parameters.constants(), made.state(known.initial)
+    still, moved = (
+        made.equations.derivative(x, made.equations.applied((0.0,), tuple(values.values()), p), p)
+        for values in (u, u | {"drum.force": 3.0})
+    )
+    rate = len(made.freedoms) + [freedom.coordinate for freedom in made.freedoms].index("cart.position")
+    assert moved[rate] - still[rate] == pytest.approx(3.0)
 
 
 def test_a_slot_may_have_its_pin_at_the_origin_and_a_ring_gear_may_stand_still() -> None:
