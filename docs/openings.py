@@ -16,9 +16,9 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from analysis.mechanisms import PUBLISHED
 from analysis.run import case_from, load_case
 from analysis.studio import address_of, state_of
+from linkwork import five_bar, slider_crank
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent / "examples"
@@ -26,6 +26,8 @@ EXAMPLES = HERE.parent / "examples"
 ANSWERS = HERE / "openings.json"
 #: Options that restrict a search to mechanisms of the FMUs.
 OF_THE_FMUS = ("--set", 'search.kinds=["four-bar", "slider-crank"]')
+#: Published sets of the mechanisms of the FMUs, not of linkages that somebody has described.
+PUBLISHED = (*five_bar.published.SETS, *slider_crank.published.SETS)
 #: Published sets by page; examples appear on the pages that name them.
 SETS = {
     "fmu": ("table-3.1", "rahman-a4-10-s1-3.5"),
