@@ -235,7 +235,8 @@ def magnification(worst: float, extent: float) -> float:
         return 1.0
     most = LONGEST * extent / worst
     power = 10.0 ** np.floor(log10(most))
-    return max(1.0, float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= most)))
+    # half of it where the logarithm was rounded up
+    return max(1.0, float(power * max(m for m in (0.5, 1.0, 2.0, 5.0) if m * power <= most)))
 
 
 def _enlarged(axis: Axes, scene: LinkageScene) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from PIL import Image
 from shapely.geometry import LineString, MultiPoint, Point, Polygon
@@ -159,6 +159,7 @@ def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
 
 
 @given(st.floats(1e-9, 1e9), st.floats(1e-6, 1e6))
+@example(120.0, 1e-6)
 def test_error_vectors_are_magnified_as_far_as_they_stay_short(worst: float, extent: float) -> None:
     factor = magnification(worst, extent)
     if worst <= 1e-9 * extent or worst > LONGEST * extent:
