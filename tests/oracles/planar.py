@@ -128,14 +128,14 @@ class Multipliers:
 
     def coordinate(self, joint: str) -> Any:
         """Coordinate of a joint."""
-        if joint in self.d.slides:
-            s = self.d.slides[joint]
+        if joint in self.d.slides or joint in self.d.slots:
+            if joint in self.d.slides:
+                s: Any = self.d.slides[joint]
+                x, y, _ = casadi.vertsplit(self.pose(s.body))
+            else:
+                s = self.d.slots[joint]
+                x, y = self.at(self.moving(s.pin), s.pin)
             normal, start = self.line(s)
-            x, y, _ = casadi.vertsplit(self.pose(s.body))
-            return normal[1] * (x - start[0]) - normal[0] * (y - start[1])
-        if joint in self.d.slots:
-            slot = self.d.slots[joint]
-            (normal, start), (x, y) = self.line(slot), self.at(self.moving(slot.pin), slot.pin)
             return normal[1] * (x - start[0]) - normal[0] * (y - start[1])
         first, second = self.owners[joint]
         return self.pose(second)[2] - self.pose(first)[2]

@@ -544,9 +544,8 @@ def torque_result() -> StudyResult:
         shares[name] = [
             (getattr(stiff, part)[i] - getattr(soft, part)[i]) / whole for part in ("acceleration", "gravity")
         ]
-    moved = np.ptp([turn.slider_cm for turn in turns.values()], axis=0).max() / (
-        CM_PER_METRE * table_3_1(0.0).ground_length
-    )
+    to_shaft = CM_PER_METRE * table_3_1(0.0).ground_length
+    moved = np.ptp([turn.slider_cm for turn in turns.values()], axis=0).max() / to_shaft
     accelerations = np.array([slider_motion(k)[2] for k in STIFFNESSES])
     apart, unequal = np.ptp(torque[:, :-1], axis=0) / peak, np.ptp(accelerations, axis=0) / np.abs(accelerations).max()
     unlike = unequal > ALIKE
@@ -609,7 +608,7 @@ def torque_result() -> StudyResult:
                 text("3.2.1, L2005-2013"),
                 f"share of the inertial loads, all but the weight, in the difference of the torque between {_k(5e5)} and 2e6, "
                 "at the extremes; spread of u between the springs, greatest of the turn, over the "
-                f"{CM_PER_METRE * table_3_1(0.0).ground_length:.2f} cm from the start to the shaft",
+                f"{to_shaft:.2f} cm from the start to the shaft",
                 f"{ALIKE:g}, the rule for *the same*; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
                 (
                     *(near(f"{name} torque", 1.0, 1.0 - x, ALIKE) for name, (_, x) in shares.items()),

@@ -495,10 +495,10 @@ def launch_positions_by_spring() -> StudyResult:
                 at_least("k = 5e5 dyn/cm, turns", 1.0, _after(runs)[0].transient),
                 *(
                     case
-                    for label, k in zip(list(runs)[1:], STIFFNESSES[1:])
+                    for label, left in zip(list(runs)[1:], map(transient, STIFFNESSES[1:]))
                     for case in (
-                        at_least(f"{label}, first turn", ALIKE, transient(k)[0]),
-                        at_most(f"{label}, third turn", ALIKE, transient(k)[2]),
+                        at_least(f"{label}, first turn", ALIKE, left[0]),
+                        at_most(f"{label}, third turn", ALIKE, left[2]),
                     )
                 ),
                 _decay(_after(runs)),

@@ -178,26 +178,25 @@ def _after(first: Found, share: float, random: np.random.Generator) -> Found:
     return then._replace(evaluations=then.evaluations + round(share * first.evaluations))
 
 
+def descended(v: FloatArray, side: int, n: int = N) -> tuple[FloatArray, float]:
+    """Return parameters and error (cm2) to which least squares lead within the bounds, by one closure, at n points."""
+    inside = np.clip(v, LOW + 1e-9, HIGH - 1e-9)
+    end = least_squares(lambda v: residuals(v, n)[side], inside, bounds=(LOW, HIGH), xtol=1e-12, ftol=1e-12)
+    return end.x, 2.0 * float(end.cost)
+
+
 def bottom(found: Found) -> float:
-    """Return the error of the minimum next to the end of a search (cm2), by least squares within the bounds."""
+    """Return the error of the minimum next to the end of a search (cm2)."""
     inside = np.clip(found.parameters, LOW + 1e-9, HIGH - 1e-9)
-    side = int(np.argmin([away @ away for away in residuals(inside)]))
-    result = least_squares(lambda v: residuals(v)[side], inside, bounds=(LOW, HIGH), xtol=1e-12, ftol=1e-12)
-    return 2.0 * float(result.cost)
+    return descended(inside, int(np.argmin([away @ away for away in residuals(inside)])))[1]
 
 
 def minima(n: int) -> int:
     """Return the number of different errors (cm2 of 72 points) at n points to which descents from random sets lead."""
-    random, ends = np.random.default_rng(612), []
-    for v in (drawn(random) for _ in range(DESCENTS)):
-        for side in (0, 1):
-            inside = np.clip(v, LOW + 1e-9, HIGH - 1e-9)
-            end = least_squares(
-                lambda v, side=side: residuals(v, n)[side], inside, bounds=(LOW, HIGH), xtol=1e-12, ftol=1e-12
-            )
-            if closes(end.x):
-                ends.append(2.0 * float(end.cost) * N / n)
-    return 1 + int(np.sum(np.diff(np.sort(ends)) > APART))
+    random = np.random.default_rng(612)
+    ends = [descended(v, side, n) for v in (drawn(random) for _ in range(DESCENTS)) for side in (0, 1)]
+    errors = np.sort([error * N / n for v, error in ends if closes(v)])
+    return 1 + int(np.sum(np.diff(errors) > APART))
 
 
 def compute() -> StudyResult:
@@ -212,6 +211,7 @@ def compute() -> StudyResult:
             name, 1.0, np.mean([e.error <= (1.0 + SMALL) * located and e.evaluations <= usual for e in ends]), 0.0
         )
         for name, ends in found.items()
+        if name != plain
     }
     chance = {name: float(mannwhitneyu(errors[name], errors[plain], alternative="less").pvalue) for name in techniques}
     bottoms = {name: np.array([bottom(end) for end in ends]) for name, ends in found.items()}
