@@ -490,6 +490,8 @@ class TestStraight:
         assert abs(last - first) <= 2.2 + 1e-6
         curve = solution.linkage.path(np.linspace(first, last, 50))
         assert syn.straightness(curve, direction=0.0).flatness < 0.025
+        traced = solution.straight()
+        assert traced is not None and traced.rotation == pytest.approx(abs(last - first))
 
 
 def refused(message: str, error: type[Exception] = InputError) -> Any:

@@ -143,6 +143,14 @@ def test_an_integral_does_not_wind_up_at_the_limit() -> None:
     assert limited.force < 1.0
 
 
+@pytest.mark.parametrize("name", ["pid", "state-feedback"])
+def test_a_controller_without_gains_adds_nothing_to_the_feed_forward(name: str) -> None:
+    idle = controller(name, reference=0.3, feed_forward=4.0)
+    begin(idle)
+    idle.do_step(0.0, 0.05)
+    assert idle.force == 4.0
+
+
 def test_state_feedback_and_its_limit() -> None:
     feedback = controller(
         "state-feedback", position_gain=10.0, velocity_gain=2.0, position=0.3, velocity=-0.5, reference=0.1

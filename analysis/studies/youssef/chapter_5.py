@@ -310,10 +310,12 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     others["Fig 5.2"] = float(widths(regions("5.2")["true orbit"]).max())
     follow, listed = "the angles follow the coupler", axis(appendix_3(held(0.8, 0.5)))
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
-    seconds = {}
+    seconds, ranges = {}, []
     for number in SWEEPS:
-        mechanisms = map(SWEEPS[number].mechanism, SWEEPS[number].values)
+        mechanisms = [SWEEPS[number].mechanism(value) for value in SWEEPS[number].values]
         seconds[number] = max(hill(p, 2).width / hill(p).width for p in mechanisms)
+        speeds = [[np.ptp([hill(p, n).low ** -0.5, hill(p, n).high ** -0.5]) for n in (1, 2)] for p in mechanisms]
+        ranges.append(max(second / first for first, second in speeds))
     return (
         Statement(
             "The width of the region decreases with increase of [sigma3].",
@@ -357,7 +359,8 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "linear equation, greatest of each figure",
             f"{SMALL:g}, the rule for *negligible*",
             tuple(at_most(f"Fig {number}", SMALL, x) for number, x in seconds.items()),
-            "the terms of first order largely cancel in the width of the first",
+            "the terms of first order largely cancel in the width of the first; as ranges of speed the quotients are "
+            + ", ".join(f"{x:.3f}" for x in ranges),
         ),
     )
 

@@ -43,6 +43,8 @@ DAMPING, FRICTION = 5.0, 2.0
 PERIOD, BANDWIDTH, TURNS = 1e-3, 120.0, 3.0
 #: Load at the pin of coupler and rocker, unknown to the controller (N).
 LOAD = (-5.0, -3.0)
+#: Load to which a search on the machine must adjust itself (N), three times as much.
+CHANGED = (-15.0, -9.0)
 #: Trial cycles, and harmonics of the deviation that they correct.
 TRIALS, HARMONICS = 6, (8, 16)
 #: First step of the search on the machine (m), and its runs.
@@ -79,12 +81,12 @@ def machine() -> Machine:
     return Machine(model, plant, motion, design_pid(mean, bandwidth=BANDWIDTH))
 
 
-def run(stored: FourierSeries, *, feedback: bool = True) -> TrackingResult:
+def run(stored: FourierSeries, *, feedback: bool = True, load: tuple[float, float] = LOAD) -> TrackingResult:
     """Run the plant along a stored motion."""
     m = machine()
     design = m.design if feedback else None
     controller = TrackingController(m.model, stored, PERIOD, design=design, feedforward=not feedback)
-    return track(controller, crank_speed=SPEED, revolutions=TURNS, plant=m.plant, load=LOAD)
+    return track(controller, crank_speed=SPEED, revolutions=TURNS, plant=m.plant, load=load)
 
 
 @cache
@@ -101,24 +103,33 @@ def trials(harmonics: int) -> tuple[NDArray[np.float64], ...]:
     return tuple(deviations)
 
 
-def searched(runs: int) -> float:
-    """Return the error that a downhill simplex reaches on the machine in so many runs, over that with the slider at rest."""
+def searched() -> tuple[float, float, float]:
+    """Search on the machine by a downhill simplex over the coefficients of two harmonics, and again with another load.
+
+    Returns the weighted errors of the rocker function (rad2): with the slider at rest, at the end of the first search, and at
+    the end of the second, which begins with what the first one found.
+    """
     linkage, turns = rocker_motion(2).linkage, round(2.0 * pi / (SPEED * PERIOD))
 
     def moved_by(series: FourierSeries) -> Linkage:
         return replace(linkage, pivot=replace(slider(linkage), series=series))
 
-    def error(c: NDArray[np.float64]) -> float:
-        loop = run(motion_of_plant(moved_by(FourierSeries(c[:3], np.append(0.0, c[3:]))))).loop
+    def error(c: NDArray[np.float64], load: tuple[float, float]) -> float:
+        loop = run(motion_of_plant(moved_by(FourierSeries(c[:3], np.append(0.0, c[3:])))), load=load).loop
         found = FourierSeries.from_samples(loop.position[-turns - 1 : -1], max(HARMONICS))
         return error_of(
             ROCKER, moved_by(FourierSeries.from_samples(found(turn(72) + linkage.crank_phase), max(HARMONICS)))
         )
 
     start = np.zeros(5)
-    simplex = np.vstack([start, start + STEP * np.eye(5)])
-    found = minimize(error, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": runs})
-    return float(found.fun) / error(start)
+    errors = [error(start, LOAD)]
+    for load in (LOAD, CHANGED):
+        simplex = np.vstack([start, start + STEP * np.eye(5)])
+        options = {"initial_simplex": simplex, "maxfev": SEARCHED}
+        found = minimize(error, start, args=(load,), method="Nelder-Mead", options=options)
+        start = found.x
+        errors.append(float(found.fun))
+    return errors[0], errors[1], errors[2]
 
 
 class Cam(NamedTuple):
@@ -174,7 +185,8 @@ def compute() -> StudyResult:
     stroke = float(np.ptp(m.motion(np.linspace(0.0, 2.0 * pi, 721))))
     run_for = open_loop.loop.time[-1] * SPEED / (2.0 * pi)
     missed, kept = (rms(found.error) / stroke for found in (open_loop, closed))
-    fixed = error_of(ROCKER, PROBLEMS[ROCKER].linkage)
+    fixed, least = error_of(ROCKER, PROBLEMS[ROCKER].linkage), error_of(ROCKER, rocker_motion(2).linkage)
+    at_rest, first, second = searched()
     left = " and ".join(f"{error[-1] / error[0]:.2f} ({n} harmonics)" for n, error in errors.items())
     small = (
         f"{ROLLER:g} cm, the radius of the roller, our choice: a convex pitch curve is nowhere sharper; the pressure angle is "
@@ -266,7 +278,17 @@ def compute() -> StudyResult:
                 f"weighted error of the rocker function over the last turn of a run of that machine, after {SEARCHED} runs of "
                 "a downhill simplex over the coefficients of two harmonics, begun with the slider at rest, over that at rest",
                 f"{SEEN_FALL}; one example is enough for *may be*",
-                (at_most("search on the machine", 1.0 - ALIKE, searched(SEARCHED)),),
+                (at_most("search on the machine", 1.0 - ALIKE, first / at_rest),),
+            ),
+            Statement(
+                "With the variational method, any change in the operating conditions require a recalculation of optimum "
+                "conditions. The direct search merely experiments with a number of cycles, after which the controller "
+                "adjusts itself, in an optimum manner, to the changes.",
+                text("7.3.1, L5871-5881"),
+                why="neither the change nor the number of cycles is stated, and what the slider has to do for a desired "
+                f"output does not depend on load or speed; with ours, and three times the load, {SEARCHED} runs more bring the "
+                f"error to {second / first:.2f} of what the first {SEARCHED} reached, {second / least:.0f} times the least "
+                "with two harmonics",
             ),
             Statement(
                 "The second input could be a slider as discussed in this chapter or could be another link resulting in a "

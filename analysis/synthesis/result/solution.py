@@ -250,7 +250,7 @@ class StraightPart:
 
     @property
     def rotation(self) -> float:
-        """Return the crank rotations over which the task is done: its stations, or a turn."""
+        """Return the crank's rotation on the part (rad)."""
         return abs(self.end - self.begin)
 
     def __str__(self) -> str:
