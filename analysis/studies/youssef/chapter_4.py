@@ -151,9 +151,16 @@ def listed_cases() -> tuple[Case, ...]:
         found = (resonance(chapter_4(ratio), variant=variant) for variant in (Variant.FORTRAN, Variant.EXACT))
         for side, by_listing, right in zip(("lower", "upper"), *found):
             cases.append(near(f"{side} root; I4 = {ratio:g}", f"{by_listing:.4f}", right, HALF_STEP, "rad/s"))
-    ((_, by_listing), (_, right)) = (peak(2, 1.0, COMPARED_AT, variant) for variant in (Variant.FORTRAN, Variant.EXACT))
-    label = f"greatest second harmonic; I4 = 1, omega_c = {COMPARED_AT:g} 1/s"
-    return *cases, near(label, f"{by_listing:.4g}", right, ABOUT * by_listing)
+    for n, ratio in (*((1, ratio) for ratio in INERTIA_RATIOS), (2, 1.0)):
+        (at, by_listing), (right_at, right) = (
+            peak(n, ratio, DAMPERS[0], variant) for variant in (Variant.FORTRAN, Variant.EXACT)
+        )
+        word = ("first", "second")[n - 1]
+        if n == 1:
+            cases.append(near(f"its peak, damped; I4 = {ratio:g}", f"{at:.4f}", right_at, HALF_STEP, "rad/s"))
+        label = f"greatest {word} harmonic, damped; I4 = {ratio:g}"
+        cases.append(near(label, f"{by_listing:.4g}", right, ABOUT * by_listing))
+    return tuple(cases)
 
 
 def compute_first() -> StudyResult:
@@ -195,9 +202,10 @@ def compute_first() -> StudyResult:
             ),
             Statement(
                 "[T]heir deviation from the idealised spring-mass system accounts for the oscillating inertia of the rocker.",
-                text("4.5.1, L3143-3148"),
-                "deviation of the lower root from omega_k that the mean of M makes alone, which is 1 and the rocker's "
-                "inertia, relative to the whole",
+                text("4.5.1, L3143-3146"),
+                "deviation of the lower root from omega_k with the mean alone of the mass that the slider feels, (m4 + m5) and "
+                "the rocker's share, relative to the whole: read as the inertia of the rocker, which oscillates; the part "
+                "that varies with the crank angle makes the rest",
                 ALIKE_WORDS,
                 tuple(near(f"I4 = {ratio:g}", 1.0, by_mean[ratio] / x, ALIKE) for ratio, x in below.items()),
             ),
@@ -213,8 +221,9 @@ def compute_first() -> StudyResult:
             Statement(
                 "THIS PROG. INV[E]STIG[A]TES RESONANCE IN PRES[EN]CE OF DAMPING",
                 listing("appendix 2, L8398"),
-                "both speeds at which the determinant of (4.33) vanishes without a damper, and the second harmonic "
-                "at its resonance: by the listing, run with I4 set to each, and by the right equation",
+                "both speeds at which the determinant of (4.33) vanishes without a damper; speed and size of the greatest "
+                f"first harmonic and size of the second with omega_c = {DAMPERS[0]:g} 1/s, the listing's first damper: by the "
+                "listing, run with I4 set to each, and by the right equation",
                 f"{HALF_STEP:g} rad/s, half the step of the listing in speed; {ABOUT:g} of the amplitude, the rule for *about*",
                 listed_cases(),
                 "M' zeta' is missing, and every term in the crank's length is halved",
@@ -325,8 +334,8 @@ def compute_deviation() -> StudyResult:
                 "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
                 "I4 and becomes zero when I4=0.",
                 text("4.5.1, L3146-3150"),
-                "greatest distance of the deviation from a straight line through zero, of the greatest deviation, up "
-                "to I4 = 1.5; deviation at I4 = 0",
+                "greatest distance of the deviation of the lower root from the straight line through zero and its value at "
+                "I4 = 1.5, relative to that value; deviation at I4 = 0",
                 f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
                 (
                     at_most("distance from the line", ALIKE, bent),
@@ -395,14 +404,15 @@ def one_mass(inertia_ratio: float, omega_c: float) -> NDArray[np.float64]:
 @cache
 def damped(inertia_ratio: float) -> dict[str, float]:
     """Return what is judged of the dampers at an I4."""
-    weak, strong, none = (harmonic(1, CLOSE, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST, 0.0))
+    weak, strong = (harmonic(1, SPEEDS, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
+    near_peak = harmonic(1, CLOSE, inertia_ratio, DAMPERS[0])
     (at, height), (at_strong, _) = (peak(1, inertia_ratio, d) for d in (DAMPERS[0], STRONGEST))
-    outside = np.abs(CLOSE - at) > OUTSIDE
+    outside = np.abs(SPEEDS - at) > OUTSIDE
     return {
-        "outside": np.abs(strong - none)[outside].max() / height,
+        "outside": np.abs(strong - weak)[outside].max() / height,
         "of the free motion": free_frequency(inertia_ratio, STRONGEST) - free_frequency(inertia_ratio, DAMPERS[0]),
         "of the peak": at_strong - at,
-        "one mass": np.abs(weak - one_mass(inertia_ratio, DAMPERS[0])).max() / height,
+        "one mass": np.abs(near_peak - one_mass(inertia_ratio, DAMPERS[0])).max() / height,
     }
 
 
@@ -433,8 +443,8 @@ def _curves() -> tuple[Statement, ...]:
         Statement(
             "The amplitude of oscillation is not affected, on the scale of the graph, outside the resonance region.",
             text("4.5.2, L3176-3178; the same in L3203-3204"),
-            f"change of the amplitude by omega_c = {STRONGEST:g} 1/s farther than {OUTSIDE:g} rad/s, ours, from the "
-            f"resonance, relative to the peak at {DAMPERS[0]:g} 1/s",
+            f"change of the amplitude from omega_c = {DAMPERS[0]:g} to {STRONGEST:g} 1/s, 9 to 40 rad/s but farther than "
+            f"{OUTSIDE:g} rad/s, ours, from the resonance, relative to the peak at {DAMPERS[0]:g} 1/s",
             ALIKE_WORDS,
             tuple(at_most(label, ALIKE, found["outside"]) for label, found in both.items()),
         ),

@@ -152,13 +152,19 @@ def multipliers() -> tuple[Case, ...]:
         run = simulate(TABLE, inputs, stop_time=0.3, step=0.003)
         first = "drive.applied_torque" if inputs.speed is not None else "crank.acceleration"
         names = {first: 0, "pin.C.fy": 1, "pin.C.fx": 2, "slider.acceleration": 3}
+        words = (
+            "crank torque" if inputs.speed is not None else "theta2''",
+            "force at C in y",
+            "force at C in x",
+            "u''",
+        )
         for i in range(1, len(run)):
             where = closed(
                 *(run[name][i] for name in ("crank.angle", "slider.position", "crank.speed", "slider.velocity"))
             )
             w = solved(*where, None if inputs.speed is not None else run["drive.applied_torque"][i])
             for name, place in names.items():
-                label, scale = f"{name}; {drive}", np.abs(run[name]).max()
+                label, scale = f"{words[place]}; {drive}", np.abs(run[name]).max()
                 worst[label] = max(worst.get(label, 0.0), abs(w[place] - run[name][i]) / scale)
     return tuple(at_most(label, ROUNDING, x) for label, x in worst.items())
 
@@ -169,7 +175,7 @@ def compute() -> StudyResult:
     columns = {"time [s]": found[next(iter(found))].times}
     for label, run in found.items():
         columns[f"failure of closure; {label} [cm]"] = np.interp(columns["time [s]"], run.times, run.gap)
-    order = np.polyfit(np.log(STEPS), np.log([run.errors[1] for run in found.values()]), 1)[0]
+    order = np.log2(integrated(STEPS[-1]).errors[1] / integrated(0.5 * STEPS[-1]).errors[1])
     milne, hamming = (
         parasite(past, rates, 0.1)
         for past, rates in (((1, 0, -1), (1 / 3, 4 / 3, 1 / 3)), ((1, -9 / 8, 0, 1 / 8), (3 / 8, 6 / 8, -3 / 8, 0)))
@@ -183,9 +189,10 @@ def compute() -> StudyResult:
             Statement(
                 "[T]he multipliers are equal to the internal forces components and the input torque.",
                 text("2.3.1, L1143-1145; for C, L1848-1852 and L2042-2046"),
-                "solution of (3.1) with the matrices (3.8) and (3.10) as printed, those of 3.2.2 for a torque, less "
-                "the plant's torque, force of the rocker on the coupler and accelerations, relative to the greatest; "
-                "Table 3.1, k = 1e6 dyn/cm, 0.3 s",
+                "solution of (3.1) with the matrices (3.8) and (3.10) as printed (the minus of l2 cos theta2, lost in the "
+                "scan of (3.8), by (4.10)), those of 3.2.2 for a torque, less torque, force of the rocker on the coupler and "
+                "accelerations by our equations of motion, which have no multipliers, relative to the greatest; Table 3.1, "
+                "k = 1e6 dyn/cm, 0.3 s",
                 f"{ROUNDING:g}, above rounding errors",
                 multipliers(),
             ),
@@ -204,18 +211,19 @@ def compute() -> StudyResult:
             Statement(
                 "It is important to recognise that a loop closure check is meaningful other than for trivial "
                 "arithmetical checks, only if used in conjunction with the first approach.",
-                text("3.1, L1748-1757"),
+                text("3.1, L1748-1755"),
                 "greatest error of u by the second approach, which integrates u alone and closes the loop by its "
                 "kinematics, relative to its failure of closure",
-                "more than 100: the check shows nothing of the error",
+                "more than 100, ours as above: the check shows nothing of the error",
                 tuple(at_least(label, 100.0, run.errors[1] / run.unseen) for label, run in found.items()),
             ),
             Statement(
                 "... the errors, inherent, roundoff or truncation, from the information already calculated. These errors "
                 "are in all cases convergent and, thus the methods are highly stable.",
                 text("2.4, L1379-1387"),
-                "factor by which an error that is no solution changes in a step on y' = -y, step 0.1, in the corrector "
-                f"alone: the greater of Hamming's, which appendix 1 has, {hamming:.2f}, and Milne's, which CSMP has (L1411)",
+                "factor by which the part of an error that follows a spurious root of the formula changes in a step, in the "
+                f"corrector alone: the greater of Hamming's, which appendix 1 has, {hamming:.2f}, and Milne's, which CSMP has "
+                "(L1411); the equation y' = -y and the step 0.1 are ours",
                 "below 1, as *convergent* says; one counterexample refutes *all*",
                 (at_most("", 1.0, max(hamming, milne), why="Milne's corrector is weakly unstable"),),
             ),
@@ -230,8 +238,9 @@ def compute() -> StudyResult:
             Statement(
                 "The Hamming fourth order modified predictor-corrector is the method chosen here ...",
                 text("2.4, L1407-1409"),
-                "order at which the error of u by the second approach falls with the step, a slope over the steps of 4 to "
-                "0.5 ms; modifier and final value take the leading error out, and add one",
+                "order at which the error of u by the second approach and Hamming's method (2.28) to (2.31), as in DHAM of "
+                f"appendix 1, falls from steps of {1e3 * STEPS[-1]:g} to {500.0 * STEPS[-1]:g} ms; modifier and final value "
+                "take the leading error out, and add one",
                 "at least the order",
                 (at_least("", "4", order),),
             ),

@@ -106,7 +106,7 @@ class Turns:
     first, second : ndarray
         Harmonics of the crank's turn in the slider position (cm).
     energy_share : ndarray
-        Relative range of the mechanical energy over that of the crank speed squared.
+        Relative range of the kinetic energy over that of the crank speed squared.
     """
 
     ends: NDArray[np.float64]
@@ -124,9 +124,8 @@ class Turns:
         """Divide a run into turns from a crank angle (rad) on."""
         angle = run["crank.angle"]
         times = np.interp(np.arange(start, angle[-1], 2.0 * pi), angle, run.time)
-        names = ("slider.position", "slider.velocity", "crank.speed", "energy.kinetic", "energy.potential")
-        u, v, w, kinetic, potential = (turn_by_turn(run, name, start) for name in names)
-        e = kinetic + potential
+        names = ("slider.position", "slider.velocity", "crank.speed", "energy.kinetic")
+        u, v, w, e = (turn_by_turn(run, name, start) for name in names)
         harmonics = 2.0 * CM_PER_METRE / SAMPLES * np.abs(np.fft.rfft(u, axis=1))
         return cls(
             ends=times[1:],
@@ -579,15 +578,16 @@ def _free_swings() -> Statement:
 def _free_causes() -> Statement:
     """Judge the causes that the thesis gives for both figures."""
     swings = [
-        at_most(f"change of the energy; {label}", 0.5, Turns.of(coast(k)).energy_share.max())
-        for label, k in BOTH.items()
+        at_most(f"change of the energy; {label}", 0.5, t.energy_share[: t.shown].max())
+        for label, t in ((label, Turns.of(coast(k))) for label, k in BOTH.items())
     ]
     return Statement(
         "The oscillatory behaviour of the speed is due to the non-linearities of the system and the reduction in "
         "speed is due to viscous dissipation of energy in the slider.",
         text("3.3, L2253-2259"),
-        "change of the mechanical energy in a turn relative to that of the crank speed squared, greatest: without it "
-        f"the speed swings because the inertia changes with the position; {UNDAMPED}",
+        "relative range of the kinetic energy in a turn over that of the crank speed squared, greatest down to "
+        f"{HARMONIC_SPEED:g} rad/s: where this energy does not change, the inertia's change with the position alone swings "
+        f"the speed; {UNDAMPED}",
         f"less than half, as *due to* says; {ALIKE_WORDS}",
         (*swings, *_undamped({label: (coast(k, 0.0), coast(k)) for label, k in BOTH.items()}, 0.0)),
     )
@@ -627,6 +627,10 @@ def soft_phase_plane() -> StudyResult:
         for label, t in turns.items()
         for name, x in (("range", t.slider_range), ("mean", t.slider), ("range of u'", t.velocity_range))
     ]
+    drifts = [
+        at_least(f"drift; {label}", ALIKE, np.ptp(t.slider[: t.shown]) / t.slider_range[: t.shown].max())
+        for label, t in turns.items()
+    ]
     return _phase_plane(
         "3.13",
         SOFT,
@@ -642,9 +646,10 @@ def soft_phase_plane() -> StudyResult:
             "a drift towards u=[0], is noticeable.",
             text("3.3, L2276-2287"),
             "range and distance of the mean of u from 0, and range of u', relative to the turn before, from the fourth turn "
-            "on, since the first are the transient of the release; greatest",
-            SIGN,
-            tuple(tending),
+            "on, ours, since the first are the transient of the release; greatest; drift of the mean of u over the turns that "
+            "are drawn, relative to the range of u in them",
+            f"{SIGN}; more than {ALIKE:g}, the rule for what is seen on a graph",
+            (*tending, *drifts),
         ),
         Statement(
             "Th[e] drift is greater in Fig. (3.13) due to the value of k being smaller which puts the mean position "

@@ -177,14 +177,21 @@ def compute() -> StudyResult:
     crank, coupler, _ = map(degrees, datum(SIGMA2, DATUM.rocker))
     left = np.log2(expansion(SHORT[0]) / expansion(SHORT[1]))
     mechanism = chapter_4(1.0)
+    parts = printed(ratios(mechanism))
+    seconds = np.array([(x.cos[1], x.sin[1]) for x in (parts.spring, parts.inertia, parts.stiffness)])
+    apart = parts.spring.mean / np.abs(seconds).max()
+    solution = (
+        "solution of (4.33) with these coefficients against the balance of two harmonics of (4.29), relative to its greatest "
+        "coefficient, at 25 rad/s and I4 = 1"
+    )
     ways = {
         "right": _quotients(slider_equation(mechanism, 1.0)),
-        "(4.21) as printed": _of(printed(ratios(mechanism))),
+        "(4.21) as printed": _of(parts),
         "listing of appendix 2": _of(listed(ratios(mechanism))),
     }
     columns = {"crank angle [deg]": np.degrees(TURN)}
     for i, name in enumerate(("inertia M", "stiffness K", "force F")):
-        columns |= {f"{name}; {way} [1]": parts[i](TURN) for way, parts in ways.items()}
+        columns |= {f"{name}; {way} [1]": of[i](TURN) for way, of in ways.items()}
     return StudyResult(
         number="4.2",
         claim="The equations (4.1) to (4.35), one by one, each against the plant or the equations before it.",
@@ -192,9 +199,9 @@ def compute() -> StudyResult:
         statements=(
             Statement(
                 "The angles [alpha] and [alpha3] are then calculated accordingly.",
-                text("4.1, eqs (4.1), (4.6), L2413-2417"),
-                "datum by (4.1) and the closure (4.6) at sigma2 = 0.05 beside that of appendices 2 to 4, ALF, ALF3, "
-                "ALF4 (L8404)",
+                text("4.1, eqs (4.1), (4.6), L2404-2417"),
+                "datum by (4.1) and the closure (4.6) at sigma2 = 0.05, sigma = sigma3 = 1 beside that of appendices 2 to 4, "
+                "ALF, ALF3, ALF4 (L8404)",
                 "half a degree: the listings have whole ones",
                 tuple(
                     near(
@@ -209,8 +216,8 @@ def compute() -> StudyResult:
                 ),
             ),
             Statement(
-                "Substituting equations (4.6) into equations (4.5) we obtain: (4.7) and hence (4.8)",
-                text("4.1, eqs (4.2) to (4.8), L2421-2477"),
+                "Substituting equations (4.6[)] into equations (4.5) we obtain: [(4.7)] and hence [(4.8)]",
+                text("4.1, eqs (4.2) to (4.8), L2459-2477"),
                 "order in the crank's length of the error of (4.8) against the closed linkage, the slider off by "
                 f"half of sigma2, from sigma2 = {SHORT[0]:g} to {SHORT[1]:g}",
                 "2, the first order that is neglected in (4.4); 0.05, as an order is a whole number",
@@ -219,9 +226,9 @@ def compute() -> StudyResult:
             Statement(
                 "[T]hen by application of the Lagrangian multiplier method stated in equation (2.5) the following "
                 "equations are obtained.",
-                text("4.2.1, eqs (4.9) to (4.20), L2501-2613"),
-                "residual in a motion of the plant without gravity, with the pin force at C for the multipliers, "
-                "relative to the greatest term",
+                text("4.2.1, eqs (4.9) to (4.20), L2499-2613"),
+                "residual in a motion of Table 3.1 without gravity by our equations of motion, with the pin force at C for the "
+                "multipliers and the damper's term in (4.18), lost in the scan, by (4.13); relative to the greatest term",
                 f"{ROUNDING:g}, above rounding errors",
                 tuple(at_most(name, ROUNDING, x) for name, x in residuals().items()),
             ),
@@ -247,7 +254,8 @@ def compute() -> StudyResult:
                 "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
                 "least a factor [...] in the worst cases.",
                 text("4.3, L2797-2801"),
-                why="the factor cannot be read, and Q1 is our reading",
+                why=f"the factor cannot be read, and Q1 is our reading; at I4 = 1 the greatest of those that can is "
+                f"1/{apart:.0f} of A1",
             ),
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
@@ -263,20 +271,21 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "Equating constant terms and coefficients of Cos[theta], Sin[theta], Cos2[theta] and Sin2[theta] on "
-                "both sides of equation (4.31) we obtain the following recurrence relationships.",
-                text("4.4.1, 4.4.2, eqs (4.30) to (4.35), L2988-3103"),
-                "solution of (4.33) with (4.34) and (4.35) against the balance of two harmonics of (4.29), relative "
-                "to its greatest coefficient, at 25 rad/s and I4 = 1",
+                "both sides of equation (4.31) we obtain the [f]ollowing recurrence relationships.",
+                text("4.4.1, eqs (4.30) to (4.33), L2988-3049"),
+                f"{solution}, without a damper",
                 f"{ROUNDING:g}, above rounding errors",
-                (
-                    at_most("without a damper, (4.32)", ROUNDING, balanced(0.0)),
-                    at_most(
-                        "omega_c = 1.2 1/s",
-                        ROUNDING,
-                        balanced(1.2),
-                        why="2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
-                    ),
-                ),
+                (at_most("", ROUNDING, balanced(0.0)),),
+            ),
+            Statement(
+                "... then multiplying and equating the coefficients of the trig[o]nometric functions of [theta] on both sides "
+                "of that equation in a similar manner to the preceding section, we obtain the following recurrence "
+                "relationships, [(4.34)]",
+                text("4.4.2, eqs (4.34), (4.35), L3055-3099"),
+                f"{solution}, with a damper of omega_c = mu/(m4 + m5) = 1.2 1/s, the greatest of appendix 2",
+                f"{ROUNDING:g}, above rounding errors",
+                (at_most("", ROUNDING, balanced(1.2)),),
+                "2 lambda_c and 4 lambda_c stand for 2 lambda_c k0 and 4 lambda_c k0",
             ),
         ),
     )
