@@ -113,6 +113,19 @@ def test_the_doubled_branch_begins_there_and_is_stable_at_first(upper: Branch) -
     assert slope == pytest.approx(0.5, abs=0.05)
 
 
+def test_a_doubled_branch_ends_where_it_meets_that_of_half_the_period(upper: Branch) -> None:
+    doubling = next(s for s in upper.special if s.kind is Crossing.PERIOD_DOUBLING)
+    doubled = switch(upper.family, doubling, low=900.0 * RPM, high=1300.0 * RPM)
+    (again,) = doubled.special
+    back = follow(
+        upper.family, doubled.orbits[-1], float(doubled.parameter[-1]), low=890.0 * RPM, high=1300.0 * RPM, direction=1
+    )
+    assert back.reached
+    assert back.parameter[-1] == pytest.approx(doubling.parameter, rel=1e-3)
+    assert [s.kind for s in back.special] == [Crossing.PERIOD_DOUBLING]
+    assert back.special[0].parameter == pytest.approx(again.parameter, rel=1e-9)
+
+
 def test_one_switches_at_period_doublings_only(softened: Branch) -> None:
     with pytest.raises(InputError, match="is a fold: only a period doubling has a branch"):
         switch(softened.family, softened.special[0], low=100.0, high=1200.0)
