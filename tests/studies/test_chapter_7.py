@@ -20,6 +20,7 @@ from analysis.studies.youssef.series_2 import (
     error_of,
     mended,
     out_of_reach,
+    over_rounding,
     path_motion,
     printed,
     readings,
@@ -172,8 +173,10 @@ class TestPrintedSeries:
         motion = slider(linkage)
         assert 100.0 * motion.series.cos == pytest.approx([0.31, 0.772, 0.568])
         assert 100.0 * motion.series.sin == pytest.approx([0.0, -0.34, -0.136])
-        assert np.degrees(motion.guide_angle + linkage.ground_angle) == pytest.approx(-0.9)
-        assert area(linkage) == pytest.approx(4.3, abs=0.05)
+        assert np.degrees(motion.guide_angle) == pytest.approx(-0.9)
+        least, greatest = over_rounding()
+        assert least < area(linkage) < greatest
+        assert least < 4.3 < greatest < 4.8
 
     def test_the_argument_of_the_series_may_be_the_crank_angle(self) -> None:
         k = PROBLEMS[ROCKER].linkage

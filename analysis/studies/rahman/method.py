@@ -563,7 +563,29 @@ def _printed_rates() -> tuple[Statement, ...]:
     seconds = joint_accelerations(crank, GENERAL, rates)
     quicker, moved, _ = later(crank, GENERAL, rates, seconds)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(quicker, moved)))
-    row_6 = CRANK_SPEED * CRANK * np.sin(GENERAL.th2) * (1.0 - np.sin(GENERAL.eta2))
+    (s2, se, s3), (c2, ce, c3) = (f([GENERAL.th2, GENERAL.eta2, GENERAL.th3]) for f in (np.sin, np.cos))
+    # eq 38 as printed, in the order theta2', theta3', eta2', eta3', S4'
+    coefficients = np.array(
+        [
+            [-se, 0.0, s2 * ce, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, s3],
+            [0.0, 0.0, c2, 1.0, 0.0],
+            [ROD * ce, 0.0, ROD * s2 * se, 0.0, -c3],
+            [ce, 1.0, s2 * se, 0.0, 0.0],
+            [0.0, 0.0, -ROD * c2, 0.0, 0.0],
+        ]
+    )
+    w, v = crank.speed, crank.shift_rate
+    column = [
+        w * se,
+        -w * CRANK * s2 * ce + v * se,
+        0.0,
+        -w * (CRANK * c2 + ROD * ce),
+        -w * ce,
+        -w * CRANK * s2 - v * ce,
+    ]
+    order = [Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
+    eq_38 = np.column_stack([coefficients, column]) - np.column_stack([matrix[:, order], -right])
     ratios = (0.5, 1.0, 2.0)
     slips = {ratio: _sinusoidal(ratio) for ratio in ratios}
     names = ("theta2' by eq 39", "eta2' by eq 41", "theta3' by eq 40", "eta3' by eq 42", "S4' by eq 43")
@@ -596,9 +618,12 @@ def _printed_rates() -> tuple[Statement, ...]:
             "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
             "matrices must be equal to some column matrix as shown below:",
             text("section 2.7, eq 38, L559-561"),
-            "right side of row 6 less that of eq 37f in a general position",
+            "coefficients and right side of eq 38 less those of eqs 37a to 37f, in a general position with S1' = 1.3 in/s",
             ROUNDING,
-            (nothing("row 6", row_6, "in/s"),),
+            (
+                nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
+                nothing("right side of row 6", eq_38[5, 5], "in/s"),
+            ),
             f"erratum 9: sin theta2 lacks sin eta2, {MAYBE}",
         ),
         Statement(
@@ -629,7 +654,7 @@ def _printed_rates() -> tuple[Statement, ...]:
             f"erratum 9: S1 for its amplitude S_S1, {MAYBE}",
         ),
         Statement(
-            "S1'' = alpha SS1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
+            "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
             text("section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of"),
             "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, with a crank acceleration of 3 rad/s2",
             ROUNDING,
@@ -766,6 +791,21 @@ def velocity_paths() -> list[Judged]:
         forward = rod.momentum(forward_rod_velocity(CRANK_AT_SPEED, q, r))
         _, mixed, _ = momenta(CRANK_AT_SPEED, b, q, r)
         found.append(nothing(case.name, forward.real - mixed.real, "lb.s"))
+    return found
+
+
+def replacements() -> list[Judged]:
+    """Judge eqs 57 and 58 against 55 and 56, with rates and accelerations as printed, in the plane and out of it."""
+    b, found = bodies(parameters()), []
+    for case in (_PLANE, *ROW_F):
+        apart = []
+        for q in map(Joints._make, np.stack(joints(followed(case).unknowns[:, 0]), -1)):
+            if np.abs(np.sin(q.th2)) > CLEAR_SINE:
+                r = joint_rates(CRANK_AT_SPEED, q)
+                a = joint_accelerations(CRANK_AT_SPEED, q, r)
+                pairs = zip(forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(b, q, r, a)[1:])
+                apart += [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
+        found.append(nothing(f"for 55 and 56; {case.name}", max(apart), "lb"))
     return found
 
 
@@ -917,18 +957,18 @@ def _momenta() -> tuple[Statement, ...]:
             "obtained, but mixed path equations set is much simpler than only the forward path equations set. ... Both the "
             "sets were tested by the program for a number of cases and resulted in same outcome.",
             text("section 2.8, L637-639, L750"),
-            "greatest difference of the rod's momentum by the forward path (eqs 35, 50) from that by the mixed path "
-            f"(eqs 36, 52 with g2), over the turn, {AWAY}",
+            "greatest difference of the force part of the rod's momentum by the forward path (eqs 35, 50) from that "
+            f"by the mixed path (eqs 36, 52 with g2), over the turn, {AWAY}",
             ROUNDING,
             tuple(velocity_paths()),
-            "erratum 3: the paths differ by the unsolved row 37f out of the plane",
+            "erratum 3: the paths differ by the unsolved row 37f out of the plane; that the mixed set is simpler is plain",
         ),
         Statement(
             "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
             "equations are obtained respectively:",
             text("section 2.8, eqs 54 to 56, L754-846"),
-            f"difference from the rates of eqs 49a to 51a in a general position {AT_RATES}, g3 = {G3:g} in; {DOTS}, as are a "
-            "bracket of 56d and one of 56e",
+            "difference from the rates of eqs 49a to 51a, the last with cos eta3 for cos theta3, in a general position "
+            f"{AT_RATES}, g3 = {G3:g} in; {DOTS}, as are one bracket inside 56d and one inside 56e, and the last of 56c to 56f",
             ROUNDING,
             tuple(nothing(label, _apart(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
             "56 has cos eta3 where 51a has cos theta3 (erratum 9)",
@@ -937,19 +977,25 @@ def _momenta() -> tuple[Statement, ...]:
             "Now, backward path equations (52a) and (53a) are differentiated with respect to time. The following "
             "equations are replacements for equations (55) and (56) respectively.",
             text("section 2.8, eqs 57, 58, L848-857"),
-            f"difference from the rates of eqs 52a, with g2 for g3, and 53a in a general position; {DOTS}",
+            "difference from the rates of eqs 52a, with g2 for g3, and 53a in a general position, speed and shift constant, "
+            f"g3 = 0; greatest difference of the force parts of 57 from 55 and of 58 from 56 over the turn, {AWAY}; {DOTS}",
             ROUNDING,
-            tuple(
-                nothing(label, _apart(rate, turned(h)), "lb")
-                for label, rate, h in zip(("eq 57", "eq 58"), printed_rates[1:], momenta(still, b, *moved)[1:])
+            (
+                *(
+                    nothing(label, _apart(rate, turned(h)), "lb")
+                    for label, rate, h in zip(("eq 57", "eq 58"), printed_rates[1:], momenta(still, b, *moved)[1:])
+                ),
+                *replacements(),
             ),
+            "erratum 3: out of the plane they are no replacements, as the velocities differ that the two paths give",
         ),
         Statement(
             "In this step, equations for the inertia forces of link 1 (i.e. the crank) relative to frame {2}, for "
             "link 2 (i.e. the connecting rod) relative to frame {3} and for link 3 (i.e. the slider) relative to "
             "frame {4} are derived.",
             text("section 2.8, eqs 59 to 61, L863-881"),
-            "difference from the rate of momentum in a frame at rest, by the binors, in a general position at constant speed",
+            "difference from the rate of momentum in a frame at rest, by the binors, in a general position at constant speed "
+            "and shift; the sign with which it enters is judged at eqs 62 to 64",
             ROUNDING,
             tuple(nothing(label, size, "lb") for label, size in zip(("eq 59", "eq 60", "eq 61"), inertia)),
         ),
@@ -1033,8 +1079,8 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "This [division by sin theta2], in fact, resulted in some abnormal outcomes when values of angle [theta2] were "
             "very close to zero, while running the program.",
             text("section 2.8, eq 69h, L995"),
-            f"greatest 2F2i by eq 69h, at half degrees, within {VERY_CLOSE_DEG:g} deg of the dead centre at which theta2 is 0, "
-            f"relative to that {FROM_DEAD}; in the plane, a4 = 10 in",
+            f"greatest 2F2i by eq 69h, at half degrees of the crank, within {VERY_CLOSE_DEG:g} deg of the dead centre at which "
+            f"theta2 is 0, relative to that {FROM_DEAD}; in the plane, a4 = 10 in, errata 5 and 6 mended",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*",
             (at_least("2F2i", ABNORMAL, high[0]),),
             "it grows without bound, and the outcome is right: the force that a torque calls forth is infinite there. At the "

@@ -485,8 +485,8 @@ def _dampers() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "It also shows that a smaller value of damping eliminated resonance for the case of I4=0.5 than that for "
-            "I4 = 1.",
+            "It also shows that a smaller value of damping eliminated resonance for the case of [I4]=0.5 than that for "
+            "[I4] = 1.",
             text("4.5.2, L3182-3184"),
             f"damper that keeps the amplitude below {level:g}, ours, relative to that at I4 = 1",
             SIGN,

@@ -45,11 +45,12 @@ The chapter claims that the downhill simplex, begun at many random sets of lengt
 error for a curve with or without timing or for a function of the rocker's angle. It prints eight linkages, seven of them
 with their errors.
 
-*What stands.* The quality functions are sound: the area by triangles is the area between the curves to a thousandth, the
-crank's phase does not change it, both closures of the links have to be tried, and the test of assembly by its two extremes
-is exact. Weights do what they are said to do. Ellipse and path (b) are harder than (a); the curves for both (a) are as close
-as the thesis says. The printed linkage for path (b) has the stated area once a digit is mended, and the packaging machine's
-push is straight to 4 % of its length. Searches that include known minima take half the work.
+*What stands.* The quality functions are sound: the area by triangles is the area between the curves to a thousandth, if the
+partners are chosen, the crank's phase does not change it, both closures of the links have to be tried, and the test of
+assembly by its two extremes is exact. Weights do what they are said to do. Ellipse and path (b) are harder than (a); the
+curves for both (a) are as close as the thesis says. The printed linkage for path (b) has the stated area once a digit is
+mended, and the packaging machine's push is straight to 4 % of its length. Searches that include known minima take half the
+work.
 
 *What does not.* Six of the seven errors are not those of the printed linkages, with the misprints mended that we found and
 each number rounded up or down: the linkage for ellipse (a) has 4.86 to 6.54 cm2, not 0.889. Those of the two rocker
@@ -57,7 +58,8 @@ functions are missed by half a per cent in the nearest of many readings. Nor are
 a few steps of a descent at least halve their errors, and under the same limits there are linkages with a fortieth to a
 fifth of them; the two rocker functions are within 5 % of the optimum. The search itself, repeated from the program, is
 stopped by its criterion each time before it is at a minimum, none of its techniques reached the least error, and to begin
-with fewer points or parameters leads to no lower errors than to begin at random.
+with fewer points or parameters leads to no lower errors than to begin at random; with fewer points it takes 0.61 of the
+work.
 
 *Why.* The downhill simplex stops before it is at the minimum, in ten dimensions each time. And without bounds the problem has
 no solution: the longer the links, the smaller the error. With exact derivatives nearly every start ends at the same optimum
@@ -190,7 +192,7 @@ def as_stated(label: str, stated: str, name: str) -> Case:
 def best_known(*names: str) -> str:
     """Return our least errors under the same limits, for a reason."""
     found = " and ".join(f"{our_error(name):.2f}" for name in names)
-    return f"the least that we find under the same limits is {found} {PROBLEMS[names[0]].unit}"
+    return f"the least that we find within our limits, see the head, is {found} {PROBLEMS[names[0]].unit}"
 
 
 def _ellipse_a() -> tuple[Statement, ...]:
@@ -247,7 +249,7 @@ def _bounded() -> tuple[Statement, ...]:
             "unconstrained case gives an increase of 52.7 cm2.",
             text("6.4.2 A, L4931"),
             "sum of the squared distances of the printed linkage, as printed and, with a1 = -93.8 deg, "
-            f"{ROUNDED}; increase over that of Fig 6.4",
+            f"{ROUNDED}; increase over that of Fig 6.4, both with the digits as printed",
             HALF,
             (
                 near("as printed", "53.6", p.error_of(p.printed), unit="cm2", why=BESIDE),
@@ -357,6 +359,11 @@ def _paths() -> tuple[Statement, ...]:
     )
 
 
+def over_least() -> dict[str, float]:
+    """Return the error of the printed linkage of each figure, mended, over the least that we find with no longer link."""
+    return {f"Fig {n}": printed_error(row.problem) / our_error(row.problem) for n, row in TABLE.items()}
+
+
 TABLE = {
     "6.4": Row(
         "ellipse-a",
@@ -403,15 +410,16 @@ def pairing_area(desired: FloatArray, actual: FloatArray, *, window: float) -> f
     """Return the thesis's quality function of path generation (section 6.4.1, listing at L9797), in the unit's square.
 
     Each desired point is paired with an actual one: the first with the nearest of all, each next one with the nearest of
-    those from its predecessor's partner on, as many as ``window`` times the actual points for each desired one. The area is
+    those from its predecessor's partner on, as many as ``window`` times the actual points for each desired one; as many actual
+    points as desired ones are paired in order, because the program leaves no point without a partner (L9894-9898). The area is
     that of the two triangles between each two successive pairs, added up; the lesser of the two senses of rotation counts.
     """
     span = int(window * len(actual) / len(desired))
     areas = []
     for way in (actual, actual[::-1]):
         curve = np.roll(way, -int(np.argmin(np.hypot(*(way - desired[0]).T))), axis=0)
-        partner = [0]
-        for point in desired[1:]:
+        partner = list(range(len(curve))) if len(curve) == len(desired) else [0]
+        for point in desired[len(partner) :]:
             ahead = curve[partner[-1] : partner[-1] + span + 1]
             partner.append(partner[-1] + int(np.argmin(np.hypot(*(ahead - point).T))))
         d, a = (np.vstack([points, points[:1]]) @ np.array([1.0, 1j]) for points in (desired, curve[partner]))

@@ -27,6 +27,7 @@ from .rigs import (
     LOST,
     NOTICED,
     RIG,
+    SEEN_IN_RECORDS,
     SLIGHT,
     SLOWEST,
     amplitude,
@@ -121,8 +122,8 @@ def compute_pulses() -> StudyResult:
                 "Since each pulse corresponds to a hole a comparison of the width of each shows whether the speed varies "
                 "within the crank cycle.",
                 text("8.2.1.2, L6255"),
-                "range of the crank speed over a turn by the times between holes, relative to the range itself; spring A, "
-                f"{PULSED:g} rpm",
+                "range of the crank speed over a turn by the times from hole to hole, for which the widths of the pulses are "
+                f"taken, relative to the range itself; spring A, {PULSED:g} rpm",
                 f"{READ:g}, what a graph can be read to",
                 tuple(
                     near(
@@ -136,9 +137,9 @@ def compute_pulses() -> StudyResult:
             ),
             Statement(
                 "A further [flywheel] (4) is mounted on the shaft to ensure constant speed input.",
-                text("8.2.1.1, L6142"),
-                why=f"no moment of inertia is printed; {enough:.3f} kg.m2 keep the speed within {ALIKE:.0%} at {PULSED:g} "
-                "rpm",
+                text("8.2.1.1, L6140-6142"),
+                why=f"no moment of inertia is printed; {enough:.3f} kg.m2 keep the range of the speed over a turn at "
+                f"{ALIKE:.0%} at {PULSED:g} rpm with spring A",
             ),
         ),
     )
@@ -422,6 +423,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
                 *(near(f"peaks at {speed:g} rpm", "4", n, 0.0) for speed, n in counted.items()),
                 at_least("second harmonic over first", NOTICED, second),
             ),
+            "that they are periodic is judged at L6449",
         ),
         Statement(
             "The amplitude of oscillations increases as the speed increases up to 290 RPM, i.e. half the natural frequency, "
@@ -474,7 +476,13 @@ def _fig_8_15() -> tuple[Statement, ...]:
             f"none of a count; {TENS}",
             (
                 near("peaks at 240 rpm", "4", peaks(turn("A", 240.0)), 0.0),
-                near("speed at which two peaks meet", "450", speed_of_fewer_peaks("A", 400.0, 500.0), 5.0, "rpm"),
+                near(
+                    "speed at which first and last peak meet",
+                    "450",
+                    speed_of_fewer_peaks("A", 400.0, 500.0),
+                    5.0,
+                    "rpm",
+                ),
                 near("peaks at 500 rpm", 2.0, peaks(turn("A", 500.0)), 0.0),
                 near(
                     "points of inflection at 500 rpm",
@@ -484,6 +492,7 @@ def _fig_8_15() -> tuple[Statement, ...]:
                     why="the point of inflection has not reached the other peak: a shoulder is left",
                 ),
             ),
+            "the two are the first and the last of a turn from 300 to 420 rpm; where they meet both lie before 360 deg",
         ),
     )
 
@@ -536,7 +545,7 @@ def _fig_8_16() -> tuple[Statement, ...]:
             text("8.4.1.2, L6770"),
             "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where no maximum is "
             "found in the steps of the curve",
-            f"{NOTICED:g}, the rule for *the same*",
+            SEEN_IN_RECORDS,
             tuple(
                 at_most(f"spring {s}, {part}, {natural_speed(s) / n:.0f} rpm", NOTICED, rise_at(s, n), why=meets[n])
                 for s, n, part in fractions
@@ -632,6 +641,7 @@ def _fig_8_18() -> tuple[Statement, ...]:
                 *(at_least(f"spring {s}", 0.5, np.mean(ratio <= ABOUT)) for s, ratio in ratios.items()),
                 at_most("largest multiplier", 1.0, largest),
             ),
+            "the phase shift is judged in the next sentence",
         ),
         Statement(
             "Other results show that the sinusoidal behaviour is maintained throughout the range of speeds performed in "

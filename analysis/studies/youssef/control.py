@@ -30,6 +30,7 @@ from ...units import CM_PER_METRE
 from ..rules import ALIKE, SEEN_FALL
 from ..statements import Case, Statement, at_least, at_most, text
 from ..study import Study, StudyResult, padded
+from .chapter_6 import over_least
 from .chapter_7 import slider
 from .problems import PROBLEMS
 from .series_2 import PATH, ROCKER, error_of, path_motion, rocker_motion
@@ -234,8 +235,10 @@ def compute() -> StudyResult:
                 "that the model needs and no feedback, on a machine that differs from the model by "
                 f"{differs}; over the {run_for:.1f} turns that it runs",
                 f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
-                (at_least("no feedback", ALIKE, missed),),
-                "then the links cannot be joined any more",
+                (
+                    at_least("no feedback", ALIKE, missed, why="then the links cannot be joined any more"),
+                    Case(label="versatility", computed=None, why="there is no measure of it, as at L6993"),
+                ),
             ),
             Statement(
                 "The required motion of the input is determined as previously. This is stored as a [reference] model to which "
@@ -298,19 +301,22 @@ def compute() -> StudyResult:
                 "slider-motion` with a `[strategy]` follows the steps: a four-bar, a slider, a fifth link",
             ),
             Statement(
-                "The computer program shown in Appendix 5, can cope with the above defined strategy producing optimum "
+                "The computer program shown in Appendix[] 5, can cope with the above defined strategy producing optimum "
                 "results in each case.",
                 text("7.4, L6026"),
-                "stated error of the two series that are printed over the least that we find with as many harmonics and the "
-                "same links",
+                "first step, the four-bar: error of the printed linkages, mended, over the least that we find with "
+                "no longer link, as at L7026; second, the slider: stated error of the two printed series over the "
+                "least that we find with as many harmonics and the same links",
                 f"{1.0 + ALIKE:g}, the rule for *the same*",
                 (
+                    *(at_most(name, 1.0 + ALIKE, ratio, why="not an optimum") for name, ratio in over_least().items()),
                     at_most(
                         "Fig 7.11", 1.0 + ALIKE, 4.8 / error_of(ROCKER, rocker_motion(2).linkage), why="not an optimum"
                     ),
                     at_most(
                         "Fig 7.12", 1.0 + ALIKE, 4.3 / error_of(PATH, path_motion(2).linkage), why="not an optimum"
                     ),
+                    Case(label="third step, a fifth link", computed=None, why="no example is given"),
                 ),
             ),
         ),

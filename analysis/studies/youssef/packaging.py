@@ -111,10 +111,11 @@ def compute() -> StudyResult:
                 "The constraints are (1) the straight line travel AB should be achieved within the first 120° rotation of "
                 "the crank and (2) the crank shaft should be below the line of travel of the package.",
                 text("6.4.3, L5103"),
-                "straightest travel of the printed linkage within 120 deg of crank rotation that is at least as long as AB, "
-                f"{TRAVEL_CM:g} cm between the program's points: how far it is off straight, relative to its length; height of "
-                "the crank shaft",
-                f"{ALIKE:g}, the rule for *straight*; {line:g} cm, the height of the program's line (L9022)",
+                "straightest travel of the printed linkage within 120 deg of crank rotation that is at least as long "
+                f"as AB, read as the program's points (10, 0) and (164, 0), {TRAVEL_CM:g} cm apart: how far it is off "
+                "straight, relative to its length; height of the crank shaft",
+                f"{ALIKE:g}, the rule for *straight*; [{line:g}] cm, the height of the program's line (L9022, its last digit "
+                "illegible)",
                 (
                     at_most(
                         f"off straight, on {CM_PER_METRE * printed.travel:.0f} cm",

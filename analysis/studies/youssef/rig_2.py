@@ -24,6 +24,7 @@ from .rigs import (
     FRICTION,
     LOST,
     NOTICED,
+    SEEN_IN_RECORDS,
     SLIGHT,
     SLOWEST,
     amplitude,
@@ -127,7 +128,7 @@ def _resonance() -> tuple[Statement, ...]:
             "of [xi3, xi4] and [sigma2], and their derivatives are ignored in the theory.",
             text(f"{section}, L6847"),
             f"both differences: amplitude at {BEYOND:g} rpm, and {WIDTH}; each by the full equations over that by the linear "
-            "equation, corrected",
+            "equation, corrected, which keeps the second order of sigma2, as (4.23) to (4.28) do",
             larger,
             tuple(
                 at_least(f"spring {s}, {what}", 1.0, ratio)
@@ -188,7 +189,7 @@ def _resonance() -> tuple[Statement, ...]:
             ),
         ),
         Statement(
-            "[The] theoretical and experimental resonance curves are in good agreement indicating that the assumption in "
+            "[T]he theoretical and experimental resonance curves are in good agreement indicating that the assumption in "
             "the theory that the second and higher orders of [xi3] and [xi4] and their derivatives are negligible is "
             "a reasonable assumption.",
             text(f"{section}, L6974"),
@@ -293,11 +294,13 @@ def compute_harmonics() -> StudyResult:
                 text("8.4.2.2, L6871"),
                 "rise of the amplitude at the maximum there over the next minimum, relative to this minimum; 0 where there is "
                 "no maximum",
-                f"{NOTICED:g}, the rule for *the same*",
+                SEEN_IN_RECORDS,
                 tuple(cases),
-                f"with friction by {SLIGHT:g} of the guide's force, more than linear bearings have, {' and '.join(left)} "
-                f"are left at half; relative to the greatest amplitude of the curve the rises there are "
-                f"{' and '.join(part_of_all)}, which its scale does not show",
+                f"of these places only half with D, at {natural_speed('D') / 2.0:.0f} rpm, lies within the "
+                f"{RANGE[0]:g} to {RANGE[-1]:g} rpm that were run (L6808); with friction by {SLIGHT:g} of the guide's "
+                f"force, more than linear bearings have, {' and '.join(left)} are left at half; relative to the "
+                f"greatest amplitude of the curve the rises there are {' and '.join(part_of_all)}, which its scale "
+                "does not show",
             ),
             Statement(
                 "The theoretical resonance curves corresponding to the second harmonic for both springs C and D are shown in "

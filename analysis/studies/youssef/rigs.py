@@ -37,6 +37,9 @@ LOST = "the measured curve is lost with the figure"
 FRICTION = "*What friction explains of the amplitudes; rig 1, springs A and B*"
 #: Relative rise of the amplitude that no one notices on a graph.
 NOTICED = ALIKE
+SEEN_IN_RECORDS = (
+    f"{NOTICED:g} of the amplitude there, ours: what one sees who compares the records of neighbouring speeds"
+)
 #: Coefficient of friction in the guide that reduces the amplitude slightly.
 SLIGHT = 0.05
 #: The rig of each spring.
