@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from math import pi
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ from analysis.periodic.motion.discretisation import operating_point, period_from
 from analysis.periodic.motion.drive import scale_of
 from analysis.periodic.motion.variables import unit_of, value_of, with_values
 from analysis.periodic.stability import sensitivity as gradients
+from analysis.periodic.stability.variations import _GAUSS, Variations
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -455,3 +457,15 @@ def test_what_has_no_gradient_says_so() -> None:
     with pytest.raises(InputError, match="no elasticities"):
         nothing.movers()
     assert isinstance(motion, MotionGradient)
+
+
+@pytest.mark.parametrize("panel", [0, 3, 5])
+@pytest.mark.parametrize("place", [-0.5, 0.4])
+def test_the_greatest_value_is_found_wherever_in_a_panel_it_lies(panel: int, place: float) -> None:
+    x = 2.0 * _GAUSS.nodes - 1.0
+    values = np.full((6, len(x)), -1.0)
+    # above the others next to its place alone
+    values[panel] = 0.1 - 20.0 * (x - place) ** 2
+    value, found = Variations.greatest(SimpleNamespace(h=np.ones(6)), values)  # type: ignore[arg-type]
+    assert (value, found.panel, found.position) == pytest.approx((0.1, panel, place), abs=1e-12)
+    assert found.weights @ values[panel] == pytest.approx(value, abs=1e-12)

@@ -32,6 +32,7 @@ from analysis.periodic import (
     with_isolas,
 )
 from analysis.periodic.motion.drive import scale_of
+from analysis.periodic.response.advice import arcs, fold_jumps
 from linkwork.errors import InputError
 from tests.mechanisms import torsion
 from tests.oracles import oscillator
@@ -150,6 +151,18 @@ def test_a_branch_followed_to_both_sides_is_the_same_branch(hardening: Branch) -
         # the multiplier passes 1 after the point that it names
         before, after = both.largest_multiplier[special.after : special.after + 2]
         assert min(before, after) < 1.0 < max(before, after)
+
+
+def test_the_arcs_of_duffing_end_at_its_folds(hardening: Branch) -> None:
+    found = arcs([hardening])
+    assert [arc.stable for arc in found] == [True, False, True]
+    ends = [[float(arc.parameter[0]), float(arc.parameter[-1])] for arc in found]
+    folds = sorted(special.parameter for special in hardening.special)
+    assert ends[1] == pytest.approx(folds, rel=1e-10)
+    assert sorted([ends[0][1], ends[2][0]], reverse=True) == pytest.approx(folds[::-1], rel=1e-10)
+    assert [arc.cut for arc in found].count((True, True)) == 1
+    # at a fold a stable motion ends
+    assert sorted(jump.parameter for jump in fold_jumps([hardening])) == pytest.approx(folds, rel=1e-10)
 
 
 def test_curvature_at_the_folds_of_duffing_is_that_of_the_series_of_the_map(hardening: Branch) -> None:

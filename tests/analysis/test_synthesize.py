@@ -491,7 +491,8 @@ class TestStraight:
         curve = solution.linkage.path(np.linspace(first, last, 50))
         assert syn.straightness(curve, direction=0.0).flatness < 0.025
         traced = solution.straight()
-        assert traced is not None and traced.rotation == pytest.approx(abs(last - first))
+        assert traced is not None
+        assert traced.rotation == pytest.approx(abs(last - first))
 
 
 def refused(message: str, error: type[Exception] = InputError) -> Any:
