@@ -202,6 +202,8 @@ class Run:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
+        if status[0] == k.NO_STEP:
+            message += self._undefined(x, u, problem.modes, batch.p[0])
         values = turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
         message = "; ".join(filter(None, (message, stiff, balance)))
@@ -228,6 +230,19 @@ class Run:
         if interrupted:
             raise RunInterrupted(trajectory)
         return trajectory
+
+    def _undefined(self, x: NDArray[np.float64], *rest: NDArray[np.float64]) -> str:
+        """Say which springs exert no number a microsecond or a millisecond ahead, of those that do so at a state; or nothing."""
+        u, modes, p = rest
+        n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
+        states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
+        values = outputs_of(self.mechanism, modes, p, states, np.tile(u, (2, 1)))
+        lost = [
+            name.rpartition(".")[0]
+            for name, column in zip(self.mechanism.output_names, values.T)
+            if name.rpartition(".")[2].startswith("exerted") and not np.isfinite(column).all()
+        ]
+        return f": the law of {' and '.join(lost)} has no value beyond" if lost else ""
 
     def _balance(self) -> tuple[int, int]:
         """Return the indices of the outputs for the energy balance residual and the kinetic energy."""
