@@ -231,9 +231,10 @@ class Run:
             raise RunInterrupted(trajectory)
         return trajectory
 
-    def _undefined(self, x: NDArray[np.float64], *rest: NDArray[np.float64]) -> str:
-        """Say which springs exert no number a microsecond or a millisecond ahead, of those that do so at a state; or nothing."""
-        u, modes, p = rest
+    def _undefined(
+        self, x: NDArray[np.float64], u: NDArray[np.float64], modes: NDArray[np.float64], p: NDArray[np.float64]
+    ) -> str:
+        """Say which springs exert no finite force a microsecond or a millisecond after a state, or nothing."""
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
         states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
         values = outputs_of(self.mechanism, modes, p, states, np.tile(u, (2, 1)))
