@@ -805,7 +805,7 @@ def replacements() -> list[Judged]:
                 a = joint_accelerations(CRANK_AT_SPEED, q, r)
                 pairs = zip(forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(b, q, r, a)[1:])
                 apart += [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
-        found.append(nothing(f"for 55 and 56; {case.name}", max(apart), "lb"))
+        found.append(nothing(f"57, 58 less 55, 56; {case.name}", max(apart), "lb"))
     return found
 
 

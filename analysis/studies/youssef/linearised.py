@@ -279,8 +279,7 @@ def compute() -> StudyResult:
             ),
             Statement(
                 "... then multiplying and equating the coefficients of the trig[o]nometric functions of [theta] on both sides "
-                "of that equation in a similar manner to the preceding section, we obtain the following recurrence "
-                "relationships, [(4.34)]",
+                "of that equation in a similar manner to the preceding section, we obtain [(4.34)]",
                 text("4.4.2, eqs (4.34), (4.35), L3055-3099"),
                 f"{solution}, with a damper of omega_c = mu/(m4 + m5) = 1.2 1/s, the greatest of appendix 2",
                 f"{ROUNDING:g}, above rounding errors",
