@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from math import exp, inf, nan, pi, sqrt
 from pathlib import Path
@@ -15,11 +16,13 @@ from fmpy.validation import validate_fmu
 
 from analysis import Inputs, simulate
 from analysis.export import NATIVE, build, build_controller, build_native
-from analysis.export.controllers import CONTROLLERS, Controller
+from analysis.export.controllers import CONTROLLERS, UNITS, Controller
 from analysis.linkages import load_linkage
 from analysis.mechanisms import FIVE_BAR
 from analysis.probe import probe
 from analysis.systems.description import HERE, PARTNERS
+from analysis.units import _registry
+from linkwork import variables
 from linkwork.errors import ParameterError
 
 
@@ -141,6 +144,19 @@ def test_an_integral_does_not_wind_up_at_the_limit() -> None:
     limited.reference = -0.5
     limited.do_step(10.01, 0.3)
     assert limited.force < 1.0
+
+
+#: Exponents of the base units of all units that FMUs name.
+EXPONENTS = UNITS | {
+    name: {base: getattr(unit, base) for base in ("kg", "m", "s", "rad")} for name, unit in variables.UNITS.items()
+}
+
+
+@pytest.mark.parametrize("name", EXPONENTS)
+def test_exponents_of_the_base_units_are_those_of_pint(name: str) -> None:
+    product = re.sub(r"([a-z])(\d)", r"\1**\2", name.replace("(m.s)", "m/s")).replace(".", "*")
+    product += "".join(f" * {base}**{-exponent}" for base, exponent in EXPONENTS[name].items())
+    assert _registry().Quantity(1.0, product).to("").magnitude == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("name", ["pid", "state-feedback"])
