@@ -11,6 +11,7 @@ from analysis.numerics.dual import Dual
 from analysis.slider_crank import close, joint_loads, rates
 from analysis.slider_crank.closure import chain, equations, planar, settle
 from analysis.studies.rahman import method, printed
+from analysis.studies.rahman.forces import planar_forces
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 from tests.published_rahman import CRANK_IN, INCH, MASSES_LB_S2_IN, POUND_FORCE, ROD_IN, TORQUE_LB_IN
 
@@ -73,7 +74,7 @@ def test_where_the_thesiss_steps_become_small_its_equations_are_not_met() -> Non
 @pytest.mark.parametrize("erratum_5", [False, True])
 def test_errata_5_and_6_momentum_is_balanced_with_both_mended_alone(erratum_5: bool, erratum_6: bool) -> None:
     """What acts from outside on the planar mechanism against the rate of its momentum, differentiated numerically."""
-    forces = method.planar_forces(erratum_5=erratum_5, erratum_6=erratum_6)
+    forces = planar_forces(erratum_5=erratum_5, erratum_6=erratum_6)
     p, h, lacking = parameters(10.0), 1e-4, []
     for angle in TURN[1::5]:
 
@@ -103,7 +104,7 @@ def test_the_printed_accelerations_are_the_second_rates_of_the_planar_loop() -> 
     at = [planar(p, TURN + 0.03 + n * h) / [1.0, 1.0, 1.0, 1.0, INCH] for n in (-2, -1, 0, 1, 2)]
     seconds = W * W * (-at[0] + 16.0 * at[1] - 30.0 * at[2] + 16.0 * at[3] - at[4]) / (12.0 * h * h)
     q = method.joints(at[2])
-    found = printed.joint_accelerations(method.CRANK_AT_SPEED, q, printed.joint_rates(method.CRANK_AT_SPEED, q))
+    found = printed.joint_accelerations(printed.CRANK_AT_SPEED, q, printed.joint_rates(printed.CRANK_AT_SPEED, q))
     np.testing.assert_allclose([found.th2, found.th3, found.s4], seconds[:, [0, 2, 4]].T, rtol=1e-6, atol=1e-5)
 
 
@@ -124,7 +125,7 @@ def test_erratum_7_the_axial_crank_force_cannot_be_prescribed() -> None:
 def test_erratum_8_the_crank_equation_is_met_whatever_the_slider_force_is() -> None:
     """69i and 69j solve 62a, so that 69k, which is 62a again, gives back any 2F2i that is put in."""
     q = printed.Joints(*(np.array(value) for value in (2.1, 0.0, -1.3, 0.0, 40.0)))
-    crank = method.CRANK_AT_SPEED
+    crank = printed.CRANK_AT_SPEED
     r = printed.joint_rates(crank, q)
     forces = printed.joint_forces(crank, printed.bodies(parameters()), q, r, r, TORQUE_LB_IN)
     inertia = -forces["along crank"] - forces["2F2i"]

@@ -17,9 +17,9 @@ from analysis.cli import main
 from analysis.slider_crank import JointLoads, close, follow, joint_loads
 from analysis.slider_crank.closure import Rows
 from analysis.studies import ENTRIES, RAHMAN
+from analysis.studies.rahman import closure, forces, method, rates
 from analysis.studies.rahman import figures as rahman
-from analysis.studies.rahman import method
-from analysis.studies.rahman.printed import dependable, joint_rates, turn
+from analysis.studies.rahman.printed import CRANK_AT_SPEED, GENERAL, dependable, joint_rates, turn
 from analysis.studies.rahman.table import (
     CAPTIONS,
     COMPONENTS,
@@ -71,7 +71,13 @@ SHOWN = (
         CRANK_IN * CRANK_SPEED * sin(2.1) * cos(1.3) * sin(0.35) ** 2 / (ROD_IN * sin(1.3)),
     ),
     ("8", "rahman-forces", "If [equation (62a) is]", "2F2i", 1.0),
-    ("9", "rahman-rates", "Now separating", "row 6", CRANK_IN * CRANK_SPEED * sin(2.1) * (1.0 - sin(0.35))),
+    (
+        "9",
+        "rahman-rates",
+        "Now separating",
+        "right side of row 6",
+        CRANK_IN * CRANK_SPEED * sin(2.1) * (1.0 - sin(0.35)),
+    ),
     ("9", "rahman-rates", "S1' = alpha S1 cos", "alpha = 2", 2.0 * 2.0 * cos(1.8) * (1.0 - sin(1.8)) * CRANK_SPEED),
     ("9", "rahman-forces", "Specific gravity", "m1", 1.0 - 62.43 / 12.0**3),
 )
@@ -470,13 +476,13 @@ class TestMethod:
         ("case", "printed", "mended"), list(zip(method.ROW_F, (84.0, 215.0), (40.0, 66.0))), ids=["S1", "310"]
     )
     def test_the_unsolved_row(self, case: Case, printed: float, mended: float) -> None:
-        found, with_erratum_2_mended = method.row_f(case)
+        found, with_erratum_2_mended = rates.row_f(case)
         assert np.nanmax(np.abs(found)) == pytest.approx(printed, abs=0.5)
         assert np.abs(with_erratum_2_mended).max() == pytest.approx(mended, abs=0.5)
 
     @pytest.mark.parametrize(("erratum_4", "rate"), [(False, -4.3389), (True, -4.3743)])
     def test_theta2_rate_as_printed_and_mended(self, erratum_4: bool, rate: float) -> None:
-        found = joint_rates(method.CRANK_AT_SPEED, method.GENERAL, erratum_4=erratum_4)
+        found = joint_rates(CRANK_AT_SPEED, GENERAL, erratum_4=erratum_4)
         assert float(found.th2) == pytest.approx(rate, abs=5e-5)
 
     @pytest.mark.slow
@@ -493,7 +499,7 @@ class TestMethod:
     def test_planar_estimates_miss_the_tilt_of_the_rod_most(self, case: Case) -> None:
         """eta2 of the closed loop at theta1 = 0 is the angle of the rod to the plane of the crank."""
         along = -slider(case, np.zeros(1))[0] * cos(np.radians(case.twist_deg)) - case.shift_in
-        assert method._estimate_error(case) == pytest.approx(np.degrees(np.arcsin(abs(along) / ROD_IN)), abs=1e-9)
+        assert closure._estimate_error(case) == pytest.approx(np.degrees(np.arcsin(abs(along) / ROD_IN)), abs=1e-9)
 
     def test_eqs_62_and_64_miss_the_balance_by_twice_the_inertia(self) -> None:
         plane = Case("", 10.0, 0.0, 270.0)
@@ -503,7 +509,7 @@ class TestMethod:
         assert left["eq 64"].computed == pytest.approx(2.0 * inertia, rel=1e-6)
 
     def test_both_mended_the_planar_forces_are_the_plants(self) -> None:
-        found = method.planar_forces(erratum_5=True, erratum_6=True)
+        found = forces.planar_forces(erratum_5=True, erratum_6=True)
         plane = Case("", 10.0, 0.0, 270.0)
         for symbol in ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k"):
             away = (found[symbol] - rahman.values(plane, COMPONENTS[symbol]))[rahman.clear(plane)]

@@ -1,0 +1,446 @@
+"""The loop closure and its iteration judged, sections 2.2 to 2.6, 3.2 and 3.3."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+
+from linkwork.slider_crank.published import parameters
+
+from ...numerics.dual import Dual, about_i, about_j, about_k
+from ...slider_crank import Settled, assembly_margin, close, constant_shift, greatest_shift, settle
+from ...slider_crank.closure import chain, equations, freedoms, planar, residuals
+from ...units import INCH
+from ..statements import Statement, at_least, at_most, near, text
+from ..study import Study, StudyResult, padded
+from ..variation import unvaried
+from .figures import (
+    ANGLE,
+    CRANK,
+    NOTHING,
+    ROUNDING,
+    full_name,
+    nothing,
+)
+from .method import (
+    OPEN,
+    OUT,
+    PLANE,
+    ROD,
+    ROUGH,
+    FloatArray,
+    H,
+    draw,
+    followed,
+)
+from .printed import (
+    GENERAL,
+    GRID_DEG,
+    MAX_STEPS,
+    STEP,
+    STEP_DEG,
+    dependable,
+    turn,
+)
+from .table import TWISTS_REACHED_DEG, Case
+
+
+def _operators() -> float:
+    """Return the greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
+    th, eta = float(GENERAL.th2), float(GENERAL.eta2)
+    about = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    tilting = np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
+
+    def ball(beyond: Dual, change: FloatArray) -> Dual:
+        return cast(Dual, about_k(th + change[0]) @ about_j(eta + change[1]) @ about_i(beyond))
+
+    def guide(change: float) -> Dual:
+        return cast(Dual, about_k(Dual(0.0, 1.3 + change)) @ about_i(Dual(4.0, 20.0)))
+
+    left = [Dual(0.0 * about, about) @ guide(0.0) - (guide(H) - guide(-H)) / (2.0 * H)]
+    for beyond in (Dual(0.0, ROD), Dual(0.5 * np.pi, 0.0)):
+        for operator, change in zip((about, tilting), H * np.eye(2)):
+            quotient = (ball(beyond, change) - ball(beyond, -change)) / (2.0 * H)
+            left.append(Dual(operator) @ ball(beyond, 0.0 * change) - quotient)
+    return max(float(np.abs([lack.real, lack.dual / ROD]).max()) for lack in left)
+
+
+def _joint_freedoms() -> tuple[int, ...]:
+    """Return the freedoms that eqs 1 to 4 give joints 1 to 4: the ranks of their matrices' slopes in a general position."""
+
+    def ball(th: float, eta: float) -> Dual:
+        return cast(Dual, about_k(th) @ about_j(eta))
+
+    ranks = []
+    for joint, at in (
+        (lambda th, s: about_k(Dual(th, s)), (0.9, 3.5)),
+        (ball, (2.1, 0.35)),
+        (ball, (-1.3, 0.2)),
+        (lambda s: about_k(Dual(0.0, s)), (40.0,)),
+    ):
+        ways = H * np.eye(len(at))
+        slopes = [(joint(*(at + way)) - joint(*(at - way))) / (2.0 * H) for way in ways]
+        ranks.append(int(np.linalg.matrix_rank([np.append(x.real, x.dual) for x in slopes], tol=1e-6)))
+    return tuple(ranks)
+
+
+def _limits() -> tuple[Statement, ...]:
+    """Judge the stated limits of the iteration, and what is inferred from them for the mechanism."""
+    place = text("section 3.2, L1121")
+    reached = {}
+    for a4, first, stated in ((10.0, 3.5, 3.5), (20.0, 3.5, 3.5), (30.0, 0.0, 9.0)):
+        tried = np.arange(first, stated + 4.5, 0.5)
+        settled = turn(parameters(a4), tried).settled
+        reached[a4] = first + 0.5 * (int(np.cumprod(settled).sum()) - 1)
+    below = float(settled[tried <= 9.0].mean())
+    between = np.linspace(*TWISTS_REACHED_DEG, 4)
+    within = float(np.mean([turn(parameters(20.0, twist), 0.0).settled.all() for twist in between]))
+    twists = []
+    for which, limit, way in zip(("least", "greatest"), TWISTS_REACHED_DEG, (-1.0, 1.0)):
+        found = limit
+        while turn(parameters(20.0, found + way), 0.0).settled.all():
+            found += way
+        twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
+    shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in (0.0, 10.0, 20.0, 30.0)}
+    beyond = [
+        at_most(
+            f"a4 = {a4:g} in, S1 = {shift + 1.0:.4g} in",
+            0.0,
+            assembly_margin(parameters(a4), constant_shift((shift + 1.0) * INCH)).length / INCH,
+            "in",
+        )
+        for a4, shift in shifts.items()
+    ]
+    own = "the thesis gives neither the accuracy nor the number of corrections that it allows, on which the last step depends"
+    return (
+        Statement(
+            "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
+            "converge if the term [S1] is greater than 1.5 inches.",
+            place,
+            why="where the iteration ends there depends on rounding: 1e-9 in more or less of S1 decide it",
+        ),
+        Statement(
+            "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
+            "greater than 3.5 inches and when offset [a4] is 30 inches, the program converges as long as the term "
+            "[S1] is less than or equal to 9 inches.",
+            place,
+            "greatest S1, by halves of an inch, up to which the printed iteration settles at every angle; share of S1 = 0 to 9 "
+            "in by 0.5 in at which it settles, a4 = 30 in",
+            f"0.5 in, the step of the limits; none of the share; {own}",
+            (
+                near("a4 = 10 in", "3.5", reached[10.0], 0.5, "in"),
+                near("a4 = 20 in, which is greater than 10 in", "3.5", reached[20.0], 0.5, "in"),
+                near("a4 = 30 in", "9", reached[30.0], 0.5, "in"),
+                at_least("a4 = 30 in, S1 = 0 to 9 in", 1.0, below),
+            ),
+            "the limit grows from 10 in on, as the sentence's second half has it",
+        ),
+        Statement(
+            "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
+            "the increase of crank axial shift, offset [a4] should be increased.",
+            place,
+            "change of the greatest S1 at which the crank turns fully",
+            "none, the sign decides",
+            tuple(
+                at_least(f"a4 = {before:g} to {after:g} in", 0.0, shifts[after] - shifts[before], "in")
+                for before, after in pairwise(shifts)
+            ),
+            "the mechanism works up to S1 = sqrt(a2^2 - (a1 + a4)^2), which falls from 48.5 to 27.1 in; the limits "
+            "are those of the iteration alone",
+        ),
+        Statement(
+            "In the case of mechanism failure, it will either lose closure, i.e. one link or more will get detached "
+            "from another at the joint or the slider will go to the opposite side.",
+            place,
+            "least margin of the rod's reach over a turn, 1 in beyond the greatest S1: negative where the loop "
+            "cannot close",
+            "none, the sign decides",
+            tuple(beyond),
+            "closure is lost",
+        ),
+        Statement(
+            "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
+            "as offset [alpha4] is between 232 and 310 degrees.",
+            place,
+            "limits of alpha4, by degrees, at which the printed iteration settles at every angle; share of alpha4 = 232 to 310 "
+            "deg by 26 deg at which it settles",
+            f"1 deg, the step of the limits; none of the share; {own}",
+            (*twists, at_least("232 to 310 deg", 1.0, within)),
+            "the mechanism itself turns fully at every alpha4",
+        ),
+    )
+
+
+def _detected() -> tuple[float, float]:
+    """Return the shares of shifts at a4 = 0, 10, 20, 30 in, 0 to 50 in by 2 in, at which the iteration misses or errs.
+
+    It runs at every 30 deg from the planar estimate. It misses a mechanism that turns fully where it does not settle at one of
+    them, and errs where it settles at all on a loop that is open at one.
+    """
+    missed: list[bool] = []
+    wrong: list[bool] = []
+    for a4 in (0.0, 10.0, 20.0, 30.0):
+        p = parameters(a4)
+        shifts = np.arange(0.0, greatest_shift(p) or 0.0, 2.0 * INCH)
+        angles, each = (x.ravel() for x in np.meshgrid(np.radians(GRID_DEG[::6]), shifts))
+        found = settle(p, angles, each, rows="printed", max_steps=MAX_STEPS)
+        settled = found.settled.reshape(shifts.size, -1).all(-1)
+        is_open = found.rotation_residual.reshape(shifts.size, -1).max(-1) > NOTHING
+        missed += np.logical_not(settled).tolist()
+        wrong += np.logical_and(settled, is_open).tolist()
+    return float(np.mean(missed)), float(np.mean(wrong))
+
+
+def endings(off: float, cases: tuple[Case, ...], step: int = 1) -> list[Settled]:
+    """Run the iteration from planar estimates of theta2 and theta3 that are off by an angle (deg), one way and the other."""
+    grid, away = np.radians(GRID_DEG[::step]), np.radians([off, 0.0, -off, 0.0, 0.0])
+    ended = []
+    for case in cases:
+        p = parameters(case.offset_in, case.twist_deg)
+        start = planar(p, grid) + away
+        ended.append(settle(p, grid, case.shift_in * INCH, rows="printed", start=start, max_steps=MAX_STEPS))
+    return ended
+
+
+def _far_off(cases: tuple[Case, ...]) -> tuple[float, float]:
+    """Return the shares of crank angles, by 30 deg, at which the iteration settles from far off, and on the closed loop."""
+    ended = [found for off in (-120.0, -60.0, 60.0, 120.0, 180.0) for found in endings(off, cases, 6)]
+    closed = [(found.rotation_residual < NOTHING) & (found.position_error < NOTHING) for found in ended]
+    return float(np.mean([found.settled for found in ended])), float(np.mean(closed))
+
+
+def _estimate_error(case: Case) -> float:
+    """Return the greatest difference (deg) of the planar estimate at theta1 = 0 from the angles of the closed loop.
+
+    The closed loop has a third rotation in each ball joint, about i beyond theta and eta.
+    """
+    p, zero = parameters(case.offset_in, case.twist_deg), np.zeros(1)
+    closed = close(p, zero, case.shift_in * INCH)
+    (rod,), (slider,) = closed.crank_ball, closed.slider_ball
+    th2, eta2 = np.arctan2(rod[1, 0], rod[0, 0]), -np.arcsin(rod[2, 0])
+    turned = (about_k(th2) @ about_j(eta2)).real.T @ rod @ slider
+    found = [th2, eta2, np.arctan2(turned[1, 0], turned[0, 0]), -np.arcsin(turned[2, 0])]
+    apart = np.degrees(found - planar(p, zero)[0, :4])
+    return float(np.abs((apart + 180.0) % 360.0 - 180.0).max())
+
+
+def _estimates() -> float:
+    """Return by how much the loop is open at the estimates of section 2.6.2, greatest of four offsets."""
+    zero, worst = np.zeros(1), 0.0
+    for a4 in (0.0, 10.0, 20.0, 30.0):
+        s4 = np.sqrt(ROD**2 - (CRANK + a4) ** 2)
+        th2 = np.pi - np.arctan(s4 / (CRANK + a4))
+        estimate = np.array([[th2, 0.0, 2.0 * np.pi - th2, 0.0, s4 * INCH]])
+        worst = max(worst, *(float(left[0]) for left in residuals(chain(parameters(a4), zero, zero, estimate)[0])))
+    return worst
+
+
+def _system(case: Case, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return A and V of eq 23 at the angles of the grid."""
+    angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
+    unknowns = unknowns * [1.0, 1.0, 1.0, 1.0, INCH]
+    return equations(*chain(parameters(case.offset_in, case.twist_deg), angle, shift, unknowns), INCH, "printed")
+
+
+def _condition(case: Case) -> float:
+    """Return A's least singular value relative to its greatest where the iteration ends."""
+    singular = np.linalg.svd(_system(case, followed(case).unknowns[:, 0])[0], compute_uv=False)
+    return float(np.min(singular[:, -1] / singular[:, 0]))
+
+
+def _unmet(case: Case) -> float:
+    """Return the greatest entry of A Delta - V at the first correction from the angle before."""
+    matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
+    delta = np.linalg.pinv(matrix) @ right[..., None]
+    return float(np.abs(matrix @ delta - right[..., None]).max())
+
+
+def _at_right_angles() -> float:
+    """Return A's least singular value relative to its greatest with the rod at right angles to the guide, a4 = a2 - a1."""
+    p, zero = parameters(ROD - CRANK), np.zeros(1)
+    matrix, _ = equations(*chain(p, zero, zero, planar(p, zero)), INCH, "printed")
+    singular = np.linalg.svd(matrix[0], compute_uv=False)
+    return float(singular[-1] / singular[0])
+
+
+def closure() -> StudyResult:
+    """Compute the iteration and the closure error at which it ends."""
+    columns = {ANGLE: GRID_DEG}
+    (first, *_), sparse = OPEN, GRID_DEG[::2]
+    p, unknowns = parameters(first.offset_in), followed(first).unknowns[4, 0] * [1.0, 1.0, 1.0, 1.0, INCH]
+    left = freedoms(p, float(np.radians(GRID_DEG[4])), first.shift_in * INCH, unknowns)
+    determined, combined = [], []
+    for case in (PLANE, *OPEN):
+        found = followed(case)
+        mechanism = parameters(case.offset_in, case.twist_deg)
+        rotation, error, _ = dependable(mechanism, case.shift_in)
+        determined += [
+            nothing(f"loop open, {case.name}", np.max(found.rotation_deg), "deg"),
+            nothing(f"error of S4, {case.name}", np.max(found.error_in), "in"),
+        ]
+        combined.append(f"{np.max(rotation):.2g} deg and {np.max(error):.2g} in ({case.name})")
+        if case != PLANE:
+            columns[f"rotation left as printed; {case.name} [deg]"] = found.rotation_deg[:, 0]
+            columns[f"error of S4 as printed; {case.name} [in]"] = found.error_in[:, 0]
+            columns[f"rotation left with Davidon Fletcher Powell; {case.name} [deg]"] = np.interp(
+                GRID_DEG, sparse, rotation
+            )
+            columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(GRID_DEG, sparse, error)
+    singular, unmet = np.transpose([(_condition(case), _unmet(case)) for case in (PLANE, *OPEN)])
+    missed, wrong = _detected()
+    planes = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
+    close_by = np.concatenate([found.steps for found in endings(20.0, planes)])
+    outside = np.concatenate([followed(case).steps[:, 0] for case in OPEN])
+    (settled, on_it), (settled_out, _) = _far_off(planes), _far_off(OPEN)
+    within = "; ".join(case.name for case in OPEN)
+    conclusions = text("section 3.3, L1131")
+    statements = (
+        Statement(
+            "The approach is developed in such a manner that a digital computer can detect when a solution is "
+            "possible and then solve the whole problem.",
+            text("abstract, L45"),
+            "shares of the shifts at which the crank turns fully, 0 to 48 in by 2 in at a4 = 0, 10, 20, 30 in; the iteration "
+            "as printed, by Newton and Raphson, from the planar estimate at every 30 deg",
+            f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
+            (
+                at_most("a solution is possible, and the iteration does not settle", 0.0, missed),
+                at_most("the iteration settles on a loop that is open", 0.0, wrong),
+            ),
+            "the iteration settles where its steps become small, which says nothing of the loop (erratum 1)",
+        ),
+        Statement(
+            "Fig. 3 is the generalized slider crank in which joint 1 is cylindrical with one translational and one "
+            "rotational degrees of freedom, joints 2 and 3 are ball joints, each of which has three rotational "
+            "degrees of freedom, and joint 4 is prismatic, exactly the same as in the planar case.",
+            text("section 2.3, L213; eqs 1 to 5"),
+            "freedoms that the matrices of eqs 1 to 4 give each joint: the rank of their slopes in a general position",
+            "none of a count",
+            tuple(
+                replace(near(f"joint {n}", float(count), found, 0.0), stated=words)
+                for n, (words, count, found) in enumerate(
+                    zip(("one and one", "three", "three", "one"), (2, 3, 3, 1), _joint_freedoms()), start=1
+                )
+            ),
+            "erratum 1: eqs 2 and 3 give each ball joint two rotations. So the chain of joints has "
+            f"{left} freedom, and theta1 and S1 cannot both be given; with three it would have 2 + 3 + 3 + 1 - 6 = 3, of which "
+            "one is the spin of the rod",
+        ),
+        Statement(
+            "hence partial differential operator [Q_L eta_2] can be written as,",
+            text("section 2.5, eqs 2a to 4a, L320-352"),
+            "difference of the operators times the matrices from difference quotients of the matrices",
+            f"{ROUGH:g}, the error of the quotients",
+            (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operators()),),
+        ),
+        Statement(
+            "The numerical method being used to determine the displacements is based on the algorithm (12) introduced "
+            "by Hall, Root & Sandgren (1977). This algorithm is the combination of Davidon-Fletcher-Powell optimization "
+            "routine with the Newton-Raphson method as applied to kinematics by Uicker, Denavit and Hartenberg (1964).",
+            text("section 2.6.1, L366; abstract, L45"),
+            why="the thesis prints the Newton-Raphson half alone (eqs 7 to 26), and its program is missing. As we read the "
+            "reference, a step by eq 23a is taken where it halves the sum of squares of eq 25, and a step of Davidon, Fletcher "
+            "and Powell down that sum where it does not. This leaves of the rotation round the loop and of S4, greatest of the "
+            f"turn: {', '.join(combined)}. Out of the plane the loop of eqs 2 and 3 cannot close (erratum 1)",
+        ),
+        Statement(
+            "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
+            "A^-1 V].",
+            text("section 2.6.1, eq 23a, L457-463"),
+            "whether Delta so found solves eq 23, A Delta = V, as it would by an inverse of A (L457 gives the name A^-1 to "
+            "(A'A)^-1 A'): greatest entry of A Delta - V at the first correction from the angle before, greatest of the turn, "
+            "lengths in inches",
+            ROUNDING,
+            tuple(nothing(case.name, entry) for case, entry in zip((PLANE, *OPEN), unmet)),
+            "six rows for five unknowns: in the plane eq 23 is met only once the loop is closed, out of it never (erratum 1)",
+        ),
+        Statement(
+            "The iterative process is continued until the absolute values of all error terms are less than or equal "
+            "to the desired accuracy limits. At this point the displacements are determined only for the first "
+            "position of the input link.",
+            text("section 2.6.1, L465"),
+            "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn",
+            ROUNDING,
+            tuple(determined),
+            "erratum 1: small steps are no closed loop",
+        ),
+        Statement(
+            "From geometry the following formulas for the joint variables can be written.",
+            text("section 2.6.2, L483-491"),
+            "rotation (rad) and length (m) by which the planar loop is open at theta1 = 0, a4 = 0, 10, 20, 30 in",
+            "1e-12, the rounding",
+            (at_most("open", 1e-12, _estimates()),),
+        ),
+        *_limits(),
+        Statement(
+            "The main disadvantage of this method is that if we can not make good initial estimates for joint "
+            "displacements, ... the method will not converge.",
+            conclusions,
+            "share of the angles, by 30 deg, at which the iteration settles from planar estimates of theta2 and theta3 that "
+            "are off by 60, 120 and 180 deg, our choice: the one by as much as the other, the opposite way",
+            "none of a share",
+            (
+                at_most("in the plane, a4 = 0, 10, 20, 30 in", 0.0, settled),
+                at_most(f"out of the plane: {within}", 0.0, settled_out),
+            ),
+            f"in the plane it settles on the loop sought from {100.0 * on_it:.0f} % of these estimates, and from the others on "
+            "another closed loop, with the slider on the other side; out of the plane on open loops",
+        ),
+        Statement(
+            "Usually the process converges in 3 to 6 iterations if estimates are within 20 degrees, which is quite "
+            "possible by using the direct formula for the planar case.",
+            conclusions,
+            "share of the angles at which 3 to 6 corrections are made, which depends on when a correction counts as small; "
+            "greatest difference of the planar estimates (section 2.6.2, theta1 = 0) from the angles of the closed loop",
+            "more than half, as *usually* says; 20 deg as stated",
+            (
+                at_least(
+                    "in the plane, a4 = 0, 10, 20, 30 in, from estimates 20 deg off",
+                    0.5,
+                    np.mean((close_by >= 3) & (close_by <= 6)),
+                ),
+                at_least(
+                    f"out of the plane, from the angle before: {within}", 0.5, np.mean((outside >= 3) & (outside <= 6))
+                ),
+                *(at_most(f"estimates, {full_name(case)}", "20", _estimate_error(case), "deg") for case in OUT),
+            ),
+            f"out of the plane up to {np.max(outside):.0f} corrections are made, since there is no loop to converge to, and "
+            "with a twist the planar eta2 = 0 is off by more",
+        ),
+        Statement(
+            "Another great disadvantage is that matrix A may become singular. Fortunately it never happened while "
+            "running the program.",
+            conclusions,
+            "least singular value of A relative to its greatest, where the iteration ends",
+            ROUNDING,
+            (
+                nothing(
+                    "may: rod at right angles to the guide, which it reaches from a4 = 38 in on", _at_right_angles()
+                ),
+                *(
+                    at_least(f"never: over the turn, {case.name}", NOTHING, least)
+                    for case, least in zip((PLANE, *OPEN), singular)
+                ),
+                at_least(
+                    f"never: least of the {len(OUT)} cases of the figures out of the plane",
+                    NOTHING,
+                    min(map(_condition, OUT)),
+                ),
+            ),
+        ),
+    )
+    return StudyResult(
+        number="rahman-closure",
+        claim="Rahman states: the iteration of section 2.6.1 finds theta2, eta2, theta3, eta3 and S4 for given theta1 and S1.",
+        assignment=f"The iteration runs round the turn by {STEP_DEG:g} deg, from the planar estimate at theta1 = 0 and then "
+        f"from the angle before. It settles where a correction is below {STEP:g} rad and {STEP:g} in, within {MAX_STEPS} "
+        "corrections: our choice, since the thesis gives neither the step, the accuracy nor the number.",
+        columns=padded(columns),
+        statements=statements,
+    )
+
+
+#: The study by its name.
+STUDIES = {"rahman-closure": Study("rahman-closure", unvaried(closure), draw)}

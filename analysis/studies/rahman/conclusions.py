@@ -1,0 +1,130 @@
+"""What section 3.3 concludes of the method, judged."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..statements import Statement, at_least, near, text
+from ..study import Study, StudyResult
+from ..variation import unvaried
+from .closure import endings
+from .figures import (
+    ALL,
+    FROM_DEAD,
+    NOTHING,
+    ROUNDING,
+    clear,
+    nothing,
+    values,
+)
+from .forces import PLANAR, planar_forces
+from .method import (
+    OUT,
+    PLANE,
+)
+from .table import COMPONENTS
+
+
+def conclusions() -> StudyResult:
+    """Judge what section 3.3 says of the method as a whole."""
+    ended = endings(0.0, OUT, 6)
+    cases = (
+        f"the {len(ended)} cases of the figures that are out of the plane whose loop the printed iteration closes, from the "
+        "planar estimate at every 30 deg"
+    )
+    closed = float(np.mean([found.rotation_residual.max() < NOTHING for found in ended]))
+    numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
+    right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
+    static = planar_forces(erratum_5=True, erratum_6=True, share=0.0)
+    at, errors = clear(PLANE), []
+    for mended in (False, True):
+        found = planar_forces(erratum_5=mended, erratum_6=mended)
+        errors.append(
+            max(
+                float(np.abs(found[s] - right[s])[at].max() / np.abs(right[s] - static[s])[at].max())
+                for s in PLANAR
+                if np.abs(right[s] - static[s])[at].max() > NOTHING
+            )
+        )
+    printed = planar_forces(erratum_5=False, erratum_6=False)
+    sizing = max(float(np.abs(printed[s] - right[s])[at].max() / np.abs(right[s])[at].max()) for s in PLANAR)
+    shaking = {s: right[s] - static[s] for s in ("1F1i", "1F1j")}
+    balancing = max(float(np.abs(printed[s] - right[s])[at].max() / np.abs(x)[at].max()) for s, x in shaking.items())
+    varied = sum(len(set(values)) > 1 for values in list(zip(*ALL))[1:])
+    kinds, place, last = "dimensions that are varied", text("section 3.3, L1129"), text("section 3.3, L1131")
+    return StudyResult(
+        number="rahman-conclusions",
+        claim="Rahman states: the method serves the design of spatial mechanisms, and is general, concise and economical. What "
+        "section 3.3 says of displacements, forces and convergence is judged at Figs R5, R8, R14 and in "
+        "rahman-closure.",
+        statements=(
+            Statement(
+                "This [agreement in the plane] verifies the feasibility of the method.",
+                text("section 3.2, L1111"),
+                f"share of {cases}",
+                "all of them",
+                (at_least("cases closed", 1.0, closed),),
+                "the plane, in which eta2 = eta3 = 0, does not show erratum 1",
+            ),
+            Statement(
+                "Since the present work investigates dynamic forces and torques at each joint of a slider crank with "
+                "all kinds of manufacturing tolerances, the results provide information needed for the sizing and "
+                "dynamic balancing of a high speed slider crank in the design stage.",
+                place,
+                f"{kinds}, of the five that the mechanism has: a1, a2, a4, S1, alpha4; greatest error by the printed equations "
+                f"in the plane, a4 = 10 in, {FROM_DEAD}: for sizing, of a joint force relative to its greatest value, for "
+                "balancing, of the force on the crank's bearing relative to the greatest part of it that inertia has",
+                f"none of a count; {ROUNDING}",
+                (
+                    near(kinds, 5.0, varied, 0.0),
+                    nothing("for sizing, joint forces", sizing),
+                    nothing("for balancing, bearing", balancing),
+                ),
+                "the lengths of crank and rod are not varied, nor is clearance in the joints; errata 5 and 6",
+            ),
+            Statement(
+                "This analysis can be used to determine the effect and significance of the inertia forces acting on "
+                "each link due to its own mass and mass moment of inertia.",
+                place,
+                "greatest error of a joint force by the printed equations in the plane, a4 = 10 in, relative to the greatest "
+                f"part of it that inertia has, {FROM_DEAD}",
+                ROUNDING,
+                (nothing("as printed", errors[0]),),
+                f"errata 5 and 6; with both mended the error is {errors[1]:.1g}",
+            ),
+            Statement(
+                "It is expected that this investigation will enable designers to have better insight into the "
+                "designing and testing of high speed spatial mechanisms and robot manipulators.",
+                place,
+                why="an expectation, for which the thesis gives no measure",
+            ),
+            Statement(
+                "Since this method is well adapted for digital computation, any complex system can be analyzed using this "
+                "analytical tool.",
+                last,
+                f"share of {cases}",
+                "all of them",
+                (at_least("cases closed", 1.0, closed),),
+                "it does not analyse its own mechanism out of the plane (erratum 1)",
+            ),
+            Statement(
+                "The main advantages of this method are its generality and that all calculations can be performed on "
+                "digital computer.",
+                last,
+                f"generality: share of {cases}; calculations: share of them in which it ends with numbers all over the turn",
+                "all of them",
+                (at_least("generality", 1.0, closed), at_least("calculations", 1.0, numbers)),
+                "it is not general (erratum 1)",
+            ),
+            Statement(
+                "Other advantages are that this method is concise, flexible, economical and its analytical approach "
+                "is independent of visualization.",
+                last,
+                why="the thesis gives no measure of any of these",
+            ),
+        ),
+    )
+
+
+#: The study by its name.
+STUDIES = {"rahman-conclusions": Study("rahman-conclusions", unvaried(conclusions))}

@@ -1,0 +1,461 @@
+"""The force equations judged: momenta, in the plane and out of it, sections 2.8 and 3.1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from linkwork.slider_crank.published import parameters
+
+from ...numerics.dual import Dual, about_i, about_j, about_k, apply
+from ...slider_crank.closure import planar
+from ...slider_crank.dual_dynamics import Binor
+from ...units import INCH
+from ..rules import ABNORMAL, VERY_CLOSE_DEG
+from ..statements import Case as Judged
+from ..statements import Statement, at_least, text
+from ..study import Study, StudyResult, padded
+from ..variation import unvaried
+from .figures import (
+    ANGLE,
+    ANGLES_DEG,
+    CRANK,
+    FROM_DEAD,
+    ROUNDING,
+    TORQUE,
+    clear,
+    dead_centres_deg,
+    nothing,
+    values,
+)
+from .method import (
+    AT_RATES,
+    AWAY,
+    CLEAR_SINE,
+    DOTS,
+    G3,
+    MAYBE,
+    MOVING,
+    PLANE,
+    ROD,
+    ROW_F,
+    WATER,
+    FloatArray,
+    draw,
+    followed,
+    joints,
+)
+from .printed import (
+    CRANK_AT_SPEED,
+    GENERAL,
+    ROD_X_SQUARE,
+    SLIDER_SQUARE,
+    Crank,
+    Joints,
+    bodies,
+    crank_momentum,
+    forward_momentum_rates,
+    forward_rod_momentum,
+    forward_rod_velocity,
+    forward_slider_momentum,
+    forward_slider_velocity,
+    inertia_force,
+    inertia_forces,
+    joint_accelerations,
+    joint_forces,
+    joint_rates,
+    later,
+    momenta,
+    momentum_rates,
+    on_crank,
+    velocities,
+)
+from .table import COMPONENTS, Case
+
+PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
+
+
+def planar_forces(*, erratum_5: bool, erratum_6: bool, share: float = 1.0) -> dict[str, FloatArray]:
+    """Return the forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not.
+
+    ``share`` is that of the masses which is taken: 0 leaves the inertia out.
+    """
+    p, angle = parameters(PLANE.offset_in), np.radians(ANGLES_DEG)
+    q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
+    r = joint_rates(CRANK_AT_SPEED, q)
+    seconds = joint_accelerations(CRANK_AT_SPEED, q, r)
+    b = bodies(p, erratum_6=erratum_6)
+    b = b._replace(masses=tuple(share * mass for mass in b.masses))
+    found = joint_forces(CRANK_AT_SPEED, b, q, r, seconds, TORQUE, erratum_5=erratum_5)
+    found["1F1i"], found["1F1j"] = on_crank(angle, found)
+    return found
+
+
+def _binors() -> tuple[Binor, Binor, Binor]:
+    """Return the inertia binors of eqs 46 to 48 of the bodies of section 3.1, in lb.s2 and inches."""
+    b = bodies(parameters())
+    squares = ((0.0, b.crank_square), (ROD_X_SQUARE, b.rod_square), (SLIDER_SQUARE, SLIDER_SQUARE))
+    first, second, third = (
+        Binor(mass=m, moment=m * np.array([g, 0.0, 0.0]), inertia=m * np.diag([x, yz, yz]))
+        for m, g, (x, yz) in zip(b.masses, (b.g1, b.g2, 0.0), squares)
+    )
+    return first, second, third
+
+
+def _balances() -> tuple[float, ...]:
+    """Return the greatest residuals of eqs 62 to 64 with the right forces in the plane, erratum 6 mended (lb, lb.in)."""
+    p, angle, b = parameters(PLANE.offset_in), np.radians(ANGLES_DEG), bodies(parameters(), erratum_6=True)
+    q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
+    r = joint_rates(CRANK_AT_SPEED, q)
+    inertia = inertia_forces(CRANK_AT_SPEED, b, q, r, joint_accelerations(CRANK_AT_SPEED, q, r))
+    first, second, third, fourth = (
+        np.stack([values(PLANE, COMPONENTS[f"{n}F{n}{axis}"]) for axis in "ijk"], -1) for n in (1, 2, 3, 4)
+    )
+    zero, moment = np.zeros_like(angle), np.zeros_like(first)
+    moment[:, 2] = TORQUE
+    crank = about_k(Dual(angle, zero)) @ about_i(Dual(zero, CRANK))
+    rod = about_k(q.th2) @ about_j(q.eta2) @ about_i(Dual(zero, ROD))
+    slider = about_k(q.th3) @ about_j(q.eta3) @ about_i(zero + 0.5 * np.pi)
+    left = [
+        apply(matrix.T, before) + Dual(after) + force
+        for matrix, before, after, force in zip(
+            (crank, rod, slider), (Dual(first, moment), Dual(second), Dual(third)), (second, third, fourth), inertia
+        )
+    ]
+    at = clear(PLANE)
+    return tuple(float(max(np.abs(x.real[at]).max(), np.abs(x.dual[at]).max())) for x in left)
+
+
+def velocity_paths() -> list[Judged]:
+    """Judge the forward path against the mixed path by the rod's momentum, eqs 50 and 52, in the plane and out of it."""
+    b, rod = bodies(parameters()), _binors()[1]
+    found = []
+    for case in (PLANE, *ROW_F):
+        q = joints(followed(case).unknowns[:, 0])
+        q = Joints(*(x[np.abs(np.sin(q.th2)) > CLEAR_SINE] for x in q))
+        r = joint_rates(CRANK_AT_SPEED, q)
+        forward = rod.momentum(forward_rod_velocity(CRANK_AT_SPEED, q, r))
+        _, mixed, _ = momenta(CRANK_AT_SPEED, b, q, r)
+        found.append(nothing(case.name, forward.real - mixed.real, "lb.s"))
+    return found
+
+
+def replacements() -> list[Judged]:
+    """Judge eqs 57 and 58 against 55 and 56, with rates and accelerations as printed, in the plane and out of it."""
+    b, found = bodies(parameters()), []
+    for case in (PLANE, *ROW_F):
+        apart = []
+        for q in map(Joints._make, np.stack(joints(followed(case).unknowns[:, 0]), -1)):
+            if np.abs(np.sin(q.th2)) > CLEAR_SINE:
+                r = joint_rates(CRANK_AT_SPEED, q)
+                a = joint_accelerations(CRANK_AT_SPEED, q, r)
+                pairs = zip(forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(b, q, r, a)[1:])
+                apart += [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
+        found.append(nothing(f"57, 58 less 55, 56; {case.name}", max(apart), "lb"))
+    return found
+
+
+def _apart(a: Dual, b: Dual) -> float:
+    """Return the greatest difference of two dual vectors."""
+    return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
+
+
+def _momenta() -> tuple[Statement, ...]:
+    """Judge eqs 49a to 61 in the general position against the binors of eqs 46 to 48."""
+    b, still = bodies(parameters()), CRANK_AT_SPEED
+    r, unmoved = joint_rates(MOVING, GENERAL), joint_rates(still, GENERAL)
+    of_crank, of_rod, of_slider = _binors()
+    at_g3 = Binor(mass=of_slider.mass, moment=of_slider.mass * np.array([G3, 0.0, 0.0]), inertia=of_slider.inertia)
+    moving = velocities(MOVING, GENERAL, r)
+    rod = forward_rod_momentum(MOVING, b, GENERAL, r)
+    slider = forward_slider_momentum(MOVING, b, GENERAL, r, G3, slip=True)
+    wrong = slider - at_g3.momentum(forward_slider_velocity(MOVING, GENERAL, r))
+    as_printed = momenta(MOVING, b, GENERAL, r, slip=True)
+    # the rates of eqs 54 to 56, and what they are the rates of, a moment later
+    seconds = joint_accelerations(MOVING, GENERAL, r)
+    of_rates = Crank(CRANK, ROD, MOVING.acceleration, MOVING.shift_acceleration)
+    to_come = later(MOVING, GENERAL, r, seconds)
+    rod_rate, slider_rate = forward_momentum_rates(MOVING, b, GENERAL, r, seconds, G3)
+    forward = {
+        "eq 54": (crank_momentum(of_rates, b), crank_momentum(to_come[0], b)),
+        "eq 55": (rod_rate, b.masses[1] * forward_rod_momentum(to_come[0], b, *to_come[1:])),
+        "eq 56": (slider_rate, forward_slider_momentum(to_come[0], b, *to_come[1:], G3)),
+    }
+    a = joint_accelerations(still, GENERAL, unmoved)
+    _, *moved = later(still, GENERAL, unmoved, a)
+    printed_rates = momentum_rates(b, GENERAL, unmoved, a)
+    steady, momentum = velocities(still, GENERAL, unmoved), momenta(still, b, GENERAL, unmoved)
+    accelerations = [Dual(v.real.imag / 1e-20, v.dual.imag / 1e-20) for v in velocities(still, *moved)]
+    inertia = [
+        _apart(inertia_force(v, h, rate), binor.rate(v, acceleration))
+        for v, h, rate, binor, acceleration in zip(steady, momentum, printed_rates, _binors(), accelerations)
+    ]
+
+    def turned(h: Dual) -> Dual:
+        return Dual(h.real.imag / 1e-20, h.dual.imag / 1e-20)
+
+    return (
+        Statement(
+            "Formulations for the dual momentum of link 1, i.e. the crank in terms of frame {2}, of link 2, i.e. the "
+            "connecting rod, in terms frame {3} and of link 3, i.e. the slider, in terms of frame {4}, can "
+            "respectively be obtained by modifying equations (49), (50) and (51) to 3\N{MULTIPLICATION SIGN}1 "
+            "dual-number matrix equations as shown below",
+            text("section 2.8, eqs 49a to 51a, L700-728"),
+            "difference from the binors of eqs 46 to 48 times the velocities of eqs 33, 35 and 45, in a general position with "
+            f"S1' = 1.3 in/s and g3 = {G3:g} in",
+            ROUNDING,
+            (
+                nothing("eq 49a", _apart(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
+                nothing(
+                    "eq 50a",
+                    _apart(rod * b.masses[1], of_rod.momentum(forward_rod_velocity(MOVING, GENERAL, r))),
+                    "lb.s",
+                ),
+                nothing("eq 51a, components i and k", [wrong.real[[0, 2]], wrong.dual[[0, 2]]], "lb.s"),
+                nothing("eq 51a, component j", [wrong.real[1], wrong.dual[1]], "lb.s"),
+            ),
+            f"erratum 9: cos theta3 for cos eta3 in 51a, {MAYBE}",
+        ),
+        Statement(
+            "Now, alternative expressions for (50a) and (51a) using the backward path are respectively",
+            text("section 2.8, eqs 52a, 53a, L744-748"),
+            "difference from the binors times the velocities of eqs 36 and 32a, in a general position",
+            ROUNDING,
+            (
+                nothing("eq 52a", _apart(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
+                nothing("eq 53a", _apart(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
+            ),
+            f"erratum 9: g3 for g2 in 52a, {MAYBE}",
+        ),
+        Statement(
+            "In either case [all by the forward path, or some by the backward path], the same numerical results are "
+            "obtained, but mixed path equations set is much simpler than only the forward path equations set. ... Both the "
+            "sets were tested by the program for a number of cases and resulted in same outcome.",
+            text("section 2.8, L637-639, L750"),
+            "greatest difference of the force part of the rod's momentum by the forward path (eqs 35, 50) from that "
+            f"by the mixed path (eqs 36, 52 with g2), over the turn, {AWAY}",
+            ROUNDING,
+            tuple(velocity_paths()),
+            "erratum 3: the paths differ by the unsolved row 37f out of the plane; that the mixed set is simpler is plain",
+        ),
+        Statement(
+            "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
+            "equations are obtained respectively:",
+            text("section 2.8, eqs 54 to 56, L754-846"),
+            "difference from the rates of eqs 49a to 51a, the last with cos eta3 for cos theta3, in a general position "
+            f"{AT_RATES}, g3 = {G3:g} in; {DOTS}, as are one bracket inside 56d and one inside 56e, and the last of 56c to 56f",
+            ROUNDING,
+            tuple(nothing(label, _apart(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
+            "56 has cos eta3 where 51a has cos theta3 (erratum 9)",
+        ),
+        Statement(
+            "Now, backward path equations (52a) and (53a) are differentiated with respect to time. The following "
+            "equations are replacements for equations (55) and (56) respectively.",
+            text("section 2.8, eqs 57, 58, L848-857"),
+            "difference from the rates of eqs 52a, with g2 for g3, and 53a in a general position, speed and shift constant, "
+            f"g3 = 0; greatest difference of the force parts of 57 from 55 and of 58 from 56 over the turn, {AWAY}; {DOTS}",
+            ROUNDING,
+            (
+                *(
+                    nothing(label, _apart(rate, turned(h)), "lb")
+                    for label, rate, h in zip(("eq 57", "eq 58"), printed_rates[1:], momenta(still, b, *moved)[1:])
+                ),
+                *replacements(),
+            ),
+            "erratum 3: out of the plane they are no replacements, as the velocities differ that the two paths give",
+        ),
+        Statement(
+            "In this step, equations for the inertia forces of link 1 (i.e. the crank) relative to frame {2}, for "
+            "link 2 (i.e. the connecting rod) relative to frame {3} and for link 3 (i.e. the slider) relative to "
+            "frame {4} are derived.",
+            text("section 2.8, eqs 59 to 61, L863-881"),
+            "difference from the rate of momentum in a frame at rest, by the binors, in a general position at constant speed "
+            "and shift; the sign with which it enters is judged at eqs 62 to 64",
+            ROUNDING,
+            tuple(nothing(label, size, "lb") for label, size in zip(("eq 59", "eq 60", "eq 61"), inertia)),
+        ),
+    )
+
+
+def _expanded() -> dict[str, FloatArray]:
+    """Return by how much the joint forces in eqs 62a to 64f differ from those in eqs 62 to 64."""
+    th1, shift, (th2, eta2, th3, eta3, _) = 0.9, 3.5, (float(value) for value in GENERAL)
+    (s, s2, se, s3, sh), (c, c2, ce, c3, ch) = (f([th1, th2, eta2, th3, eta3]) for f in (np.sin, np.cos))
+    i, j, k = force = np.array([30.0, -50.0, 70.0])
+    ti, tj, tk = moment = np.array([110.0, 130.0, -170.0])
+    crank = about_k(Dual(th1, shift)) @ about_i(Dual(0.0, CRANK))
+    rod = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, ROD))
+    slider = about_k(th3) @ about_j(eta3) @ about_i(0.5 * np.pi)
+    printed = {
+        62: [
+            (i * c + j * s, -j * s + j * c, k),
+            (
+                ti * c - i * shift * s + j * shift * c + tj * s,
+                -ti * s - i * shift * c + tj * c - j * shift * s + CRANK * k,
+                i * CRANK * s - j * CRANK * c + tk,
+            ),
+        ],
+        63: [
+            (i * c2 * ce + j * s2 * ce - k * se, -i * s2 + j * c2, i * c2 * se + j * s2 * se + k * ce),
+            (0.0, i * ROD * c2 * se + j * ROD * s2 * se + ROD * k * ce, i * ROD * s2 - j * ROD * c2),
+        ],
+        64: [
+            (i * c3 * ch + j * s3 * ch - k * sh, i * c3 * sh + j * s3 * sh + k * ch, i * s3 - j * c3),
+            (0.0, 0.0, 0.0),
+        ],
+    }
+    right = (apply(crank.T, Dual(force, moment)), apply(rod.T, Dual(force)), apply(slider.T, Dual(force)))
+    apart = {eq: np.transpose(printed[eq]) - np.transpose([f.real, f.dual]) for eq, f in zip(printed, right)}
+    slip = apart[62][1, 0]
+    apart[62][1, 0] = 0.0
+    return {"eq 62c": slip, **{f"eqs {eq}a to {eq}f{', but for 62c' * (eq == 62)}": left for eq, left in apart.items()}}
+
+
+def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
+    """Judge eqs 62c, 63b, 69h and 69k, the manipulations of section 3.2, and the data of section 3.1."""
+    angle, at = np.radians(ANGLES_DEG), clear(PLANE)
+    crank, b = CRANK_AT_SPEED, bodies(parameters())
+    r = joint_rates(crank, GENERAL)
+    general = joint_forces(crank, b, GENERAL, r, joint_accelerations(crank, GENERAL, r), TORQUE)
+    s, c, inertia = np.sin(angle), np.cos(angle), -(right["along crank"] + right["2F2i"])
+    wrong = dict(right)
+    wrong["2F2i"] = right["2F2i"] + 1.0
+    for _ in range(10):
+        wrong["along crank"] = -(wrong["2F2i"] + inertia)
+        i, j = on_crank(angle, wrong)
+        wrong["2F2i"] = -i * c - j * s - inertia
+    left = float(np.abs(wrong["2F2i"] - right["2F2i"])[at].max())
+    high = [
+        np.abs(right["2F2i"][np.abs(ANGLES_DEG - centre) < VERY_CLOSE_DEG]).max() / np.abs(right["2F2i"][at]).max()
+        for centre in dead_centres_deg(PLANE)
+    ]
+    (crank_mass, *_), volume = b.masses, np.pi * 1.5**2 * CRANK
+    gravity = 0.28 * WATER * volume / 386.4 / crank_mass
+    return (
+        Statement(
+            "Expanding equations (62), (63), (64) and separating primary and dual parts, the following equations are "
+            "obtained:",
+            text("section 2.8, eqs 62a to 64f, L907-943"),
+            "difference from eqs 62 to 64 with the matrices of eqs 1 to 3, any forces and moments in a general position, "
+            "lengths in inches",
+            ROUNDING,
+            tuple(nothing(words, size, "lb") for words, size in _expanded().items()),
+            f"erratum 9: 1F1j for 1F1i in 62c, {MAYBE}",
+        ),
+        Statement(
+            "There are eighteen equations out of which one does not give any solution (equation (63b)), since it is "
+            "of the form 0=0; confirmation of this was done by evaluating it in the computer program.",
+            text("section 2.8, eq 63b, L923, L945"),
+            "f2xd in a general position",
+            ROUNDING,
+            (nothing("f2xd", general["f2xd"], "lb.in"),),
+        ),
+        Statement(
+            "This [division by sin theta2], in fact, resulted in some abnormal outcomes when values of angle [theta2] were "
+            "very close to zero, while running the program.",
+            text("section 2.8, eq 69h, L995"),
+            f"greatest 2F2i by eq 69h, at half degrees of the crank, within {VERY_CLOSE_DEG:g} deg of the dead centre at which "
+            f"theta2 is 0, relative to that {FROM_DEAD}; in the plane, a4 = 10 in, errata 5 and 6 mended",
+            f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*",
+            (at_least("2F2i", ABNORMAL, high[0]),),
+            "it grows without bound, and the outcome is right: the force that a torque calls forth is infinite there. At the "
+            f"second dead centre, where theta2 is 180 deg, it is so too, by {high[1]:.0f} times",
+        ),
+        Statement(
+            "If [equation (62a) is] not satisfied, then a better value of the force [2F2i] is found from the following "
+            "equation (69k), using previously found values of the terms [1F1i] and [1F1j] from the equations (69i) and (69j) "
+            "respectively.",
+            text("section 2.8, L1007-1009"),
+            "error of 2F2i after ten passes of eqs 69i, 69j, 69k from an error of 1 lb",
+            ROUNDING,
+            (nothing("2F2i", left, "lb"),),
+            "erratum 8: 69i and 69j satisfy 62a for any 2F2i",
+        ),
+        Statement(
+            "Interestingly, by manual manipulation of the equation those components [4T4 and 2F2k] are also found to be zero.",
+            text("section 3.2, L1117"),
+            "by the printed equations in a general position",
+            ROUNDING,
+            tuple(
+                nothing(symbol, general[symbol], "lb.in" if "T" in symbol else "lb")
+                for symbol in ("4T4i", "4T4j", "4T4k", "2F2k")
+            ),
+            "the equations put 1F1k to zero, and with it 2F2k (erratum 7)",
+        ),
+        Statement(
+            "By manual manipulation that force component [2F2j] is found to be negative of the ratio of input torque (100 "
+            "lb-in) and the crank length (12 inches).",
+            text("section 3.2, L1119; eq 69g, L989"),
+            "2F2j by eq 69g plus T/a1 in a general position",
+            ROUNDING,
+            (nothing("2F2j + T/a1", general["2F2j"] + TORQUE / CRANK, "lb"),),
+        ),
+        Statement(
+            "Specific gravity of the material (mild steel is used for all the links) d = 0.28,",
+            text("section 3.1, L1071"),
+            "mass of a crank of that specific gravity less m1, relative to m1",
+            ROUNDING,
+            (nothing("m1", gravity - 1.0),),
+            "erratum 9: 0.28 is the weight density in lb/in3",
+        ),
+    )
+
+
+def forces() -> StudyResult:
+    """Compute the force equations in the plane, as printed and mended."""
+    columns, at = {ANGLE: ANGLES_DEG}, clear(PLANE)
+    right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
+    columns["4F4k right [lb]"] = right["4F4k"]
+    found = {
+        "as printed": planar_forces(erratum_5=False, erratum_6=False),
+        "erratum 6 mended": planar_forces(erratum_5=False, erratum_6=True),
+        "erratum 5 mended": planar_forces(erratum_5=True, erratum_6=False),
+        "both mended": planar_forces(erratum_5=True, erratum_6=True),
+    }
+    columns |= {f"4F4k {words} [lb]": of["4F4k"] for words, of in found.items()}
+    wrong = {words: max(float(np.abs(of[s] - right[s])[at].max()) for s in PLANAR) for words, of in found.items()}
+    flat = max(float(np.max(followed(Case("", a4, 0.0, 270.0)).error_in)) for a4 in (0.0, 10.0, 20.0, 30.0))
+    worst = (
+        "greatest difference of a joint force from that by Newton and Euler (our model) in the plane, a4 = 10 in, "
+        f"{FROM_DEAD}"
+    )
+    unbalanced = zip(("eq 62", "eq 63", "eq 64"), _balances())
+    return StudyResult(
+        number="rahman-forces",
+        claim="Rahman states: in the plane the program gives the same as the complex algebra method.",
+        columns=padded(columns),
+        statements=(
+            Statement(
+                "The program was first tested for the planar case and the results found to be same as that obtained "
+                "by the complex algebra method, a widely used procedure for analyzing planar mechanisms.",
+                text("section 3.2, L1111"),
+                f"error of S4 by the printed iteration, a4 = 0, 10, 20, 30 in; {worst}, by the printed equations",
+                ROUNDING,
+                (nothing("S4", flat, "in"), nothing("joint forces", wrong["as printed"], "lb")),
+                "errata 5 and 6; with both mended the forces are right",
+            ),
+            *_momenta(),
+            Statement(
+                "The force equations for links 1, 2 and 3 are respectively as follows:",
+                text("section 2.8, eqs 62 to 64, L885-891"),
+                "greatest residual with the joint forces by Newton and Euler (our model) and erratum 6 mended, in the plane, "
+                f"a4 = 10 in, {FROM_DEAD}",
+                ROUNDING,
+                tuple(nothing(label, left, "lb") for label, left in unbalanced),
+                "erratum 5: f1 and f3 have the wrong sign",
+            ),
+            Statement(
+                "Location of center of the crank [g1 = a1/2], Location of center of mass of the connecting rod [g2 = "
+                "a2/2],",
+                text("section 3.1, L1085-1087"),
+                f"{worst}, by the printed equations with erratum 5 mended",
+                ROUNDING,
+                (nothing("joint forces", wrong["erratum 5 mended"], "lb"),),
+                "erratum 6: from the distal joints both are negative",
+            ),
+            *_slips(found["both mended"]),
+        ),
+    )
+
+
+#: The study by its name.
+STUDIES = {"rahman-forces": Study("rahman-forces", unvaried(forces), draw)}

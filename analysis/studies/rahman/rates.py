@@ -1,0 +1,333 @@
+"""Velocities and accelerations of the joints judged, sections 2.7 and 2.8."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from linkwork.slider_crank.published import CRANK_SPEED, parameters
+
+from ...numerics.dual import Dual, about_j, about_k, axial
+from ...slider_crank import settle
+from ...slider_crank.closure import planar
+from ...units import INCH
+from ..rules import ABNORMAL, ABOUT_DEG, VERY_CLOSE_DEG
+from ..statements import Statement, at_least, at_most, near, text
+from ..study import Study, StudyResult, padded
+from ..variation import unvaried
+from .figures import (
+    ANGLE,
+    ANGLES_DEG,
+    CRANK,
+    NOTHING,
+    OFFSETS,
+    ROUNDING,
+    dead_centres_deg,
+    full_name,
+    nothing,
+)
+from .method import (
+    AT_RATES,
+    AWAY,
+    CLEAR_SINE,
+    DOTS,
+    MAYBE,
+    MOVING,
+    ROD,
+    ROW_F,
+    FloatArray,
+    H,
+    draw,
+    followed,
+    joints,
+)
+from .printed import (
+    CRANK_AT_SPEED,
+    GENERAL,
+    GRID_DEG,
+    MAX_STEPS,
+    STEP_DEG,
+    Joints,
+    joint_accelerations,
+    joint_rates,
+    later,
+    loop_rates,
+    mended_row,
+)
+from .table import Case
+
+
+def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the residual of row 37f (in/s) on the grid: as printed, NaN where eq 41 is unbounded, and by erratum 2."""
+    p, q = parameters(case.offset_in, case.twist_deg), joints(followed(case).unknowns[:, 0])
+    lacking = loop_rates(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))[5]
+    shift = np.full(GRID_DEG.size, case.shift_in * INCH)
+    mended = mended_row(p, np.radians(GRID_DEG), shift, q, CRANK_SPEED)
+    return np.where(np.abs(np.sin(q.th2)) > CLEAR_SINE, lacking, np.nan), mended
+
+
+def _angular_velocity() -> float:
+    """Return the difference (rad/s) of eqs 30 and 31 from the angular velocity of Z(theta) Y(eta), by a difference quotient."""
+    th, eta, th_rate, eta_rate = 0.8, 0.3, 1.7, -2.1
+    before, now, after = (about_k(th + h * th_rate).real @ about_j(eta + h * eta_rate).real for h in (-H, 0.0, H))
+    omega = axial(Dual((after - before) / (2.0 * H) @ now.T)).real
+    return float(np.linalg.norm(omega - [0.0, eta_rate, th_rate]))
+
+
+def _sinusoidal(ratio: float) -> tuple[float, float]:
+    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) as rates of eqs 28 and 28a mended, at an alpha."""
+    amplitude, angle, speed, acceleration, h = 2.0, 0.9, CRANK_SPEED, 3.0, 1e-20
+    # derivatives along the motion by a complex step, which has no rounding error
+    moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration
+    shift = amplitude * np.sin(ratio * moved)
+    rate = ratio * amplitude * np.cos(ratio * moved) * quicker
+    printed_rate = ratio * shift.real * np.cos(ratio * angle) * speed
+    printed_second = (
+        ratio * amplitude * (np.cos(ratio * angle) * acceleration - ratio * np.sin(ratio * angle) * speed**2)
+    )
+    return float(printed_rate - shift.imag / h), float(printed_second - rate.imag / h)
+
+
+def _printed_rates() -> tuple[Statement, ...]:
+    """Judge eqs 28a to 31 and 37 to 43, 38a to 42a in the general position, with the shift in motion."""
+    crank = MOVING
+    right = loop_rates(crank, GENERAL, Joints(*np.zeros(5)))
+    matrix = np.stack([loop_rates(crank, GENERAL, Joints(*unit)) - right for unit in np.eye(5)], -1)
+    ranks = [int(np.linalg.matrix_rank(m)) for m in (matrix, np.column_stack([matrix, right]))]
+    solved, rates = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
+    seconds = joint_accelerations(crank, GENERAL, rates)
+    quicker, moved, _ = later(crank, GENERAL, rates, seconds)
+    rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(quicker, moved)))
+    (s2, se, s3), (c2, ce, c3) = (f([GENERAL.th2, GENERAL.eta2, GENERAL.th3]) for f in (np.sin, np.cos))
+    # eq 38 as printed, in the order theta2', theta3', eta2', eta3', S4'
+    coefficients = np.array(
+        [
+            [-se, 0.0, s2 * ce, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, s3],
+            [0.0, 0.0, c2, 1.0, 0.0],
+            [ROD * ce, 0.0, ROD * s2 * se, 0.0, -c3],
+            [ce, 1.0, s2 * se, 0.0, 0.0],
+            [0.0, 0.0, -ROD * c2, 0.0, 0.0],
+        ]
+    )
+    w, v = crank.speed, crank.shift_rate
+    column = [
+        w * se,
+        -w * CRANK * s2 * ce + v * se,
+        0.0,
+        -w * (CRANK * c2 + ROD * ce),
+        -w * ce,
+        -w * CRANK * s2 - v * ce,
+    ]
+    order = [Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
+    eq_38 = np.column_stack([coefficients, column]) - np.column_stack([matrix[:, order], -right])
+    ratios = (0.5, 1.0, 2.0)
+    slips = {ratio: _sinusoidal(ratio) for ratio in ratios}
+    names = ("theta2' by eq 39", "eta2' by eq 41", "theta3' by eq 40", "eta3' by eq 42", "S4' by eq 43")
+    reasons = ("erratum 4: no cos^2 eta2", "", "", "", "")
+    errors = [
+        nothing(name, a - b, "in/s" if "S4" in name else "rad/s", why=why)
+        for name, a, b, why in zip(names, rates, solved, reasons)
+    ]
+    unsolved = [
+        nothing(
+            f"row 37f, {case.name}",
+            np.nanmax(np.abs(row_f(case)[0])),
+            "in/s",
+            why=why,
+        )
+        for case, why in zip(ROW_F, 2 * ("erratum 3: it is left unsolved",))
+    ]
+    return (
+        Statement(
+            "where symbols [eta2'] and [theta2'] denote rotational velocities about the [j2] and [k2] axes at joint 2 "
+            "respectively.",
+            text("section 2.7, eqs 30, 31, L503-509"),
+            "angular velocity by eq 30 less that of the matrix Z(theta) Y(eta) of eq 2, at theta = 0.8, eta = 0.3 "
+            "rad, with rates of 1.7 and -2.1 rad/s",
+            ROUNDING,
+            (nothing("angular velocity", _angular_velocity(), "rad/s"),),
+            "erratum 2: eta turns about the axis j that theta has turned",
+        ),
+        Statement(
+            "Now separating the unknowns to form a column matrix and a coefficient matrix, the product of these two "
+            "matrices must be equal to some column matrix as shown below:",
+            text("section 2.7, eq 38, L559-561"),
+            "coefficients and right side of eq 38 less those of eqs 37a to 37f, in a general position with S1' = 1.3 in/s",
+            ROUNDING,
+            (
+                nothing("coefficients, and right side of rows 1 to 5", [*eq_38[:, :5].ravel(), *eq_38[:5, 5]]),
+                nothing("right side of row 6", eq_38[5, 5], "in/s"),
+            ),
+            f"erratum 9: sin theta2 lacks sin eta2, {MAYBE}",
+        ),
+        Statement(
+            "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
+            text("section 2.7, L563"),
+            "ranks in a general position; a solution needs equal ones",
+            "none of a count",
+            (
+                near("coefficients", "5", ranks[0], 0.0),
+                near("coefficients with the right side", 5.0, ranks[1], 0.0),
+            ),
+            "erratum 3: six equations for five unknowns, of which five are solved",
+        ),
+        Statement(
+            "The final solutions for all the unknowns are as follows:",
+            text("section 2.7, eqs 39 to 43, L563-573"),
+            "difference from the solution of eqs 37a to 37e in a general position with S1' = 1.3 in/s, and what "
+            f"remains of eq 37f over the turn, {AWAY}",
+            ROUNDING,
+            (*errors, *unsolved),
+        ),
+        Statement(
+            "S1' = alpha S1 cos(alpha theta1) theta1' [when S1 is sinusoidal] (28a)",
+            text("section 2.7, eq 28a, L581; L583, in brackets, says what it is the derivative of"),
+            "S1' by eq 28a less the rate of eq 28, at theta1 = 0.9 rad with an amplitude of 2 in",
+            ROUNDING,
+            tuple(nothing(f"alpha = {ratio:g}", slip, "in/s") for ratio, (slip, _) in slips.items()),
+            f"erratum 9: S1 for its amplitude S_S1, {MAYBE}",
+        ),
+        Statement(
+            "S1'' = alpha S_S1 [cos(alpha theta1) theta1'' - alpha sin(alpha theta1) theta1'^2] (28b)",
+            text("section 2.8, eq 28b, L955; L957, in brackets, says what it is the derivative of"),
+            "S1'' by eq 28b less the rate of eq 28a with its amplitude mended, with a crank acceleration of 3 rad/s2",
+            ROUNDING,
+            tuple(nothing(f"alpha = {ratio:g}", slip, "in/s2") for ratio, (_, slip) in slips.items()),
+        ),
+        Statement(
+            "Equations (69a) through (69q) involve acceleration terms which are obtained by differentiating "
+            "equations (38) through (42) with respect to time. Hence the five acceleration equations are as follows:",
+            text("section 2.8, eqs 38a to 42a, L1035-1045"),
+            "greatest difference from the rates of eqs 39 to 43, which this sentence calls 38 to 42, in a general position "
+            f"{AT_RATES}; {DOTS}",
+            ROUNDING,
+            (nothing("eqs 38a to 42a", rough, "rad/s2"),),
+            "as a derivative; 38a is the rate of eq 39 as printed and has its erratum 4",
+        ),
+    )
+
+
+#: What the printed equations of the accelerations give.
+EQUATIONS = {
+    "th2": "theta2'' by 38a",
+    "th3": "theta3'' by 39a",
+    "eta2": "eta2'' by 40a",
+    "eta3": "eta3'' by 41a",
+    "s4": "S4'' by 42a",
+}
+
+
+def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[str, float]:
+    """Return the greatest second rates within 10 deg of a dead centre, relative to those elsewhere, by eqs 38a to 42a."""
+    found = joint_accelerations(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))
+    close_by = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
+    sizes = {name: np.abs(second) for name, second in found._asdict().items()}
+    return {
+        name: float(x[close_by].max() / x[~close_by].max()) for name, x in sizes.items() if x[~close_by].max() > NOTHING
+    }
+
+
+def _roundoff(q: Joints) -> float:
+    """Return the greatest roundoff of an acceleration by eqs 38a to 42a, relative to the greatest one of its equation."""
+    digit = np.spacing(2.0 * np.pi)
+    short, long = (
+        joint_accelerations(CRANK_AT_SPEED, at, joint_rates(CRANK_AT_SPEED, at))
+        for at in (q, Joints(*(x.astype(np.longdouble) + digit for x in q)))
+    )
+    return max(float(np.abs(x - y).max() / np.abs(y).max()) for x, y in zip(short, long) if np.abs(y).max() > NOTHING)
+
+
+def _dead_centres() -> tuple[Statement, ...]:
+    """Judge the cause that section 3.2 gives for the spikes, in the plane and where the printed iteration ends."""
+    cases = [Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)]
+    worst, least, rough, zeros, near_zero, high = 0.0, np.inf, 0.0, [], [], []
+    for case, shifted in zip(cases, OFFSETS):
+        p, centres = parameters(case.offset_in), dead_centres_deg(case)
+        q = joints(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH])
+        worst = max(worst, *_near_dead_centres(case, q, ANGLES_DEG).values())
+        least = min(least, float(np.abs(np.sin(q.th3)).min()))
+        th2 = np.degrees(planar(p, np.radians(centres))[:, 0]) % 360.0
+        zeros += [
+            near(f"sin theta2 = 0, {case.name}, {which}", stated, at, ABOUT_DEG, "deg")
+            for which, stated, at in zip(("first", "second"), ("100", "300"), centres)
+        ]
+        near_zero += [
+            at_most(
+                f"theta2 at the {which} spike, {case.name}", VERY_CLOSE_DEG, float(min(angle, 360.0 - angle)), "deg"
+            )
+            for which, angle in zip(("first", "second"), th2)
+        ]
+        # half degrees from the loops at every fifth
+        start = np.repeat(followed(shifted).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
+        angles, shift = np.radians(ANGLES_DEG[:-1]), shifted.shift_in * INCH
+        ended = settle(p, angles, shift, rows="printed", start=start, max_steps=MAX_STEPS)
+        q = joints(ended.unknowns / [1.0, 1.0, 1.0, 1.0, INCH])
+        ratios = _near_dead_centres(shifted, q, ANGLES_DEG[:-1])
+        rough = max(rough, _roundoff(q))
+        high += [
+            at_least(f"{words}, {full_name(shifted)}", ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()
+        ]
+    place = text("section 3.2, L1115")
+    return (
+        Statement(
+            "Although all the dynamic equations ((68a) through (68g) and (68i) through (68q)) are free from sine or "
+            "cosine terms in the denominator, the expressions for acceleration (equation (38a) through (42a)) are "
+            "not free from sine terms which become very very close to zero at some particular positions of the "
+            "crank, i.e. near 100 degrees and 300 degrees.",
+            place,
+            "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at "
+            "which sin theta2 vanishes, which stands in the denominators of 40a and 41a; least distance of theta3 from 0 or "
+            "half a turn, since its sine stands in all five",
+            f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
+            (
+                near("sines and cosines in denominators", 0.0, 0, 0.0),
+                *zeros,
+                at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(least)), "deg"),
+            ),
+            "theta2 is 0 or half a turn at the dead centres, which the offset moves; sin theta3 does not vanish, so "
+            "that 39a and 42a stay finite. Out of the plane 40a and 41a are unbounded, and with them 38a, because eq 41 "
+            "divides by sin theta2 and row 37f is left out (erratum 3); in the plane 40a and 41a are zero",
+        ),
+        Statement(
+            "Using the computer program it has been observed that near those particular values for input crank "
+            "angle, the joint angle [theta2] goes very close to zero degrees and thus the calculated values of the "
+            "acceleration terms, at those particular positions, go abnormally high on account of roundoff errors in "
+            "the computer calculations, which is clearly inaccurate.",
+            place,
+            "distance of theta2 from 0 at the dead centres; greatest accelerations, at half degrees, within "
+            f"{ABOUT_DEG:g} deg of a dead centre relative to those elsewhere: in the plane, where 40a and 41a are zero, and "
+            "where the printed iteration ends; there also the greatest share of the greatest acceleration that is roundoff, by "
+            "numbers with three digits more and joints off by the last digit of a turn",
+            f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
+            "for *on account of*",
+            (
+                *near_zero,
+                at_least("in the plane, by 38a, 39a, 42a", ABNORMAL, worst),
+                *high,
+                at_least("share that is roundoff", 0.5, rough),
+            ),
+            "at the second spike theta2 is half a turn. Out of the plane 40a and 41a grow without bound there, and with them "
+            "38a, but not by roundoff: eq 41 divides by sin theta2, and row 37f is left out (erratum 3). 39a and 42a stay "
+            "finite, as all five are in the plane: the spikes of the forces come from the torque, which has no lever on the "
+            "slider there",
+        ),
+    )
+
+
+def rates() -> StudyResult:
+    """Compute the rates as printed, and the residual of the unsolved row."""
+    columns = {ANGLE: GRID_DEG}
+    for case in ROW_F:
+        lacking, mended = row_f(case)
+        columns[f"opening of the loop as printed; {case.name} [in/s]"] = lacking
+        columns[f"opening of the loop mended; {case.name} [in/s]"] = mended
+    return StudyResult(
+        number="rahman-rates",
+        claim="Rahman states: eqs 39 to 43 give all velocities of the joints, and eqs 38a to 42a their accelerations.",
+        columns=padded(columns),
+        statements=(*_printed_rates(), *_dead_centres()),
+    )
+
+
+#: The study by its name.
+STUDIES = {"rahman-rates": Study("rahman-rates", unvaried(rates), draw)}
