@@ -99,16 +99,19 @@ def run(
     from ..files import save_figure
     from ..run import INTERFACES, RunInterrupted, cosimulate, in_sentences, simulate
 
+    changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    for name in ("stop_time", "step"):
+        if name in changed:
+            changed[name] = quantity(changed[name], "s", f"--{name.replace('_', '-')}")
+    if case is not None and "stop_time" in changed:
+        # it takes the place of the file's revolutions
+        settings = (*settings, f"run.stop_time={changed['stop_time']!r}")
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
         raise click.UsageError("--method is for a run in process: the FMU brings its own")
     if fmu is None and interface is not None:
         raise click.UsageError("--interface is for a run through an FMU: give --fmu")
     interface = interface or INTERFACES[0]
-    changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    for name in ("stop_time", "step"):
-        if name in changed:
-            changed[name] = quantity(changed[name], "s", f"--{name.replace('_', '-')}")
     chosen = replace(chosen, **changed)
     common = {name: getattr(chosen, name) for name in ("initial", "stop_time", "step", "tolerance")}
     common["progress"] = console.is_terminal

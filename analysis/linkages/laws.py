@@ -87,7 +87,7 @@ def _constant(value: Any, name: str) -> tuple[float, str]:
             return quantity(value, unit, name), unit
         except ParameterError:
             continue
-    raise ParameterError(name, value, f"be a quantity with a unit, as of {', '.join(_UNITS[1:])}")
+    raise ParameterError(name, value, f"be a number in SI, or a quantity with a unit, as of {', '.join(_UNITS[1:])}")
 
 
 def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:

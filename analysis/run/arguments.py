@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from inspect import signature
 from math import tau
@@ -62,6 +62,8 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
             own = [one if known is None else known.parameters for one, known in zip(each, sets)]
             bound = its.bind_partial(*arguments, **options).arguments
             bound["parameters"] = own if several else own[0]
+            if isinstance(varied := bound.get("vary"), Mapping):
+                sets = [None if known is None else _but_for(known, varied) for known in sets]
             for name, fill in fills.items():
                 value: Any = bound.get(name)
                 own_each = several and isinstance(value, (list, tuple)) and len(value) == len(sets)
@@ -108,6 +110,14 @@ def driven(known: PublishedSet, inputs: Any) -> Any:
     rivals = {name: next((own for own in modes if name in own), (name,)) for name in known.drive}
     added = {name: value for name, value in known.drive.items() if not {*inputs} & {*rivals[name]}}
     return inputs.replace(**added) if added else inputs
+
+
+def _but_for(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
+    """Return a published set without the drives of freedoms that inputs of these names drive."""
+    mechanism = mechanism_of(known.parameters)
+    driving = {channel.argument for channel in mechanism.channels if {channel.name, channel.argument} & {*names}}
+    rivals = {name for mode in mechanism.modes if driving & {*mode.arguments} for name in mode.arguments}
+    return known._replace(drive={name: value for name, value in known.drive.items() if name not in rivals})
 
 
 def started(known: PublishedSet, initial: Any) -> Any:

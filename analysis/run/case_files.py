@@ -203,13 +203,14 @@ def case_from(
 ) -> Case:
     """Build a case from the tables of a case file; its CSV tables, and a linkage of a file, are read from ``folder``."""
     data = with_linkage(data, folder)
-    named = {**data, **(overrides or {})}
-    mechanism = mechanism_in(named)
+    mechanism = mechanism_in({**data, **(overrides or {})})
+    overrides = {_in_files(name, mechanism): value for name, value in (overrides or {}).items()}
+    named = {**data, **overrides}
     published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
     acting = acting_on(mechanism)
-    data = files.overridden(_without_rivals(data, overrides or {}, mechanism, acting), overrides or {})
+    data = files.overridden(_without_rivals(data, overrides, mechanism, acting), overrides)
     own, found = _divided(data, mechanism, acting, folder)
     printed = None if published is None else published.parameters
     try:
@@ -239,11 +240,22 @@ def case_from(
     )
 
 
+def _in_files(name: str, mechanism: Mechanism) -> str:
+    """Return the name of an entry that is given for itself, where an input may have its FMI name, as parameters have."""
+    for channel in mechanism.channels:
+        if f"{name}.".startswith(f"{channel.name}."):
+            return name_in_files(mechanism, channel) + name.removeprefix(channel.name)
+    return name
+
+
 def _without_rivals(
     data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting]
 ) -> dict[str, Any]:
-    """Return the tables without the other ways to drive a freedom that an override drives."""
+    """Return the tables without the other ways to drive a freedom that an override drives, or to end a run."""
     result = dict(data)
+    for given, rival in (("run.stop_time", "revolutions"), ("run.revolutions", "stop_time")):
+        if given in overrides and isinstance(run := result.get("run"), Mapping):
+            result["run"] = {name: value for name, value in run.items() if name != rival}
     for name in overrides:
         chosen = next((a.argument for own, a in acting.items() if f"{name}.".startswith(f"{own}.")), None)
         rivals = {n for mode in mechanism.modes if chosen in mode.arguments for n in mode.arguments} - {chosen}

@@ -97,6 +97,17 @@ def test_doubled_motions_and_none() -> None:
     assert found(single, doubled, beside)[Risk.SEVERAL] == [pytest.approx((102.5, 104.0))]
 
 
+def test_a_stable_stretch_between_two_unstable_ones_is_not_avoided() -> None:
+    gaps = ((92.0, 95.0), (103.0, 106.0))
+    multiplier = np.where(np.any([(low < X) & (high > X) for low, high in gaps], axis=0), 1.2, 0.9)
+    doublings = [(Crossing.PERIOD_DOUBLING, at, 1.0, int((at > X).sum()) - 1) for at in (92.0, 95.0, 103.0, 106.0)]
+    single = branch(X, np.ones(len(X)), multiplier, doublings)
+    pieces = [branch(np.linspace(low, high - 1.0, 50), np.full(50, 2.0), 0.9, turns=2) for low, high in gaps]
+    ranges = found(single, *pieces)
+    assert ranges[Risk.DOUBLED] == [pytest.approx((low, high - 1.0)) for low, high in gaps]
+    assert ranges[Risk.UNSTABLE] == [pytest.approx((high - 1.0, high)) for _, high in gaps]
+
+
 def test_a_motion_without_damping_is_not_unstable() -> None:
     assert Risk.UNSTABLE not in found(branch(X, resonant(), 1.0))
     assert found(branch(X, resonant(), 1.001)) == {Risk.UNSTABLE: [(90.0, 110.0)]}

@@ -15,6 +15,7 @@ from analysis.run import (
     Harmonics,
     Piecewise,
     TorsionBar,
+    case_from,
     load_case,
     load_parameters,
     parameters_from,
@@ -282,3 +283,19 @@ def test_the_examples_load():
     assert len(runs) >= 2
     for path in runs:
         assert load_case(path).stop_time > 0.0
+
+
+def test_an_end_that_is_given_for_itself_takes_the_place_of_the_files():
+    data = {"published": "table-3.1", "run": {"revolutions": 2.0}}
+    case = case_from(data, folder=Path(), overrides={"run.stop_time": "0.1 s", "drive.torque": "1 N.m"})
+    assert (case.stop_time, [*case.inputs], case.inputs.parts("torque")) == (0.1, ["torque"], (1.0,))
+    data = {"published": "table-3.1", "run": {"stop_time": "1 s"}}
+    case = case_from(data, folder=Path(), overrides={"run.revolutions": 2.0})
+    assert case.stop_time == pytest.approx(4.0 * pi / PUBLISHED["table-3.1"].crank_speed)
+
+
+def test_an_input_that_is_given_for_itself_may_have_its_fmi_name():
+    data = {"published": "table-3.1"}
+    for name in ("force", "slider.force"):
+        case = case_from(data, folder=Path(), overrides={name: "3 N"})
+        assert case.inputs.parts("force") == (3.0,)

@@ -169,6 +169,15 @@ def test_sets_made_by_arrays_are_the_sets_one_by_one() -> None:
     assert same(again, listed)
 
 
+def test_a_torque_that_varies_takes_the_place_of_the_speed_of_a_published_set() -> None:
+    runs = simulate_many("table-3.1", vary={"drive.torque": [0.0, 1.0]}, stop_time=0.1)
+    for run, torque in zip(runs, (0.0, 1.0)):
+        one = simulate("table-3.1", Inputs(torque=torque), stop_time=0.1)
+        assert run["crank.angle"][-1] == pytest.approx(one["crank.angle"][-1], rel=1e-12)
+    with pytest.raises(InputError, match="both speed and torque are given"):
+        simulate_many("table-3.1", Inputs(speed=3.0), vary={"drive.torque": [0.0, 1.0]}, stop_time=0.1)
+
+
 def test_texts_and_names_of_the_contract_vary_too(tmp_path: Path) -> None:
     values = {"slider.stiffness": ["1 kN/m", 1500.0], "drive.speed": ["420 rpm", "430 rpm"]}
     varied = simulate_many("table-3.1", vary=values, folder=tmp_path, **OPTIONS)

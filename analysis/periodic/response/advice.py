@@ -207,7 +207,7 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
         Risk.RESONANCE: _union((band for arc in stable for band in _resonances(arc)), least),
         Risk.SEVERAL: _union((_overlap(a, b) for a, b in combinations(stable, 2) if not a.same_as(b)), least),
         Risk.DOUBLED: doubled,
-        Risk.UNSTABLE: [part for gap in without for part in _gaps(doubled, *gap)],
+        Risk.UNSTABLE: [part for gap in without for part in _gaps(_within(several, *gap), *gap)],
     }
     ranges = [Avoided(low=a, high=b, risk=risk) for risk, parts in found.items() for a, b in parts if b - a > least]
     return tuple(sorted(ranges, key=lambda avoided: (avoided.low, avoided.high)))
@@ -259,7 +259,7 @@ def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
 
 
 def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
-    """Return the gaps between intervals in a range."""
+    """Return the gaps between intervals that lie in a range, in order."""
     ends = [low, *(v for interval in intervals for v in interval), high]
     return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
 
