@@ -379,7 +379,7 @@ def closure() -> StudyResult:
             "displacements, ... the method will not converge.",
             conclusions,
             "share of the angles, by 30 deg, at which the iteration settles from planar estimates of theta2 and theta3 that "
-            "are off by 60, 120 and 180 deg, our choice: the one by as much as the other, the opposite way",
+            "are off by 60 and 120 deg either way and by 180 deg, our choice: theta3 by as much as theta2, the opposite way",
             "none of a share",
             (
                 at_most("in the plane, a4 = 0, 10, 20, 30 in", 0.0, settled),

@@ -334,8 +334,8 @@ def compute_deviation() -> StudyResult:
                 "However, as shown in fig. (4.5), this deviation decreases linearly with decrease of inertia ratio "
                 "I4 and becomes zero when I4=0.",
                 text("4.5.1, L3146-3150"),
-                "greatest distance of the deviation of the lower root from the straight line through zero and its value at "
-                "I4 = 1.5, relative to that value; deviation at I4 = 0",
+                "greatest distance of the deviation from omega_k of the resonance, the lower root of the determinant, from the "
+                "straight line through zero and its value at I4 = 1.5, relative to that value; deviation at I4 = 0",
                 f"{ALIKE_WORDS}; 1e-6 rad/s, above rounding errors",
                 (
                     at_most("distance from the line", ALIKE, bent),

@@ -332,9 +332,11 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "The width of the region decreases with increase of [sigma3].",
             text("5.3.1, L3892; the same in L3938-3942"),
-            "growth of the width with sigma3, greatest",
+            "growth of the width from one sigma3 to the next, greatest; true periodic motion, sigma3 = 0.8 to 1.2",
             SIGN,
-            tuple(at_most(words, 0.0, np.diff(widths(of)).max(), why=follow) for words, of in both.items()),
+            tuple(at_most(words, 0.0, np.diff(widths(of)).max()) for words, of in both.items()),
+            "on the same ground link the angles follow the coupler: the region narrows up to about equal links and "
+            "widens beyond",
         ),
         Statement(
             "It also converges about an axis given by [omega]=A.[omega_k] where A=1.96 when [sigma3] = 0.8 and stays "
@@ -563,8 +565,9 @@ def damped_statements(charts: Mapping[float, Chart]) -> tuple[Statement, ...]:
             "The instability regions shown in figs. (5.2) and (5.3) were also completely eliminated for the values "
             "of [omega_c] = 0.45 anywhere within [sigma2] = [0.]001 to 0.1 and [sigma3] = 0.8 to 1.2 respectively.",
             text("5.3.2, L3923-3929"),
-            "greatest omega_c that removes the region of the right linear equation, estimated from its width without a damper",
-            SIGN,
+            "least omega_c that removes the region, the most over sigma2 up to 0.1 and over sigma3 = 0.8 to 1.2; by the right "
+            "linear equation, estimated from the width without a damper",
+            "none: it is removed or it is not",
             (
                 at_most("Fig 5.2", "0.45", removing_estimate(with_crank(0.1)), "1/s"),
                 at_most("Fig 5.3; angles held", "0.45", max(removing_estimate(held(x)) for x in coupler), "1/s"),

@@ -326,9 +326,10 @@ def _periodic() -> tuple[Statement, ...]:
             "The theory predicts the steady state slider motion to be oscillatory and periodic with one crank cycle.",
             text("8.4.1.1, L6437"),
             "largest Floquet multiplier of the motion with the period of a crank cycle, spring A, the greatest from 355 to 365 "
-            "rpm",
+            "rpm: half a unit of the last digit of the figure's speed, in tens; all others at L6449",
             stable,
             (at_most("", 1.0, here),),
+            "that it is oscillatory is seen in the figure",
         ),
         Statement(
             "This is verified experimentally as shown in Fig. (8.7) in which a typical experimentally observed steady state "

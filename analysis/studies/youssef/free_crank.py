@@ -314,7 +314,8 @@ def launch_speeds() -> StudyResult:
             "The decaying aspect is due to the energy dissipation in the slider guide and will be studied in the "
             "next section.",
             text("3.2.2, L2147-2151"),
-            f"{UNDAMPED}; with 2e8 dyn.cm the links are collinear after four turns",
+            f"{UNDAMPED}; with 2e8 dyn.cm and without the damper the links are collinear after four turns, so that "
+            "only turns 3 and 4 are compared there",
             f"{ALIKE_WORDS}; a loss is more than that",
             _undamped({label: _launches(torque, 1e6) for label, torque in zip(runs, TORQUES)}, 1.0),
         ),

@@ -158,8 +158,9 @@ def compute() -> StudyResult:
                 "It does, however, impose the unnecessary condition that the mechanism pass the desired points at the "
                 "specified times.",
                 text("6.2.2, L4205"),
-                "area between curve and ellipse (a) of the linkage that is best in time over that of the linkage that is "
-                f"best without, both with no link longer than {CM_PER_METRE * LONGEST:.2f} cm",
+                "area between curve and ellipse (a) of the linkage with the least error (6.6) at the given times "
+                "over that of the linkage with the least area, both with no link longer than "
+                f"{CM_PER_METRE * LONGEST:.2f} cm, the longest of the two printed linkages",
                 f"above {1.0 + ALIKE:g}, the rule for *the same*: a condition that costs nothing would leave it",
                 (at_least("area", 1.0 + ALIKE, timed.area / path.area),),
             ),
