@@ -108,7 +108,9 @@ def main() -> None:
                 if tests not in sound:  # they must pass on the code as it is
                     tried = subprocess.run(shlex.split(tests), capture_output=True, text=True)
                     if tried.returncode:
-                        raise SystemExit(f"{tried.stdout[-3000:]}\nthe code as it is fails this test: {tests}")
+                        raise SystemExit(
+                            f"{(tried.stdout + tried.stderr)[-3000:]}\nthe code as it is fails this test: {tests}"
+                        )
                     sound.add(tests)
                 result = mutate_and_test([mutant], tests, SETTINGS["timeout"])
                 if result.worker_outcome != WorkerOutcome.NORMAL:

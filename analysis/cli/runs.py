@@ -103,7 +103,9 @@ def run(
     for name in ("stop_time", "step"):
         if name in changed:
             changed[name] = quantity(changed[name], "s", f"--{name.replace('_', '-')}")
-    if case is not None and "stop_time" in changed:
+    if any(setting.startswith("run.revolutions=") for setting in settings) and "stop_time" in changed:
+        raise click.UsageError("give --stop-time or --set run.revolutions, not both")
+    if "stop_time" in changed and (case is not None or settings):
         # it takes the place of the file's revolutions
         settings = (*settings, f"run.stop_time={changed['stop_time']!r}")
     chosen = chosen_case(case, published, settings)

@@ -185,9 +185,10 @@ class _Balance:
         its = layout(mechanism, tuple(loose))
         free = [place for place, n in enumerate(its.free) if n not in held]
         if not free:
+            mode = mechanism.modes[0]
             raise InputError(
-                f"no freedom of the {mechanism.name} is free: there is no equilibrium to be found; inputs such as torque=0.0 "
-                "let go what is driven at a speed"
+                f"no freedom of the {mechanism.name} is free: there is no equilibrium to be found; "
+                f"{mode.arguments[0]}=0.0 in the place of {mode.arguments[1]} frees one"
             )
         scale = np.array(mechanism.error_scale(parameters, tuple(still[0].tolist())))[list(its.free)]
         return cls(

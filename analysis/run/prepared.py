@@ -237,13 +237,17 @@ class Run:
         """Say which springs exert no finite force a microsecond or a millisecond after a state, or nothing."""
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
         states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
-        values = outputs_of(self.mechanism, modes, p, states, np.tile(u, (2, 1)))
+        names, values = self.mechanism.output_names, outputs_of(self.mechanism, modes, p, states, np.tile(u, (2, 1)))
+        if "assembly.clearance" in names:
+            # beyond the limit of assembly nothing has a value
+            values = values[np.isfinite(values[:, names.index("assembly.clearance")])]
         lost = [
             name.rpartition(".")[0]
-            for name, column in zip(self.mechanism.output_names, values.T)
+            for name, column in zip(names, values.T)
             if name.rpartition(".")[2].startswith("exerted") and not np.isfinite(column).all()
         ]
-        return f": the law of {' and '.join(lost)} has no value beyond" if lost else ""
+        words = "law of {} has" if len(lost) == 1 else "laws of {} have"
+        return f": the {words.format(' and '.join(lost))} no value beyond" if lost else ""
 
     def _balance(self) -> tuple[int, int]:
         """Return the indices of the outputs for the energy balance residual and the kinetic energy."""

@@ -112,8 +112,9 @@ def simulate(
         Of a mechanism, such as FiveBarParameters or SliderCrankParameters; or a published set or its name, such as
         "table-3.1", which brings its start, and its crank speed unless the inputs drive the crank. See `variant` too.
     inputs : Inputs
-        What acts on it; by default nothing does (torque drive without torque). The slider-crank's shift is held, and so is at
-        rest what a described linkage drives at a speed: a published set brings the speed, and ``torque=0.0`` lets it go.
+        What acts on it; by default nothing does: a crank is free, the slider-crank's shift is held, and a freedom of a
+        described linkage that has a speed in its file is held at rest. A published set brings that speed; ``torque=0.0``
+        frees it.
     initial
         That of the mechanism, or a mapping such as {"crank_speed": "420 rpm"}; by default at rest with all coordinates zero.
         Commanded speeds take the place of the rates.

@@ -214,6 +214,21 @@ def test_a_run_that_leaves_a_law_behind_names_it(tmp_path):
     assert found.message.endswith("the law of stop has no value beyond")
 
 
+def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
+    rocker = linkage("two-laws", ground={"A": (0, 0), "D": ("200 mm", 0)})
+    rocker.body("left", bar=("A", "B"), length="150 mm", mass=0.2, inertia=1e-3)
+    rocker.body("coupler", bar=("B", "C"), length="60 mm", mass=0.1, inertia=1e-4)
+    rocker.body("right", bar=("D", "C"), length="100 mm", mass=0.2, inertia=1e-3)
+    rocker.spring("back", at="D", stiffness="1 N*m/rad").freedom("left", "A", start="40 deg", speed="90 rpm")
+    limit = reach(rocker.mechanism()).high
+    rocker.tables["name"] = "two-laws-one-ends"
+    rocker.spring("pad", at="A", law=f"10*sqrt({limit - 3e-3!r} - x)")
+    made = rocker.mechanism()
+    found = simulate(made.first_set.parameters, Inputs(speed=5.0), initial=made.first_set.initial, stop_time=1.0)
+    assert found.status == 4
+    assert found.message.endswith("the law of pad has no value beyond")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_linkage_of_the_library_runs_as_with_multipliers(path):

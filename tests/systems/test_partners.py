@@ -156,7 +156,8 @@ EXPONENTS = UNITS | {
 def test_exponents_of_the_base_units_are_those_of_pint(name: str) -> None:
     product = re.sub(r"([a-z])(\d)", r"\1**\2", name.replace("(m.s)", "m/s")).replace(".", "*")
     product += "".join(f" * {base}**{-exponent}" for base, exponent in EXPONENTS[name].items())
-    assert _registry().Quantity(1.0, product).to("").magnitude == pytest.approx(1.0)
+    # an angle is a number to pint: the candela stands for its unit
+    assert _registry().Quantity(1.0, product.replace("rad", "cd")).to("").magnitude == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("name", ["pid", "state-feedback"])

@@ -200,7 +200,7 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
     """Return the ranges in which a machine resonates, may jump, doubles its period or has no stable motion."""
     least = _SLIVER * (high - low)
     stable = [arc for arc in arcs(branches) if arc.stable]
-    without = _gaps(_union((arc.span for arc in stable if arc.turns == 1), least), low, high)
+    without = _gaps(_within(_union((arc.span for arc in stable if arc.turns == 1), least), low, high), low, high)
     several = _union((arc.span for arc in stable if arc.turns > 1), least)
     doubled = [part for gap in without for part in _within(several, *gap)]
     found = {
@@ -259,7 +259,7 @@ def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
 
 
 def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
-    """Return the gaps between intervals that lie in a range, in order."""
+    """Return what intervals, in order and within a range, leave of it."""
     ends = [low, *(v for interval in intervals for v in interval), high]
     return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
 

@@ -169,7 +169,9 @@ def _limits() -> tuple[Statement, ...]:
             "deg by 26 deg at which it settles",
             f"1 deg, the step of the limits; none of the share; {own}",
             (*twists, at_least("232 to 310 deg", 1.0, within)),
-            "the mechanism itself turns fully at every alpha4",
+            "the loops on which it settles are open, at 232 deg by up to "
+            f"{np.max(followed(OPEN[1]).rotation_deg):.0f} deg (erratum 1); the mechanism itself turns fully at every "
+            "alpha4",
         ),
     )
 

@@ -62,7 +62,7 @@ def conclusions() -> StudyResult:
                 "This [agreement in the plane] verifies the feasibility of the method.",
                 text("section 3.2, L1111"),
                 f"share of {cases}",
-                "all of them",
+                f"all of them; {ROUNDING}, of a closed loop",
                 (at_least("cases closed", 1.0, closed),),
                 "the plane, in which eta2 = eta3 = 0, does not show erratum 1",
             ),

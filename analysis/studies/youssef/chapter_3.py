@@ -576,7 +576,7 @@ def torque_result() -> StudyResult:
                 "The other feature is that on the scale of the graph this torque is independent of the spring "
                 "stiffness k. The exception is at the maximum and minimum values where a slight variation is "
                 "recorded.",
-                text("3.2.1, L1993-2001"),
+                text("3.2.1, L1995-2001"),
                 "distance between the curves as it is seen, square to them, on a graph as wide as it is high, "
                 "relative to its size, farther than 10 deg, the rule for *near*, from an extreme; spread of the extremes "
                 "between the springs, relative to the greatest torque in size at k = 1e6 dyn/cm",
@@ -589,7 +589,7 @@ def torque_result() -> StudyResult:
                             computed=np.ptp(x) / peak,
                             lower=ALIKE,
                             upper=SLIGHTLY,
-                            why=f"there the springs differ by {100 * np.ptp(x) / peak:.0f} %, which is not seen",
+                            why=f"at the {name} torque the springs differ by {100 * np.ptp(x) / peak:.0f} %, which is not seen",
                         )
                         for name, x in (("greatest", torque.max(axis=1)), ("least", torque.min(axis=1)))
                     ),

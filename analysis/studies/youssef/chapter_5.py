@@ -201,10 +201,12 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
             "below it the slider falls away",
         ),
         Statement(
-            "[T]he second region of instability may now be defined by [(5.26)]",
+            "[A] region for [lambda_k^2] may be defined by [(5.16)] ... the second region of instability may now be defined by "
+            "[(5.26)]",
             text("5.1.1, eqs (5.13), (5.16), (5.26), L3406, L3446-3464, L3555-3575"),
             "boundaries by the formulas less those by the determinant (5.35), for the printed equation (4.29) at I4 "
-            "= 1, relative to the width of the region, and (5.13) to that of the first",
+            "= 1, relative to the width of the region, and (5.13) to that of the first; h0 = 0; under the root of "
+            "(5.26) stands (P - R)^2, as (5.23) gives, where our scan has P + R in (5.25) and in a line of (5.26)",
             f"{SMALL:g}, the rule for *small*: the next order",
             formulas(),
         ),
@@ -358,9 +360,9 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
         Statement(
             "This region is narrower than both regions of Figs. (5.1[)] and (5.2).",
             text("5.3.1, L3898-3900"),
-            "greatest width of the true periodic motion, angles held, relative to that of each; on the same ground link it is "
-            f"{widths(found[SAME_GROUND]).max() / widths(found['true orbit']).max():.1f} times as great; the range of I4 in "
-            "Fig 5.1 is not said",
+            "greatest width of the region of the true periodic motion, angles held, relative to that of each; on the "
+            f"same ground link it is {widths(found[SAME_GROUND]).max() / widths(found['true orbit']).max():.1f} times "
+            "as great; the range of I4 in Fig 5.1 is not said",
             SIGN,
             tuple(at_most(name, 1.0, widths(found["true orbit"]).max() / x) for name, x in others.items()),
             "with the angles held it is so at I4 = 0.5, which the listing has (L8641)",

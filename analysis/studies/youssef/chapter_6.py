@@ -149,7 +149,7 @@ def by_readings(name: str, linkage: Linkage) -> dict[str, float]:
             found |= {
                 f"{angles}, window{ends}": window + rest / WEIGHT,
                 f"{angles} and the end of the turn, window{ends}": window + (rest + end) / WEIGHT,
-                f"{angles} of the window{ends} alone": window,
+                f"{angles} a turn, those within the window{ends} alone": window,
             }
     return found
 
@@ -264,7 +264,7 @@ def _bounded() -> tuple[Statement, ...]:
 def _rocker() -> tuple[Statement, ...]:
     usual = {name: len(PROBLEMS[name].task.rotation) for name in ("rocker", "rocker-weighted")}  # type: ignore[arg-type, union-attr]
     least = (
-        f"at {n} angles, {'weighted' if 'weighted' in name else 'unweighted'}, the printed linkage has "
+        f"at {n} angles, {'weighted' if 'weighted' in name else 'unweighted'}, with the digits as printed, the linkage has "
         f"{printed_error(name):.2f} deg2, and the least that we find is {our_error(name):.2f}"
         for name, n in usual.items()
     )
@@ -273,7 +273,8 @@ def _rocker() -> tuple[Statement, ...]:
             "The values of the error function [E1a] of equation (6.18) produced by the linkage in generating the unweighted "
             "and weighted outputs are 700.0 and 35.0 degree2 respectively.",
             text("6.4.2 B, L4965"),
-            f"error of the printed linkages, of all readings {ROUNDED}",
+            "error of the printed linkages, each of their printed numbers rounded up or down, by that reading of "
+            "those named above that comes nearest to the stated error",
             HALF,
             (as_stated("unweighted", "700.0", "rocker"), as_stated("weighted", "35.0", "rocker-weighted")),
             "; ".join(least),

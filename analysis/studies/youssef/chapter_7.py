@@ -25,7 +25,7 @@ from ...slider import VariationalMotion, slider_motion, variational_motion
 from ...synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution, TimedPath, turn
 from ...youssef import AccessibleArea, accessible, accessible_area
 from ..rules import READ
-from ..statements import Statement, at_least, at_most, near, text
+from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 
 FINDINGS = """\
@@ -508,7 +508,13 @@ def _unweighted() -> tuple[Statement, ...]:
             "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "
             "greater effort than would otherwise be needed with a direct search.",
             text("7.3.1, L5883"),
-            why="the effort of neither method is stated, and in this mechanism the equations are solved in closed form",
+            "equations (7.6), one for each of theta3, theta4 and U, and (7.3), the closure",
+            "none of a count",
+            (
+                replace(near("equations", 5.0, 3 + 2, 0.0), stated="n + m"),
+                Case(label="effort", computed=None, why="that of neither method is stated"),
+            ),
+            "in this mechanism the equations are solved in closed form, see Fig 7.5",
         ),
     )
 

@@ -472,8 +472,8 @@ def _fig_8_15() -> tuple[Statement, ...]:
             "coincide and become an inflection point and as the speed is increased further this inflection point coincides "
             "with the third peak, thus resulting in a sinusoidal type oscillation as shown in the case of 500 RPM.",
             text("8.4.1.2, L6724"),
-            "peaks of a turn; speed above which there are two instead of four; points of inflection of a turn at 500 rpm, "
-            "of which a sine has two",
+            "peaks of a turn, maxima and minima together; speed above which there are two instead of four; points of "
+            "inflection of a turn at 500 rpm, of which a sine has two",
             f"none of a count; {TENS}",
             (
                 near("peaks at 240 rpm", "4", peaks(turn("A", 240.0)), 0.0),

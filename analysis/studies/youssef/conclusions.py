@@ -293,8 +293,8 @@ def dynamics() -> tuple[Statement, ...]:
                 Case(label=f"step {1e3 * step:g} ms", computed=run.gap.max() / run.errors[0], lower=1.0, upper=100.0)
                 for step, run in runs.items()
             ),
-            "it is not more accurate: its error of u is "
-            f"{min(run.errors[0] / run.errors[1] for run in runs.values()):.0f} to "
+            "as a check, for its own results are by the other approach (L1790-1796): it is not more accurate, its "
+            f"error of u being {min(run.errors[0] / run.errors[1] for run in runs.values()):.0f} to "
             f"{max(run.errors[0] / run.errors[1] for run in runs.values()):.0f} times that with u alone",
         ),
         Statement(
@@ -305,7 +305,7 @@ def dynamics() -> tuple[Statement, ...]:
             f"{SLIGHTLY:g}, the upper bound of *a little*; none below, since no effect would be little too",
             (at_most("difference", SLIGHTLY, differs.max()),),
             f"by *small*, {SMALL:g}, it would fail in {np.mean(differs > SMALL):.0%} of the turn, beside the extremes of the "
-            "torque, where the thesis has a slight variation (L1993)",
+            "torque, where the thesis has a slight variation (L1999)",
         ),
         Statement(
             "It was also found that when the slider was opposed by both spring and viscous damping its motion was a "

@@ -233,7 +233,7 @@ def compute() -> StudyResult:
                 text("7.1.1 (c), L5321"),
                 "rms deviation of the slider from the two harmonics of Fig 7.11, relative to the stroke, with the force "
                 "that the model needs and no feedback, on a machine that differs from the model by "
-                f"{differs}; over the {run_for:.1f} turns that it runs",
+                f"{differs}; over the {run_for:.1f} turns that it runs until the links cannot be joined",
                 f"more than {ALIKE:g}, the rule for *the same*; one example is enough for *may be*",
                 (
                     at_least("no feedback", ALIKE, missed, why="then the links cannot be joined any more"),

@@ -272,8 +272,8 @@ def compute_friction() -> StudyResult:
                 "is considered in the theory and (b) the friction in the pin joints of the linkage is also ignored in the "
                 "theory.",
                 text("8.4.1.1, L6508"),
-                why="neither the scatter of the coefficient nor a size of the bearings is given, nor, as at L6853, which way "
-                "the amplitude differs; 10 % more damping takes "
+                why="neither the scatter of the coefficient nor a size of the bearings is given, nor which way the amplitude "
+                "differs, which is said for rig 2 (L6841); 10 % more damping takes "
                 f"{damper:.1%} off the amplitude with spring A, a friction radius of {1e3 * PIN_RADIUS:g} mm in the pins "
                 f"{pins:.1%}",
             ),
