@@ -50,7 +50,7 @@ def phone(browser: Browser) -> Iterator[Any]:
         viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2
     )
     made = context.new_page()
-    made.set_default_timeout(120_000)
+    made.set_default_timeout(600_000)
     made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
     made.goto(PAGE.as_uri())
     made.wait_for_function("document.documentElement.dataset.ready")

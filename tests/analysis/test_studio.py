@@ -50,7 +50,7 @@ def page(browser: Browser) -> Iterator[Page]:
 
 def _opened(browser: Browser, path: Path) -> Page:
     made = browser.new_page(viewport={"width": 1400, "height": 1000})
-    made.set_default_timeout(120_000)
+    made.set_default_timeout(600_000)
     made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
     made.goto(path.as_uri())
     made.wait_for_function("document.documentElement.dataset.ready")

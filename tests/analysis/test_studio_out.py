@@ -389,7 +389,7 @@ def test_the_page_works_from_a_plain_web_server(browser: Any) -> None:
         try:
             made = browser.new_page()
             made.goto(f"http://127.0.0.1:{server.server_port}/{PAGE.name}")
-            made.wait_for_function("document.documentElement.dataset.ready", timeout=120_000)
+            made.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
             assert "stable" in made.inner_text("#floquet")
             made.close()
         finally:
@@ -439,7 +439,7 @@ def test_a_reader_of_the_screen_finds_its_way(browser: Any, sources: Path, size:
     """What axe-core finds: all that is wrong with names, roles and contrast."""
     page = browser.new_page(viewport=size, color_scheme=theme)
     page.goto(PAGE.as_uri())
-    page.wait_for_function("document.documentElement.dataset.ready", timeout=120_000)
+    page.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
     page.click("#play")
     page.add_script_tag(path=sources / "node_modules" / "axe-core" / "axe.min.js")
     for state in (opening_state(), _spatial()):

@@ -57,7 +57,7 @@ def test_curves_are_told_apart_in_the_legend_and_axes_have_names(page: Any) -> N
 def test_curves_have_the_colours_of_the_theme(browser: Any, theme: str) -> None:
     page = browser.new_page(color_scheme=theme)
     page.goto(PAGE.as_uri())
-    page.wait_for_function("document.documentElement.dataset.ready", timeout=120_000)
+    page.wait_for_function("document.documentElement.dataset.ready", timeout=600_000)
     accent = page.evaluate("getComputedStyle(document.body).getPropertyValue('--accent')")
     assert page.evaluate("window.studio.charts.charts.charts[0].plot.series[1].stroke()") == accent
     page.close()

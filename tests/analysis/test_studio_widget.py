@@ -91,7 +91,7 @@ def test_what_is_dragged_is_known_to_python_and_back(browser: Any) -> None:
     widget = Widget("table-3.1")
     code = Path(widget_module.__file__).with_suffix(".js").read_text(encoding="utf-8")
     host = browser.new_page(viewport={"width": 1200, "height": 900})
-    host.set_default_timeout(120_000)
+    host.set_default_timeout(600_000)
     host.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
     host.evaluate(HOST, [code, {"page": widget.page, "state": widget.state, "height": 850}])
     frame = host.wait_for_selector("iframe").content_frame()
