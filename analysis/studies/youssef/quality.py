@@ -1,9 +1,9 @@
 """Methods of sections 6.2 and 6.3 without a figure: the combined quality function and the constraint of assembly.
 
 The quality functions of a path in time and of the area between the curves may be added. For ellipse (a) the sum is
-minimised with no link longer than the longest of either printed linkage, by the thesis's downhill simplex from our two
-optima. A linkage found for the path alone gets its best crank phase: the thesis keeps th20 there although the area
-does not depend on it (L4700).
+minimised with no link longer than the longest of either printed linkage, by the thesis's downhill simplex from our optima
+for each, that in time with both limits of the links. A linkage found for the path alone gets its best crank phase: the
+thesis keeps th20 there although the area does not depend on it (L4700).
 """
 
 from __future__ import annotations
@@ -114,7 +114,8 @@ def linkages() -> dict[str, Linkage]:
     limits = (*USUAL, LargestLink(length=LONGEST))
     timed = synthesize(TIMED.task, TIMED.bounds, limits, search=SEARCH).best.linkage
     ours = {"ours; timed": timed, "ours; path": in_time(best("path-a").linkage)}
-    found = min((least_combined(start) for start in ours.values()), key=lambda linkage: both(linkage).combined)
+    starts = (*ours.values(), best("ellipse-a").linkage)
+    found = min(map(least_combined, starts), key=lambda linkage: both(linkage).combined)
     return {"printed; timed": TIMED.linkage, "printed; path": in_time(PATH.linkage), **ours, "ours; combined": found}
 
 
