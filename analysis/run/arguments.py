@@ -105,19 +105,17 @@ def driven(known: PublishedSet, inputs: Any) -> Any:
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
         return inputs
-    mechanism = mechanism_of(known.parameters)
-    modes = [mode.arguments for mode in mechanism.modes]
-    rivals = {name: next((own for own in modes if name in own), (name,)) for name in known.drive}
-    added = {name: value for name, value in known.drive.items() if not {*inputs} & {*rivals[name]}}
+    added = _but_for(known, inputs).drive
     return inputs.replace(**added) if added else inputs
 
 
 def _but_for(known: PublishedSet, names: Iterable[str]) -> PublishedSet:
-    """Return a published set without the drives of freedoms that inputs of these names drive."""
-    mechanism = mechanism_of(known.parameters)
-    driving = {channel.argument for channel in mechanism.channels if {channel.name, channel.argument} & {*names}}
-    rivals = {name for mode in mechanism.modes if driving & {*mode.arguments} for name in mode.arguments}
-    return known._replace(drive={name: value for name, value in known.drive.items() if name not in rivals})
+    """Return a published set without the drives of freedoms that inputs of these names, the arguments' or FMI's, drive."""
+    mechanism, names = mechanism_of(known.parameters), {*names}
+    given = names | {channel.argument for channel in mechanism.channels if channel.name in names}
+    modes = [mode.arguments for mode in mechanism.modes]
+    rivals = {name: next((own for own in modes if name in own), (name,)) for name in known.drive}
+    return known._replace(drive={name: value for name, value in known.drive.items() if not given & {*rivals[name]}})
 
 
 def started(known: PublishedSet, initial: Any) -> Any:

@@ -203,9 +203,9 @@ def case_from(
 ) -> Case:
     """Build a case from the tables of a case file; its CSV tables, and a linkage of a file, are read from ``folder``."""
     data = with_linkage(data, folder)
-    mechanism = mechanism_in({**data, **(overrides or {})})
+    named = {**data, **(overrides or {})}
+    mechanism = mechanism_in(named)
     overrides = {_in_files(name, mechanism): value for name, value in (overrides or {}).items()}
-    named = {**data, **overrides}
     published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")

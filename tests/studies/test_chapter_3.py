@@ -60,7 +60,7 @@ class TestDrift:
     def test_without_gravity_it_grows_by_a_quarter(self, mu: float) -> None:
         without, drift = (chapter_3.drift(mu, gravity) for gravity in (0.0, 9.81))
         assert self.per_turn(without) / self.per_turn(drift) == pytest.approx([1.25] * 3, abs=0.03)
-        assert without.line[0] / drift.line[0] == pytest.approx(1.242, abs=0.003)
+        assert without.rate / drift.rate == pytest.approx(1.242, abs=0.003)
 
 
 class TestSteadyMotion:

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, Stability, confirm
-from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, removing, without_factor
+from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, removing, to_the_letter, without_factor
 from analysis.studies.youssef.linearised import with_crank
 from analysis.studies.youssef.regions import (
     appendix_3,
@@ -122,24 +122,14 @@ def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
 def test_formulas_of_the_perturbation_to_the_letter() -> None:
     """(5.16) and (5.24) to (5.26) with the coefficients of (4.29), whose h0 is 0."""
     e = slider_equation(chapter_4(1.0), 60.0, variant=Variant.PRINTED, form=Form.SERIES)
-    s, k = e.spring_factor, e.stiffness.to_order(2)
-    k0 = s.mean
-
-    def amplitudes(n: int, at: float) -> tuple[float, float]:
-        return at * s.cos[n] / k0 + k.cos[n], at * s.sin[n] / k0 + k.sin[n]
-
-    half = 0.5 * np.hypot(*amplitudes(1, 0.25))
+    _, first, second = to_the_letter(e)
     region = perturbed_region(e.homogeneous(), 1, order=1)
     assert region is not None
-    assert (region.low, region.high) == pytest.approx(((0.25 - half) / k0, (0.25 + half) / k0), abs=1e-9)
-    (n1, n2), (m1, m2) = (amplitudes(n, 1.0) for n in (1, 2))
-    p, r = (n2**2 - 5.0 * n1**2) / 12.0 + m1 / 2.0, (n1**2 - 5.0 * n2**2) / 12.0 - m1 / 2.0
-    q = m2 / 2.0 - n1 * n2 / 2.0
-    middle, half = 1.0 - 0.5 * (p + r), 0.5 * np.sqrt((p - r) ** 2 + 4.0 * q**2)
+    assert (region.low, region.high) == pytest.approx(first, abs=1e-9)
     region = perturbed_region(e.homogeneous(), 2)
     assert region is not None
     # the next order
-    assert (region.low, region.high) == pytest.approx(((middle - half) / k0, (middle + half) / k0), abs=1e-5)
+    assert (region.low, region.high) == pytest.approx(second, abs=1e-5)
 
 
 def test_cut_after_the_ninth_term() -> None:

@@ -200,14 +200,14 @@ def ranges_to_avoid(branches: Sequence[Branch], low: float, high: float) -> tupl
     """Return the ranges in which a machine resonates, may jump, doubles its period or has no stable motion."""
     least = _SLIVER * (high - low)
     stable = [arc for arc in arcs(branches) if arc.stable]
-    without = _gaps(_within(_union((arc.span for arc in stable if arc.turns == 1), least), low, high), low, high)
+    without = _gaps(_union((arc.span for arc in stable if arc.turns == 1), least), low, high)
     several = _union((arc.span for arc in stable if arc.turns > 1), least)
     doubled = [part for gap in without for part in _within(several, *gap)]
     found = {
         Risk.RESONANCE: _union((band for arc in stable for band in _resonances(arc)), least),
         Risk.SEVERAL: _union((_overlap(a, b) for a, b in combinations(stable, 2) if not a.same_as(b)), least),
         Risk.DOUBLED: doubled,
-        Risk.UNSTABLE: [part for gap in without for part in _gaps(_within(several, *gap), *gap)],
+        Risk.UNSTABLE: [part for gap in without for part in _gaps(several, *gap)],
     }
     ranges = [Avoided(low=a, high=b, risk=risk) for risk, parts in found.items() for a, b in parts if b - a > least]
     return tuple(sorted(ranges, key=lambda avoided: (avoided.low, avoided.high)))
@@ -259,8 +259,8 @@ def _union(intervals: Iterable[Interval], least: float) -> list[Interval]:
 
 
 def _gaps(intervals: Sequence[Interval], low: float, high: float) -> list[Interval]:
-    """Return what intervals, in order and within a range, leave of it."""
-    ends = [low, *(v for interval in intervals for v in interval), high]
+    """Return what intervals in order leave of a range."""
+    ends = [low, *(v for interval in _within(intervals, low, high) for v in interval), high]
     return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if a < b]
 
 

@@ -8,20 +8,9 @@ from ..statements import Statement, at_least, near, text
 from ..study import Study, StudyResult
 from ..variation import unvaried
 from .closure import endings
-from .figures import (
-    ALL,
-    FROM_DEAD,
-    NOTHING,
-    ROUNDING,
-    clear,
-    nothing,
-    values,
-)
+from .figures import ALL, FROM_DEAD, NOTHING, ROUNDING, FloatArray, clear, nothing, values
 from .forces import PLANAR, planar_forces
-from .method import (
-    OUT,
-    PLANE,
-)
+from .method import OUT, PLANE
 from .table import COMPONENTS
 
 
@@ -36,20 +25,18 @@ def conclusions() -> StudyResult:
     numbers = float(np.mean([np.isfinite(found.unknowns).all() for found in ended]))
     right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
     static = planar_forces(erratum_5=True, erratum_6=True, share=0.0)
-    at, errors = clear(PLANE), []
-    for mended in (False, True):
-        found = planar_forces(erratum_5=mended, erratum_6=mended)
-        errors.append(
-            max(
-                float(np.abs(found[s] - right[s])[at].max() / np.abs(right[s] - static[s])[at].max())
-                for s in PLANAR
-                if np.abs(right[s] - static[s])[at].max() > NOTHING
-            )
+    inertial = {s: right[s] - static[s] for s in PLANAR}
+    printed, mended = (planar_forces(erratum_5=both, erratum_6=both) for both in (False, True))
+
+    def error(found: dict[str, FloatArray], of: dict[str, FloatArray]) -> float:
+        """Return the greatest error of the components in ``of``, relative to the greatest value there, of those that vary."""
+        sizes = {s: np.abs(x)[clear(PLANE)].max() for s, x in of.items()}
+        return max(
+            float(np.abs(found[s] - right[s])[clear(PLANE)].max() / size) for s, size in sizes.items() if size > NOTHING
         )
-    printed = planar_forces(erratum_5=False, erratum_6=False)
-    sizing = max(float(np.abs(printed[s] - right[s])[at].max() / np.abs(right[s])[at].max()) for s in PLANAR)
-    shaking = {s: right[s] - static[s] for s in ("1F1i", "1F1j")}
-    balancing = max(float(np.abs(printed[s] - right[s])[at].max() / np.abs(x)[at].max()) for s, x in shaking.items())
+
+    sizing, of_inertia = error(printed, right), error(printed, inertial)
+    balancing = error(printed, {s: inertial[s] for s in ("1F1i", "1F1j")})
     varied = sum(len(set(values)) > 1 for values in list(zip(*ALL))[1:])
     kinds, place, last = "dimensions that are varied", text("section 3.3, L1129"), text("section 3.3, L1131")
     return StudyResult(
@@ -89,8 +76,8 @@ def conclusions() -> StudyResult:
                 "greatest error of a joint force by the printed equations in the plane, a4 = 10 in, relative to the greatest "
                 f"part of it that inertia has, {FROM_DEAD}",
                 ROUNDING,
-                (nothing("as printed", errors[0]),),
-                f"errata 5 and 6; with both mended the error is {errors[1]:.1g}",
+                (nothing("as printed", of_inertia),),
+                f"errata 5 and 6; with both mended the error is {error(mended, inertial):.1g}",
             ),
             Statement(
                 "It is expected that this investigation will enable designers to have better insight into the "

@@ -386,6 +386,7 @@ def _constant() -> tuple[Statement, ...]:
         s: max(float(np.abs(values(c, COMPONENTS[s])).max()) for c in (IDEAL, *ALL)) for s in ("4T4i", "4T4j", "4T4k")
     }
     pins = [values(case, COMPONENTS["2F2j"]) for case in ALL]
+    equations = _equations()
     return (
         Statement(
             "All the torque components at joint 4, i.e. [4T4i], [4T4j], and [4T4k] and the force components along joint axis "
@@ -444,8 +445,8 @@ def _constant() -> tuple[Statement, ...]:
             f"none of a count; {ROUNDING}",
             (
                 replace(near("unknowns", 16.0, len(COMPONENTS) - 1, 0.0), stated="sixteen"),
-                replace(near("equations", 17.0, len(_equations()), 0.0), stated="seventeen"),
-                near("rank", 16.0, np.linalg.matrix_rank(_equations()), 0.0),
+                replace(near("equations", 17.0, len(equations), 0.0), stated="seventeen"),
+                near("rank", 16.0, np.linalg.matrix_rank(equations), 0.0),
                 nothing("eq 62e", max(size["1F1k"].values()), "lb"),
             ),
             "erratum 7: with 1F1k seventeen unknowns stand against seventeen equations, and none is redundant; 69a to 69q use "

@@ -32,13 +32,11 @@ from .method import (
     AWAY,
     CLEAR_SINE,
     DOTS,
-    G3,
     MAYBE,
     MOVING,
     PLANE,
     ROD,
     ROW_F,
-    WATER,
     FloatArray,
     draw,
     followed,
@@ -71,6 +69,11 @@ from .printed import (
 )
 from .table import COMPONENTS, Case
 
+#: Distance g3 (in) at which the terms of the slider's moment of mass count; the thesis computes with 0.
+G3 = 2.0
+#: Weight of water (lb/in3), the reference of specific gravities.
+WATER = 62.43 / 12.0**3
+#: Components of the joint forces in the plane.
 PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 
 
@@ -125,13 +128,18 @@ def _balances() -> tuple[float, ...]:
     return tuple(float(max(np.abs(x.real[at]).max(), np.abs(x.dual[at]).max())) for x in left)
 
 
+def _clear_joints(case: Case) -> Joints:
+    """Return the joints where the printed iteration ends, at the angles where theta2 is not near 0 or half a turn."""
+    q = joints(followed(case).unknowns[:, 0])
+    return Joints(*(x[np.abs(np.sin(q.th2)) > CLEAR_SINE] for x in q))
+
+
 def velocity_paths() -> list[Judged]:
     """Judge the forward path against the mixed path by the rod's momentum, eqs 50 and 52, in the plane and out of it."""
     b, rod = bodies(parameters()), _binors()[1]
     found = []
     for case in (PLANE, *ROW_F):
-        q = joints(followed(case).unknowns[:, 0])
-        q = Joints(*(x[np.abs(np.sin(q.th2)) > CLEAR_SINE] for x in q))
+        q = _clear_joints(case)
         r = joint_rates(CRANK_AT_SPEED, q)
         forward = rod.momentum(forward_rod_velocity(CRANK_AT_SPEED, q, r))
         _, mixed, _ = momenta(CRANK_AT_SPEED, b, q, r)
@@ -144,12 +152,11 @@ def replacements() -> list[Judged]:
     b, found = bodies(parameters()), []
     for case in (PLANE, *ROW_F):
         apart = []
-        for q in map(Joints._make, np.stack(joints(followed(case).unknowns[:, 0]), -1)):
-            if np.abs(np.sin(q.th2)) > CLEAR_SINE:
-                r = joint_rates(CRANK_AT_SPEED, q)
-                a = joint_accelerations(CRANK_AT_SPEED, q, r)
-                pairs = zip(forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(b, q, r, a)[1:])
-                apart += [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
+        for q in map(Joints._make, zip(*_clear_joints(case))):
+            r = joint_rates(CRANK_AT_SPEED, q)
+            a = joint_accelerations(CRANK_AT_SPEED, q, r)
+            pairs = zip(forward_momentum_rates(CRANK_AT_SPEED, b, q, r, a, 0.0), momentum_rates(b, q, r, a)[1:])
+            apart += [float(np.abs(forward.real - mixed.real).max()) for forward, mixed in pairs]
         found.append(nothing(f"57, 58 less 55, 56; {case.name}", max(apart), "lb"))
     return found
 

@@ -16,19 +16,8 @@ from ...slider_crank.closure import Rows
 from ..rules import ABOUT_DEG
 from ..study import StudyResult
 from ..variation import cache
-from .figures import (
-    ALL,
-    ANGLE,
-    clear,
-    printed,
-    printed_symbol,
-)
-from .printed import (
-    CRANK_AT_SPEED,
-    Joints,
-    Turn,
-    turn,
-)
+from .figures import ALL, ANGLE, clear, printed, printed_symbol
+from .printed import CRANK_AT_SPEED, Joints, Turn, turn
 from .table import IDEAL, Case
 
 FloatArray = NDArray[np.float64]
@@ -52,14 +41,10 @@ AWAY = f"where theta2 is over {ABOUT_DEG:g} deg from 0 and half a turn, the rule
 MOVING = CRANK_AT_SPEED._replace(shift_rate=1.3, acceleration=3.0, shift_acceleration=0.7)
 AT_RATES = "with S1' = 1.3 in/s, theta1'' = 3 rad/s2 and S1'' = 0.7 in/s2"
 DOTS = "second dots lost in the scan are restored"
-#: Distance g3 (in) at which the terms of the slider's moment of mass count; the thesis computes with 0.
-G3 = 2.0
 #: What is said of a slip of one character.
 MAYBE = "so in our scan; the print may be right"
 #: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
-#: Weight of water (lb/in3), the reference of specific gravities.
-WATER = 62.43 / 12.0**3
 
 
 @cache

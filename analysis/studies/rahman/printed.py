@@ -233,6 +233,23 @@ def loop_rates(c: Crank, q: Joints, r: Joints) -> FloatArray:
     )
 
 
+def separated_rates(c: Crank, q: Joints) -> FloatArray:
+    """Return eq 38, shape (6, 6): the coefficients of theta2', theta3', eta2', eta3', S4', and the right side."""
+    (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
+    w, v = c.speed, c.shift_rate
+    return np.array(
+        [
+            [-se, 0.0, s2 * ce, 0.0, 0.0, w * se],
+            [0.0, 0.0, 0.0, 0.0, s3, -w * c.a1 * s2 * ce + v * se],
+            [0.0, 0.0, c2, 1.0, 0.0, 0.0],
+            [c.a2 * ce, 0.0, c.a2 * s2 * se, 0.0, -c3, -w * (c.a1 * c2 + c.a2 * ce)],
+            [ce, 1.0, s2 * se, 0.0, 0.0, -w * ce],
+            # sin theta2 lacks sin eta2 (erratum 9)
+            [0.0, 0.0, -c.a2 * c2, 0.0, 0.0, -w * c.a1 * s2 - v * ce],
+        ]
+    )
+
+
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
     """Return the residual of the last of rows 37 (in/s) with erratum 2 mended, when the others are solved.
 

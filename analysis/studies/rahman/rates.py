@@ -17,7 +17,6 @@ from ..variation import unvaried
 from .figures import (
     ANGLE,
     ANGLES_DEG,
-    CRANK,
     NOTHING,
     OFFSETS,
     ROUNDING,
@@ -32,7 +31,6 @@ from .method import (
     DOTS,
     MAYBE,
     MOVING,
-    ROD,
     ROW_F,
     FloatArray,
     H,
@@ -52,6 +50,7 @@ from .printed import (
     later,
     loop_rates,
     mended_row,
+    separated_rates,
 )
 from .table import Case
 
@@ -97,29 +96,8 @@ def _printed_rates() -> tuple[Statement, ...]:
     seconds = joint_accelerations(crank, GENERAL, rates)
     quicker, moved, _ = later(crank, GENERAL, rates, seconds)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(quicker, moved)))
-    (s2, se, s3), (c2, ce, c3) = (f([GENERAL.th2, GENERAL.eta2, GENERAL.th3]) for f in (np.sin, np.cos))
-    # eq 38 as printed, in the order theta2', theta3', eta2', eta3', S4'
-    coefficients = np.array(
-        [
-            [-se, 0.0, s2 * ce, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, s3],
-            [0.0, 0.0, c2, 1.0, 0.0],
-            [ROD * ce, 0.0, ROD * s2 * se, 0.0, -c3],
-            [ce, 1.0, s2 * se, 0.0, 0.0],
-            [0.0, 0.0, -ROD * c2, 0.0, 0.0],
-        ]
-    )
-    w, v = crank.speed, crank.shift_rate
-    column = [
-        w * se,
-        -w * CRANK * s2 * ce + v * se,
-        0.0,
-        -w * (CRANK * c2 + ROD * ce),
-        -w * ce,
-        -w * CRANK * s2 - v * ce,
-    ]
     order = [Joints._fields.index(name) for name in ("th2", "th3", "eta2", "eta3", "s4")]
-    eq_38 = np.column_stack([coefficients, column]) - np.column_stack([matrix[:, order], -right])
+    eq_38 = separated_rates(crank, GENERAL) - np.column_stack([matrix[:, order], -right])
     ratios = (0.5, 1.0, 2.0)
     slips = {ratio: _sinusoidal(ratio) for ratio in ratios}
     names = ("theta2' by eq 39", "eta2' by eq 41", "theta3' by eq 40", "eta3' by eq 42", "S4' by eq 43")

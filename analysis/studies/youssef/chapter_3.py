@@ -109,14 +109,22 @@ class Drift:
         return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
 
     @property
-    def line(self) -> tuple[float, float]:
-        """Drift in a turn after the transient (cm), and the greatest distance from a line relative to the drift over all."""
+    def _ends(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Turns after the transient, or all if none comes after it, and the slider position at their ends (cm)."""
         last = int(min(DRAWN_TURNS, np.nan_to_num(self.collinear_turn, nan=DRAWN_TURNS)))
-        # from the start if none comes after it
         turns = np.arange(TRANSIENT_TURNS if last > TRANSIENT_TURNS else 0, last + 1)
-        ends = self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
-        best = np.polyfit(turns, ends, 1)
-        return float(best[0]), float(np.abs(ends - np.polyval(best, turns)).max() / np.ptp(ends))
+        return turns, self.slider_cm[turns * SAMPLES_PER_DRIFT_TURN]
+
+    @property
+    def rate(self) -> float:
+        """Drift in a turn after the transient, by the best line (cm)."""
+        return float(np.polyfit(*self._ends, 1)[0])
+
+    @property
+    def bend(self) -> float:
+        """Greatest distance of the ends of turns after the transient from their best line, relative to the drift over them."""
+        turns, ends = self._ends
+        return float(np.abs(ends - np.polyval(np.polyfit(turns, ends, 1), turns)).max() / np.ptp(ends))
 
     def unsteadiness(self, number: int) -> float:
         """Difference between a turn and the next, each less its drift, relative to the range of the next."""
@@ -156,7 +164,7 @@ def drift_result() -> StudyResult:
     shapes = [
         at_most(_mu(mu), ALIKE, run.unsteadiness(3), why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]
     ]
-    bends = [at_most(_mu(mu), ALIKE, run.line[1], why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
+    bends = [at_most(_mu(mu), ALIKE, run.bend, why=accelerates) for mu, run in runs.items() if mu > DAMPINGS[0]]
     # with the strongest damper the links never are collinear
     folds = {mu: run.collinear_turn for mu, run in runs.items() if np.isfinite(run.collinear_turn)}
     sooner = [
@@ -217,7 +225,7 @@ def weightless_result() -> StudyResult:
     for mu in DAMPINGS:
         columns[f"slider position u; {_mu(mu)} [cm]"] = drift(mu).until_collinear
         columns[f"slider position u without gravity; {_mu(mu)} [cm]"] = drift(mu, 0.0).until_collinear
-    ratios = {mu: drift(mu, 0.0).line[0] / drift(mu).line[0] for mu in NEAR_LINEAR}
+    ratios = {mu: drift(mu, 0.0).rate / drift(mu).rate for mu in NEAR_LINEAR}
     return StudyResult(
         number="3.3",
         claim="Without gravity M, the rate of the drift, is slightly reduced.",

@@ -28,6 +28,7 @@ from ...youssef import (
     Form,
     PeriodicEquation,
     Region,
+    SliderEquation,
     Variant,
     boundary_stiffnesses,
     hill_multipliers,
@@ -223,30 +224,36 @@ def judge_inertia(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     )
 
 
-def formulas() -> tuple[Case, ...]:
-    """Compare the formulas of the perturbation, to the letter with an h0 of 0, with Hill's determinant."""
-    given = slider_equation(chapter_4(1.0), 1.0, variant=Variant.PRINTED, form=Form.SERIES)
-    equation = given.homogeneous()
-    by_hill, k, k0 = hill_regions(equation, 2), given.stiffness.to_order(2), given.spring_factor.mean
+def to_the_letter(given: SliderEquation) -> tuple[tuple[float, float], ...]:
+    """Return the zeroth boundary by (5.13), twice, and those of the first two regions by (5.16), (5.26); h0 is 0."""
+    s, k = given.spring_factor, given.stiffness.to_order(2)
 
     def amplitudes(n: int, at: float) -> tuple[float, float]:
-        return at * given.spring_factor.cos[n] / k0 + k.cos[n], at * given.spring_factor.sin[n] / k0 + k.sin[n]
+        return at * s.cos[n] / s.mean + k.cos[n], at * s.sin[n] / s.mean + k.sin[n]
 
-    ends = {"(5.13)": (-0.5 * np.hypot(*amplitudes(1, 0.0)) ** 2, 0.0)}
-    ends["(5.16)"] = 0.25, 0.5 * np.hypot(*amplitudes(1, 0.25))
     (n1, n2), (m1, m2) = (amplitudes(n, 1.0) for n in (1, 2))
     p, r = (n2**2 - 5.0 * n1**2) / 12.0 + m1 / 2.0, (n1**2 - 5.0 * n2**2) / 12.0 - m1 / 2.0
     q = m2 / 2.0 - n1 * n2 / 2.0
-    ends["(5.26)"] = 1.0 - 0.5 * (p + r), 0.5 * np.sqrt((p - r) ** 2 + 4.0 * q**2)
-    zeroth = boundary_stiffnesses(equation, 1, count=1)[0].real
-    cases = [at_most("(5.13)", SMALL, abs(ends["(5.13)"][0] / k0 - zeroth) / by_hill[1].width)]
-    for number, name in ((1, "(5.16)"), (2, "(5.26)")):
-        region, (middle, half) = by_hill[number], ends[name]
-        cases += [
-            at_most(f"{name}, {end}", SMALL, abs((middle + side * half) / k0 - getattr(region, end)) / region.width)
-            for end, side in (("low", -1.0), ("high", 1.0))
-        ]
-    return tuple(cases)
+    zeroth = -0.5 * np.hypot(*amplitudes(1, 0.0)) ** 2
+    middles = zeroth, 0.25, 1.0 - 0.5 * (p + r)
+    halves = 0.0, 0.5 * np.hypot(*amplitudes(1, 0.25)), 0.5 * np.sqrt((p - r) ** 2 + 4.0 * q**2)
+    return tuple(((middle - half) / s.mean, (middle + half) / s.mean) for middle, half in zip(middles, halves))
+
+
+def formulas() -> tuple[Case, ...]:
+    """Compare the formulas of the perturbation with Hill's determinant."""
+    given = slider_equation(chapter_4(1.0), 1.0, variant=Variant.PRINTED, form=Form.SERIES)
+    (zeroth, _), *regions = to_the_letter(given)
+    right = hill_regions(given.homogeneous(), 2)
+    below = boundary_stiffnesses(given.homogeneous(), 1, count=1)[0].real
+    return (
+        at_most("(5.13)", SMALL, abs(zeroth - below) / right[1].width),
+        *(
+            at_most(f"{name}, {end}", SMALL, abs(x - getattr(region, end)) / region.width)
+            for name, ends, region in zip(("(5.16)", "(5.26)"), regions, (right[1], right[2]))
+            for end, x in zip(("low", "high"), ends)
+        ),
+    )
 
 
 def widest_by_inertia() -> dict[float, float]:
@@ -326,10 +333,10 @@ def judge_coupler(found: Mapping[str, Sequence[Region]]) -> tuple[Statement, ...
     both = {"angles held": found["true orbit"], "same ground link": found[SAME_GROUND]}
     seconds, ranges = {}, []
     for number in SWEEPS:
-        mechanisms = [SWEEPS[number].mechanism(value) for value in SWEEPS[number].values]
-        seconds[number] = max(hill(p, 2).width / hill(p).width for p in mechanisms)
-        speeds = [[np.ptp([hill(p, n).low ** -0.5, hill(p, n).high ** -0.5]) for n in (1, 2)] for p in mechanisms]
-        ranges.append(max(second / first for first, second in speeds))
+        mechanisms = map(SWEEPS[number].mechanism, SWEEPS[number].values)
+        pairs = [(hill(p), hill(p, 2)) for p in mechanisms]
+        seconds[number] = max(second.width / first.width for first, second in pairs)
+        ranges.append(max(np.divide(*(of.low**-0.5 - of.high**-0.5 for of in pair[::-1])) for pair in pairs))
     return (
         Statement(
             "The width of the region decreases with increase of [sigma3].",

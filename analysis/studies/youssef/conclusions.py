@@ -334,7 +334,7 @@ def dynamics() -> tuple[Statement, ...]:
                     for x in DAMPINGS[1:]
                 ),
                 *(
-                    at_most(f"line; mu = {plain(x)} dyn.s/cm", ALIKE, drift(x).line[1], why="the drift accelerates")
+                    at_most(f"line; mu = {plain(x)} dyn.s/cm", ALIKE, drift(x).bend, why="the drift accelerates")
                     for x in DAMPINGS[1:]
                 ),
                 *(
