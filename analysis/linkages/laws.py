@@ -70,10 +70,21 @@ def expression(law: Law, about: bool, name: str) -> str:
         If a row of a table is of other kinds of quantities, or the rows are not in order.
     """
     if isinstance(law, str):
-        return law
+        return ast.unparse(_Powers().visit(ast.parse(law, mode="eval")))
     units = ("rad", "N.m") if about else ("m", "N")
     rows = [[quantity(value, unit, name) for value, unit in zip(row, units)] for row in law]
     return _table(rows, name)
+
+
+class _Powers(ast.NodeTransformer):
+    """Writes powers as `math.pow` has them, which has no value where ``**`` becomes complex; whole constant powers stay."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        whole = re.fullmatch(r"-?\d+", ast.unparse(node.right))
+        if not isinstance(node.op, ast.Pow) or whole:
+            return node
+        return ast.Call(ast.Name("pow"), [node.left, node.right], [])
 
 
 def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:

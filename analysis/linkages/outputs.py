@@ -107,7 +107,8 @@ class Outputs:
                 what, unit = ("torque", "N.m") if turned else ("force", "N")
                 of = f", on the {turned[0]}" if turned else ""
                 text = f"{what.title()} of {name} against its stretch{of}"
-                yield Output(f"{name}.exerted_{what}", unit, text, "", self.motion.tension(name, spring))
+                role = f'role="spring force", of="{name}"'
+                yield Output(f"{name}.exerted_{what}", unit, text, role, self.motion.tension(name, spring))
         yield from self._joint_forces()
 
     def _joint_forces(self) -> Iterator[Output]:

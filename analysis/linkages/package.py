@@ -344,7 +344,12 @@ class Package:
 def _imports(body: str) -> str:
     """Return the import lines that the text of the equations needs."""
     library = [name for name, value in vars(planar).items() if getattr(value, "__module__", "") == planar.__name__]
-    wanted = {"math": FUNCTIONS, "typing": ("NamedTuple",), "linkwork.friction": _FRICTION, "linkwork.planar": library}
+    wanted = {
+        "math": (*FUNCTIONS, "pow"),
+        "typing": ("NamedTuple",),
+        "linkwork.friction": _FRICTION,
+        "linkwork.planar": library,
+    }
     found = []
     for module, names in wanted.items():
         used = [name for name in names if re.search(rf"\b{name}\b", body)]

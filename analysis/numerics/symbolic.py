@@ -18,6 +18,7 @@ from .tracing import Rebound, rebound
 #: Functions of `math` that equations may use.
 ELEMENTARY = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "fabs", "hypot",
+    "pow",
 )  # fmt: skip
 
 
@@ -31,7 +32,8 @@ def library() -> Any:
 def traced(modules: tuple[ModuleType, ...], **others: Any) -> Rebound:
     """Return the functions of ``modules`` for CasADi symbols instead of floats; ``others`` replace further names."""
     casadi = library()
-    return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY} | others)
+    functions = {name: getattr(casadi, {"pow": "power"}.get(name, name)) for name in ELEMENTARY}
+    return rebound(modules, functions | others)
 
 
 def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:

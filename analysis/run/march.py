@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolver, solve_ivp
+from scipy.integrate import LSODA, OdeSolver, solve_ivp
 
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
@@ -20,7 +20,7 @@ from .prepared import Run, verdict
 from .sampling import NotFiniteError, release, sample
 from .trajectory import Occurrence, Trajectory
 
-#: Evaluations of inputs that are not finite after which one of SciPy's methods is stopped.
+#: Evaluations without a value in an interval after which LSODA is stopped, which would go on for ever.
 MOST_LOSSES = 300
 
 #: What ends an interval early: an event of the user, the release of a torsion bar by its number, or None: the limit of
@@ -44,6 +44,8 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
         rows = [*rows, (march.t, march.x, march.held)]
     values = [run.mechanism.equations.outputs(tuple(x), held, march.energy, run.p) for _, x, held in rows]
     code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x, run.limit)
+    if march.status == k.NO_STEP:
+        message += run.undefined(march.good[1])
     table = np.array(values).reshape(-1, len(names))
     if not code:
         message = energy_balance(names, table, run.settings.tolerance)
@@ -85,10 +87,11 @@ class March:
         self.occurrences: list[Occurrence] = []
         self.evaluations = 0
         self.status = k.RUNNING
-        #: the input that was not finite inside a step, which is then tried again shorter, how often, and what went well
+        #: the input that was not finite inside a step, which is then tried again shorter; evaluations without a value, and
+        #: time and state of the last one with a value
         self._lost: int | None = None
-        self._losses = 0
-        self._good = self.t, self.x
+        self.losses = 0
+        self.good = self.t, self.x
         #: value of each event at the end of the interval before; zero where it happened just there
         self._gaps: list[float] | None = None
 
@@ -165,19 +168,30 @@ class March:
             held = self._inputs(t, x, stop)
         except NotFiniteError as error:
             self._lost = error.number
-            self._losses += 1
-            if self._losses > MOST_LOSSES:
-                # LSODA would go on for ever
-                raise NotFiniteError(self.of.encoded, error.number, *self._good) from None
+            self.losses += 1
             return nothing
         try:
             result = np.array(self.equations.derivative(tuple(x), held, self.of.p))
         except (ArithmeticError, ValueError):
+            self.losses += 1
             return nothing
         # a trial of a step too long may be anywhere
-        if t > self._good[0] and np.abs(x).max() < 1e100:
-            self._good = t, x.copy()
+        if t > self.good[0] and np.abs(x).max() < 1e100:
+            self.good = t, x.copy()
         return result
+
+    def _lsoda(self) -> type[OdeSolver]:
+        """Return SciPy's LSODA, made to end where the equations have no value beyond."""
+        march = self
+
+        class EndingLSODA(LSODA):  # type: ignore[misc]
+            def _step_impl(self) -> tuple[bool, str | None]:
+                done, message = super()._step_impl()
+                if march.losses > MOST_LOSSES or not np.isfinite(self.y).all():
+                    return False, self.TOO_SMALL_STEP
+                return done, message
+
+        return EndingLSODA
 
     def _interval(
         self, stop: float, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None
@@ -186,7 +200,7 @@ class March:
         t0, x0 = self.t, self.x
         times = self.settings.times
         watched = self._watched(stop)
-        self._lost, self._losses, self._good = None, 0, (t0, x0)
+        self._lost, self.losses, self.good = None, 0, (t0, x0)
 
         def right_side(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             if show is not None:
@@ -199,7 +213,7 @@ class March:
                 right_side,
                 (t0, stop),
                 x0,
-                method=method,
+                method=self._lsoda() if method == "LSODA" else method,
                 t_eval=np.append(inner, stop),
                 events=[function for _, function in watched],
                 rtol=max(self.settings.tolerance, 3e-14),
@@ -238,7 +252,7 @@ class March:
             if self.rows[-1][0] > t0:
                 self.t, self.x = self.rows[-1][:2]
             if self._lost is not None:
-                raise NotFiniteError(self.of.encoded, self._lost, *self._good)
+                raise NotFiniteError(self.of.encoded, self._lost, *self.good)
             clearance = self.equations.clearance(tuple(self.x), self.held, self.of.p)
             self.status = k.LIMIT if abs(clearance) < NEAR_LIMIT else k.NO_STEP
         self.held = self._inputs(self.t, self.x, stop)

@@ -203,7 +203,7 @@ class Run:
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
         code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit, needed)
         if status[0] == k.NO_STEP:
-            message += self._undefined(x, u, problem.modes, batch.p[0])
+            message += self.undefined(x)
         values = turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces))
         balance = "" if code else energy_balance(self.mechanism.output_names, values, self.settings.tolerance)
         message = "; ".join(filter(None, (message, stiff, balance)))
@@ -231,21 +231,18 @@ class Run:
             raise RunInterrupted(trajectory)
         return trajectory
 
-    def _undefined(
-        self, x: NDArray[np.float64], u: NDArray[np.float64], modes: NDArray[np.float64], p: NDArray[np.float64]
-    ) -> str:
+    def undefined(self, x: NDArray[np.float64]) -> str:
         """Say which springs exert no finite force a microsecond or a millisecond after a state, or nothing."""
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
         states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
-        names, values = self.mechanism.output_names, outputs_of(self.mechanism, modes, p, states, np.tile(u, (2, 1)))
+        names, idle = self.mechanism.output_names, np.zeros((2, len(self.mechanism.channels)))
+        values = outputs_of(self.mechanism, np.array(self.modes), np.array([*self.p, 0.0]), states, idle)
         if "assembly.clearance" in names:
             # beyond the limit of assembly nothing has a value
             values = values[np.isfinite(values[:, names.index("assembly.clearance")])]
-        lost = [
-            name.rpartition(".")[0]
-            for name, column in zip(names, values.T)
-            if name.rpartition(".")[2].startswith("exerted") and not np.isfinite(column).all()
-        ]
+        springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
+        finite = dict(zip(names, map(np.all, np.isfinite(values).T)))
+        lost = [spring for name, spring in springs.items() if not finite[name]]
         words = "law of {} has" if len(lost) == 1 else "laws of {} have"
         return f": the {words.format(' and '.join(lost))} no value beyond" if lost else ""
 

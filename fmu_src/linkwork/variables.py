@@ -54,6 +54,7 @@ ROLES = {
     "ratio": ("parameter", "ratio of a gear pair, on which the common period of all bodies depends"),
     "gravity": ("parameter", "acceleration of gravity, or a direction that it has"),
     "drive": ("output", "torque or force with which a freedom is driven"),
+    "spring force": ("output", "force or torque that a spring exerts"),
     "joint force": ("output", "component of the force in a joint, in the order of the axes"),
     "guide force": ("output", "force of a guide across it"),
     "transmission": ("output", "transmission angle: the links lock where its sine is zero"),

@@ -78,7 +78,7 @@ def arguments_of(name: str) -> list[tuple[np.ndarray, ...]]:
     return [(g.uniform(-3.0, 3.0, COUNT),), (spread(g, 1e-140, 1e140),)]
 
 
-@pytest.mark.parametrize("name", ELEMENTARY)
+@pytest.mark.parametrize("name", [name for name in ELEMENTARY if name != "pow"])
 def test_functions_err_by_no_more_than_their_bound(name: str) -> None:
     for arguments in arguments_of(name):
         assert greatest_error(name, *arguments) <= lanes.BOUNDS[name]
@@ -90,7 +90,7 @@ def test_a_power_is_that_of_the_c_library() -> None:
     assert values("pow", x, y).tolist() == list(map(math.pow, x.tolist(), y.tolist()))
 
 
-@pytest.mark.parametrize("name", [name for name in ELEMENTARY if name not in ("atan2", "hypot")])
+@pytest.mark.parametrize("name", [name for name in ELEMENTARY if name not in ("atan2", "hypot", "pow")])
 def test_arguments_without_a_straight_line(name: str) -> None:
     """Zeros, infinities, what is no number, angles of astronomical size, one beside the other."""
     x = np.array([0.0, -0.0, inf, -inf, nan, 1e10, -1e300, 0.5])
@@ -114,7 +114,7 @@ def test_angles_on_the_axes(y: float, x: float) -> None:
     assert values("hypot", y * row, x * row).tolist() == [math.hypot(y, x)] * lanes.width()
 
 
-@pytest.mark.parametrize("name", [*ELEMENTARY, "pow"])
+@pytest.mark.parametrize("name", ELEMENTARY)
 def test_a_lane_depends_neither_on_its_neighbours_nor_on_their_number(name: str) -> None:
     g = np.random.default_rng(5)
     arguments = [abs(g.normal(size=8 * lanes.width())) for _ in range(1 + (name in ("atan2", "hypot", "pow")))]

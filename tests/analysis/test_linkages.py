@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from analysis.files import entry_names
-from analysis.linkages import Dyad, Package, Racked, described, linkage, load_linkage
+from analysis.linkages import Dyad, Package, Racked, described, laws, linkage, load_linkage
 from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
 from analysis.linkages.structure import Pin, Slider
@@ -565,6 +565,13 @@ def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
         find_orbit(replace(made.first_set.parameters, wind_n=2.5), speed=10.0)
     # where the law has no value at some angle it is none of them
     assert not wheel("rooted", law="tanh(x**1.5)").mechanism().cyclic
+
+
+def test_powers_that_are_not_whole_have_no_complex_value() -> None:
+    written = laws.expression("a*x**2 - 3*x**-1 + (x - 1)**(2*x**1.5)", False, "law")
+    assert written.replace("(-1)", "-1") == "a * x ** 2 - 3 * x ** -1 + pow(x - 1, 2 * pow(x, 1.5))"
+    with pytest.raises(ValueError, match="math domain error"):
+        eval(laws.expression("x**1.5", False, "law"), vars(math) | {"x": -0.1})
 
 
 def test_springs_without_a_length_are_named() -> None:
