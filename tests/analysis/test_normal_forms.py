@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 from math import sqrt
 
 import numpy as np
@@ -36,6 +37,22 @@ def test_period_doubling_of_the_logistic_map() -> None:
 def test_fold_of_a_parabola() -> None:
     forms = Forms(lambda x: x - 0.7 * x**2 + 3.0 * x**3, np.array([[1.0]]))
     assert abs(form_coefficient(forms, Crossing.FOLD, 1.0, 1e-3)) == pytest.approx(0.7, rel=1e-6)
+
+
+def test_multilinear_forms_of_a_cubic_map() -> None:
+    """They are those that the map is made of, at complex vectors too."""
+    g = np.random.default_rng(2)
+    a, b, c = g.normal(size=(3, 3)), g.normal(size=(3, 3, 3)), g.normal(size=(3, 3, 3, 3))
+    b = (b + b.transpose(0, 2, 1)) / 2.0
+    c = sum(c.transpose(0, *order) for order in permutations((1, 2, 3))) / 6.0
+
+    def cubic(x: np.ndarray) -> np.ndarray:
+        return a @ x + np.einsum("ijk,j,k", b, x, x) / 2.0 + np.einsum("ijkl,j,k,l", c, x, x, x) / 6.0
+
+    second, third = Forms(cubic, a).complex(0.1)
+    u, v, w = g.normal(size=(3, 3)) + 1j * g.normal(size=(3, 3))
+    assert second(u, v) == pytest.approx(np.einsum("ijk,j,k", b, u, v), rel=1e-9)
+    assert third(u, v, w) == pytest.approx(np.einsum("ijkl,j,k,l", c, u, v, w), rel=1e-9)
 
 
 def delayed(r: float, place: np.ndarray) -> np.ndarray:

@@ -95,6 +95,7 @@ def test_pid_has_the_poles_asked_for(held) -> None:
     design = design_pid(held, poles=wanted)
     assert np.sort_complex(design.poles) == pytest.approx(np.sort_complex(np.array(wanted)), rel=1e-8)
     assert np.abs(design_pid(held, bandwidth=80.0, damping=0.6).poles) == pytest.approx([80.0] * 3, rel=1e-8)
+    assert design_pid(held, bandwidth=80.0, damping=1.0).poles == pytest.approx([-80.0] * 3, rel=1e-4)
 
 
 def test_pi_has_the_crossover_and_phase_asked_for(held) -> None:

@@ -132,6 +132,18 @@ def test_the_constraints_of_the_greatest_distance_have_exact_slopes() -> None:
         # the nearest point of a corner changes with the step in a few places
         assert np.median(np.abs(exact[:, k] - differences)) < 1e-4 * (1.0 + np.abs(differences).max())
         assert np.abs(exact[:, k]).max() == pytest.approx(np.abs(differences).max(), rel=1e-2, abs=1e-4)
+    # between wider bounds there is as much more room
+    free = program.g_low != program.g_high
+    rooms = []
+    for more in (0.0, 0.5):
+        program.g_low, program.g_high = (
+            np.where(free, -1.0 - more, program.g_low),
+            np.where(free, 1.0 + more, program.g_high),
+        )
+        (held,) = (c for c in down.constraints() if c["type"] == "ineq")
+        rooms.append(held["fun"](y)[: 2 * free.sum()])
+    assert free.any()
+    assert rooms[1] - rooms[0] == pytest.approx(0.5 * np.ones(2 * free.sum()))
 
 
 # Corners
