@@ -182,6 +182,8 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
             if code == _GIVEN_UP:
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
+            if code == k.NO_STEP:
+                message += task.run(i).undefined(x)
             stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages

@@ -233,6 +233,9 @@ class Run:
 
     def undefined(self, x: NDArray[np.float64]) -> str:
         """Say which springs exert no finite force a microsecond or a millisecond after a state, or nothing."""
+        springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
+        if not springs:
+            return ""
         n, states = len(self.mechanism.freedoms), np.tile(x, (2, 1))
         states[:, :n] += np.array([[1e-6], [1e-3]]) * x[n : 2 * n]
         names, idle = self.mechanism.output_names, np.zeros((2, len(self.mechanism.channels)))
@@ -240,7 +243,6 @@ class Run:
         if "assembly.clearance" in names:
             # beyond the limit of assembly nothing has a value
             values = values[np.isfinite(values[:, names.index("assembly.clearance")])]
-        springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
         finite = dict(zip(names, map(np.all, np.isfinite(values).T)))
         lost = [spring for name, spring in springs.items() if not finite[name]]
         words = "law of {} has" if len(lost) == 1 else "laws of {} have"

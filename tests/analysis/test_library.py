@@ -23,7 +23,7 @@ from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, frequency_response, orbit_of
 from analysis.periodic.motion.discretisation import operating_point
 from analysis.probe import probe
-from analysis.run import Inputs, Trajectory, case_from, compare, cosimulate, load_case, simulate
+from analysis.run import Inputs, Trajectory, case_from, compare, cosimulate, load_case, simulate, simulate_many
 from analysis.studio import page_of, state_of
 from analysis.studio.tables import tables_of
 from analysis.synthesis.result.described import description, drives
@@ -226,9 +226,13 @@ def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
     rocker.tables["name"] = "two-laws-one-ends"
     rocker.spring("pad", at="A", law=f"10*sqrt({limit - 3e-3!r} - x)")
     made = rocker.mechanism()
-    found = simulate(made.first_set.parameters, Inputs(speed=5.0), initial=made.first_set.initial, stop_time=1.0)
+    given = {"inputs": Inputs(speed=5.0), "initial": made.first_set.initial, "stop_time": 1.0}
+    found = simulate(made.first_set.parameters, **given)
     assert found.status == 4
     assert found.message.endswith("the law of pad has no value beyond")
+    # so do the runs of an ensemble
+    many = simulate_many([made.first_set.parameters] * 2, **given)
+    assert [message.partition(":")[2] for message in many.messages] == [" the law of pad has no value beyond"] * 2
 
 
 @pytest.mark.slow
