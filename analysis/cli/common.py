@@ -301,6 +301,7 @@ PARAMETERS = "a file of parameters alone", "linkwork info"
 SYNTHESIS = "a synthesis case", "linkwork synthesize"
 SLIDER_MOTION = "a case of a slider's motion", "linkwork slider-motion"
 TUNING = "a case of a tuning", "linkwork tune"
+SYSTEM = "a system of parts", "linkwork system run"
 #: What no command takes for a case, by the ending of the file.
 _OTHERS = {
     ".fmu": "an FMU: linkwork info {0} describes it, linkwork run CASE --fmu {0} runs it",
@@ -318,6 +319,8 @@ def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
     from ..run import COMMON, acting_on
 
     names = set(tables)
+    if "parts" in names:
+        return SYSTEM
     if described_in(tables) and not names & {"tune", "task"}:
         return RUN
     if "tune" in names:

@@ -67,7 +67,10 @@ class Given(TypedDict):
     "over it), or model-exchange under CVode.",
 )
 @click.option(
-    "--method", default="compiled", show_default=True, help="compiled, Hamming, or a method of SciPy's solve_ivp."
+    "--method",
+    default="compiled",
+    show_default=True,
+    help="compiled, balanced, Hamming, or a method of SciPy's solve_ivp.",
 )
 @click.option("--stop-time", metavar="TIME", help="End of the run, such as '2 s'.")
 @click.option("--step", metavar="TIME", help="Step of the samples and of the co-simulation, such as '0.1 ms'.")

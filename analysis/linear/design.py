@@ -86,6 +86,13 @@ class Design:
     crossover: float
     delay_margin: float
 
+    def __repr__(self) -> str:
+        integral = f", integral {self.integral_gain:.6g}" if self.integral_gain else ""
+        margins = f"gain margin {self.gain_margin:.4g}, phase margin {np.degrees(self.phase_margin):.4g} deg"
+        law = f"{self.method} from {self.channel} to {self.coordinate}"
+        gains = f"gains {', '.join(f'{gain:.6g}' for gain in self.gains)}{integral}"
+        return f"<{law}: {gains}; poles {self.poles.round(4).tolist()}; {margins}>"
+
     @property
     def coordinate(self) -> str:
         """FMI name of the controlled coordinate."""

@@ -101,6 +101,9 @@ class Equilibrium:
     residual: float
     iterations: int
 
+    def __repr__(self) -> str:
+        return f"<Equilibrium: {mechanism_of(self.parameters).where(self.coordinates.tolist())}>"
+
     def __getitem__(self, name: str) -> float:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:

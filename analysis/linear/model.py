@@ -272,6 +272,10 @@ class LinearModel(Matrices):
     state: FloatArray
     channels: FloatArray
 
+    def __repr__(self) -> str:
+        states, inputs = (", ".join(names) for names in (self.layout.state_names, self.layout.input_names))
+        return f"<LinearModel of {self.mechanism.name}: states {states}; inputs {inputs}; poles {self.poles.round(4).tolist()}>"
+
     @property
     def inputs(self) -> Inputs:
         """Inputs at the operating point, as constants; without the rates of change of commands."""

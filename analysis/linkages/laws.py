@@ -24,7 +24,10 @@ _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, as
 _ROWS = Many(Many(unchanged, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
 #: Units that a constant of a law may have.
-_UNITS = ("1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "kg", "s")
+_UNITS = (
+    "1", "rad", "m", "rad/s", "m/s", "N", "N.m", "N/m", "N.m/rad", "N.s/m", "N.m.s/rad", "N/m2", "N/m3", "N.s2/m2", "m2", "m3",
+    "kg", "s",
+)  # fmt: skip
 #: Angles at which a law is compared with itself a turn further (rad).
 _ANGLES = (-2.0, -0.7, 0.3, 1.9)
 
@@ -93,7 +96,9 @@ def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
 
 
 def _constant(value: Any, name: str) -> tuple[float, str]:
-    for unit in _UNITS:
+    # a radian has no dimension: whether one is meant is seen from the text alone
+    angular = bool(re.search("rad|deg|°|rpm|/min", str(value)))
+    for unit in sorted(_UNITS, key=lambda unit: ("rad" in unit) != angular):
         try:
             return quantity(value, unit, name), unit
         except ParameterError:

@@ -304,12 +304,14 @@ def analyse(description: Description) -> Structure:
             f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): they must be as many"
         )
     for name, freedom in freedoms.items():
-        if freedom.joint not in found:
+        # the second force of a pin of three bodies is called like C2
+        of = freedom.joint if freedom.joint in found else freedom.joint.rstrip("0123456789")
+        if freedom.joint not in found and (of not in found or len(found[of].bodies) == 2):
             raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, of linkage.freedoms.{name}")
-        if len(found[freedom.joint].bodies) != 2:
+        if len(found[of].bodies) != 2:
             raise LinkageError(
-                f"the freedom {name} is of the pin {freedom.joint} of {', '.join(found[freedom.joint].bodies)}: it must be of "
-                "one of two bodies; give the others a point of another name there"
+                f"the freedom {name} is of the pin {of} of {', '.join(found[of].bodies)}: it must be of one of two bodies; "
+                "give the others a point of another name there"
             )
     steps, left = _solve(description, found, [f.joint for f in freedoms.values()])
     if left:

@@ -47,7 +47,7 @@ class InputError(LinkworkError, ValueError):
 class UnknownNameError(ParameterError, InputError):
     """An unknown name; ``known`` are the valid names, ``near`` the one that was probably meant.
 
-    The message lists the valid names, or the nearest five if there are more than eight; ``words`` replace the name in it.
+    The message lists the valid names, or the nearest five if there are more than ten; ``words`` replace the name in it.
     """
 
     def __init__(self, name: str, known: tuple[str, ...], words: str = "") -> None:
@@ -55,7 +55,7 @@ class UnknownNameError(ParameterError, InputError):
 
         self.known = known
         self.near = next(iter(get_close_matches(name, known, 1)), None)
-        few = len(known) <= 8
+        few = len(known) <= 10
         listed = ", ".join(known if few else get_close_matches(name, known, _LISTED, 0.0))
         super().__init__(words or name, None, f"be one of {listed}")
         hint = f"; did you mean {self.near}?" if self.near else ""

@@ -323,6 +323,10 @@ class Mechanism:
             raise LinkworkError(f"this {self.name} is not the MECHANISM of {package}: another process cannot import it")
         return _load, (package,)
 
+    def __repr__(self) -> str:
+        freedoms = ", ".join(freedom.coordinate for freedom in self.freedoms)
+        return f"<mechanism {self.name}: freedoms {freedoms}; inputs {', '.join(self.input_names)}>"
+
     @cached_property
     def size(self) -> int:
         """Number of components of the state."""

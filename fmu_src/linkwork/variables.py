@@ -38,6 +38,11 @@ UNITS = {
     "N.s/m": Unit(kg=1, s=-1),
     "N.m/rad": Unit(kg=1, m=2, s=-2, rad=-1),
     "N.m.s/rad": Unit(kg=1, m=2, s=-1, rad=-1),
+    "N/m2": Unit(kg=1, m=-1, s=-2),
+    "N/m3": Unit(kg=1, m=-2, s=-2),
+    "N.s2/m2": Unit(kg=1, m=-1),
+    "m2": Unit(m=2),
+    "m3": Unit(m=3),
     "J": Unit(kg=1, m=2, s=-2),
     "W": Unit(kg=1, m=2, s=-3),
 }

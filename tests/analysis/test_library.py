@@ -278,11 +278,18 @@ def test_whitworths_lever_is_fast_on_one_side():
     assert slow == pytest.approx(0.5 + np.arcsin(30.0 / 80.0) / np.pi, abs=3e-4)
 
 
-@pytest.mark.parametrize(("name", "span", "height"), [("klann", 75.0, 4.0), ("jansen", 45.0, 2.5)])
+@pytest.mark.parametrize(("name", "span", "height"), [("klann", 100.0, 4.0), ("jansen", 45.0, 2.5)])
 def test_a_foot_is_flat_on_the_ground(name, span, height):
     found = run(name)
     x, y = 1e3 * found["P.x"], 1e3 * found["P.y"]
     assert np.ptp(x[y < y.min() + height]) > span
+
+
+def test_klanns_foot_is_where_the_patent_has_it():
+    """With the leg stretched out it is the origin of the coordinates in which the crank's axis is (1.599, 0.750) units."""
+    found = run("klann")
+    i = np.cos(found["crank.angle"]).argmin()
+    assert [1e3 * found[f"P.{axis}"][i] for axis in "xy"] == pytest.approx([-159.9, -75.0], abs=0.5)
 
 
 def test_another_ratio_with_another_period_is_refused():

@@ -567,6 +567,29 @@ def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
     assert not wheel("rooted", law="tanh(x**1.5)").mechanism().cyclic
 
 
+def test_constants_of_a_law_keep_their_units() -> None:
+    given = {"a": "2 cm^2", "p": "10 bar", "c": "3e6 N/m^3", "k": "0.5 N*m/deg", "m": "3 N*m", "n": 2.5}
+    found = {"a": (2e-4, "m2"), "p": (1e6, "N/m2"), "c": (3e6, "N/m3"), "m": (3.0, "N.m"), "n": (2.5, "1")}
+    read = laws.constants(given, "law")
+    stiffness, unit = read.pop("k")
+    assert (stiffness, unit) == (pytest.approx(90.0 / math.pi), "N.m/rad")
+    assert read == found
+    made = wheel("gas", law="a*p*x/c", constants={name: given[name] for name in "apc"}).mechanism()
+    assert {v.name: v.unit for v in made.variables if v.role == "law"} == {
+        "wind.a": "m2",
+        "wind.p": "N/m2",
+        "wind.c": "N/m3",
+    }
+
+
+def test_a_freedom_at_a_pin_of_three_bodies_names_them() -> None:
+    for joint in ("Q", "Q2"):
+        built = wheel("crowded", stiffness="0.01 N*m/rad").body("bob", bar=("Q", "S"), length="0.1 m", mass=0.1)
+        built.freedom("bob", joint)
+        with pytest.raises(LinkworkError, match="of the pin Q of drum, pendulum, bob: it must be of one of two bodies"):
+            built.mechanism()
+
+
 def test_powers_that_are_not_whole_have_no_complex_value() -> None:
     written = laws.expression("a*x**2 - 3*x**-1 + (x - 1)**(2*x**1.5)", False, "law")
     assert written.replace("(-1)", "-1") == "a * x ** 2 - 3 * x ** -1 + pow(x - 1, 2 * pow(x, 1.5))"

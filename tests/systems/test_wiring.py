@@ -88,6 +88,24 @@ def test_notes_name_what_is_not_connected_and_loops() -> None:
     )
 
 
+def test_a_controller_without_gains_is_noted(tmp_path: Path) -> None:
+    text = library()["slider-tracking"].read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if "gain =" not in line]
+    (tmp_path / "idle.toml").write_text("\n".join(lines), encoding="utf-8")
+    assert len(lines) < len(text.splitlines())
+    found = [note for note in load_system(tmp_path / "idle.toml").wiring().notes() if "controls nothing" in note]
+    assert [note.partition(": ")[2] for note in found] == [
+        "it controls nothing, as its gains are 0: gain, integral_gain, derivative_gain"
+    ]
+    assert not any("controls nothing" in note for note in wiring_of("slider-tracking").notes())
+
+
+def test_a_system_given_to_a_command_for_cases_is_named(linkwork: Callable[..., Result]) -> None:
+    result = linkwork("run", str(library()["slider-tracking"]))
+    assert result.exit_code == 1
+    assert "is a system of parts: linkwork system run" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("name", "count"), [("motor-crank", 1), ("press", 3), ("two-linkages", 3), ("slider-tracking", 0)]
 )
