@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import analysis.synthesis as syn
 from analysis.run import Inputs, case_from, simulate
 from analysis.synthesis.result.report import report
+from analysis.synthesis.task.constraint import advance, stroke
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank.parameters import InitialState
 
@@ -54,6 +55,16 @@ def advantage(linkage: syn.SliderCrank, rotation: Any) -> FloatArray:
     with np.errstate(divide="ignore"):
         found: FloatArray = 2e-6 * linkage.crank_length / (turned - linkage.slider_position(phi - 1e-6))
     return found
+
+
+@settings(max_examples=50, deadline=None)
+@given(slider_cranks().filter(lambda linkage: linkage.turns_fully))
+def test_stroke_and_advance_are_those_of_the_places_of_the_slider(linkage: syn.SliderCrank) -> None:
+    phi = np.linspace(0.0, 2.0 * pi, 7200, endpoint=False)
+    u = linkage.slider_position(phi)
+    assert stroke(linkage) == pytest.approx(np.ptp(u), rel=1e-5)
+    between = abs(phi[u.argmax()] - phi[u.argmin()])
+    assert pi + abs(advance(linkage)) == pytest.approx(max(between, 2.0 * pi - between), abs=3e-3)
 
 
 @settings(max_examples=100, deadline=None)
