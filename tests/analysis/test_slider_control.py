@@ -97,8 +97,12 @@ def test_pid_has_the_poles_asked_for(held) -> None:
     assert np.abs(design_pid(held, bandwidth=80.0, damping=0.6).poles) == pytest.approx([80.0] * 3, rel=1e-8)
     # all of it is shown in a line
     assert repr(design).startswith("<PID from slider.force to slider.position: gains ")
-    assert repr(held).startswith("<LinearModel of five-bar: states slider.position, slider.velocity; inputs slider.force")
-    assert repr(held.mechanism).startswith("<mechanism five-bar: freedoms crank.angle, slider.position; inputs drive.torque")
+    assert repr(held).startswith(
+        "<LinearModel of five-bar: states slider.position, slider.velocity; inputs slider.force"
+    )
+    assert repr(held.mechanism).startswith(
+        "<mechanism five-bar: freedoms crank.angle, slider.position; inputs drive.torque"
+    )
     assert design_pid(held, bandwidth=80.0, damping=1.0).poles == pytest.approx([-80.0] * 3, rel=1e-4)
 
 
