@@ -142,6 +142,20 @@ def test_the_guide_spans_the_travel_of_the_slider() -> None:
     np.testing.assert_allclose(scene.guide[0] + travel[:, None] * along, places, atol=1e-12)
 
 
+def test_the_block_is_drawn_as_a_rectangle_along_its_guide() -> None:
+    tilted = replace(SLIDING, pivot=replace(SLIDING.pivot, guide_angle=0.5))
+    drawn = syn.drawing(timed(tilted), 1.0)
+    (line,), (block,) = (
+        [x for x in shapes if x.layer in ("guide", "slider")] for shapes in (drawn.lines, drawn.polylines)
+    )
+    guide = np.subtract(line.end, line.start)
+    sides = np.roll(block.points, -1, axis=0) - block.points
+    assert [abs(sides[k] @ sides[k - 1]) for k in range(4)] == pytest.approx([0.0] * 4, abs=1e-12)
+    assert abs(sides[0] @ guide) == pytest.approx(hypot(*sides[0]) * hypot(*guide))
+    assert hypot(*sides[0]) == pytest.approx(1.5 * hypot(*sides[1]))
+    assert block.points.mean(axis=0) == pytest.approx(tilted.pins(1.0)["D"])
+
+
 def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
     task = syn.Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
     solution = syn.Solution.of(task, SWINGING)
