@@ -384,7 +384,11 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
     mechanism = mechanism_of(parameters)
     its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
     if not its.free:
-        raise InputError(f"no freedom of the {mechanism.name} is free: there is nothing to linearise")
+        names = " and ".join(mechanism.freedoms[n].rate for n in its.commanded)
+        raise InputError(
+            f"no freedom of the {mechanism.name} is free, {names} being commanded: there is nothing to linearise; leave out a "
+            "commanded speed"
+        )
     for row, u in zip(states, channels):
         if not np.all(np.isfinite(row)):
             raise InputError(f"the state {row} is not finite")

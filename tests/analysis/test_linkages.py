@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from analysis.files import entry_names
+from analysis.linear import linearise
 from analysis.linkages import Dyad, Package, Racked, described, laws, linkage, load_linkage
 from analysis.linkages.builder import Builder
 from analysis.linkages.description import Body, FreedomTable, Gear, Rack, Slide, Slot, Spring
@@ -580,6 +581,14 @@ def test_constants_of_a_law_keep_their_units() -> None:
         "wind.p": "N/m2",
         "wind.c": "N/m3",
     }
+
+
+def test_a_linkage_whose_freedoms_are_all_commanded_has_no_linear_model() -> None:
+    built = linkage("lone-arm", ground={"A": (0, 0)}).body("arm", bar=("A", "B"), length="0.1 m", mass=0.1)
+    made = built.freedom("arm", "A").mechanism()
+    known = made.first_set
+    with pytest.raises(InputError, match=r"arm\.speed being commanded: .*leave out a commanded speed"):
+        linearise(known.parameters, made.state(known.initial), Inputs(speed=0.0))
 
 
 def test_a_freedom_at_a_pin_of_three_bodies_names_them() -> None:

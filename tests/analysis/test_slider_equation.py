@@ -22,6 +22,7 @@ from analysis.youssef import (
     balance,
     monodromies,
     perturbed_region,
+    printed_coefficients,
     resonance,
     slider_equation,
     two_harmonics,
@@ -152,6 +153,26 @@ class TestThesis:
             for v in (Variant.EXACT, Variant.FORTRAN)
         )
         assert right / listed == pytest.approx(published.SECOND_HARMONIC_TOO_SMALL, abs=0.5)
+
+    def test_the_force_has_a_third_of_its_second_harmonic(self) -> None:
+        """A sixth with the halved factors, which makes the slider's seven times too small in the right equation too."""
+        right, ratios = slider_equation(chapter_4(1.0), 1.0), printed_coefficients.ratios(chapter_4(1.0))
+        assert right.force.amplitudes[2] == pytest.approx(0.00069, abs=5e-6)
+        forces = [right.force]
+        for coefficients, size in ((printed_coefficients.printed, 0.00023), (printed_coefficients.listed, 0.00011)):
+            parts = coefficients(ratios)
+            forces.append(FourierSeries.from_samples(parts.force(TURN) / parts.spring(TURN), 2))
+            assert forces[-1].amplitudes[2] == pytest.approx(size, abs=5e-6)
+
+        def greatest(force: FourierSeries, damping: float = 0.2) -> float:
+            equations = (
+                replace(right, force=force, spring=1000.0 / w**2, damping=damping / w)
+                for w in np.arange(15.2, 15.4, 0.005).tolist()
+            )
+            return max(two_harmonics(e).harmonic(2) for e in equations)
+
+        whole, _, halved = map(greatest, forces)
+        assert (whole, halved) == pytest.approx((0.0271, 0.0040), abs=5.1e-5)
 
     @pytest.mark.parametrize("variant", [Variant.PRINTED, Variant.FORTRAN, Variant.APPENDIX_3])
     def test_without_a_rocker_it_is_a_mass_on_a_spring(self, variant: Variant) -> None:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, radians, sin
+from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
 
+from analysis.numerics.fourier import FourierSeries
 from analysis.studies.youssef.chapter_6 import PROBLEMS
 from analysis.studies.youssef.linearised import datum, with_crank
 from analysis.synthesis import evaluate
-from analysis.youssef import Variant, slider_equation
+from analysis.youssef import Variant, hill_regions, slider_equation
 from analysis.youssef.printed_coefficients import DATUM, listed, ratios
-from linkwork.five_bar.published import TABLE_3_1
+from analysis.youssef.printed_coefficients import printed as as_printed
+from linkwork.five_bar.published import TABLE_3_1, chapter_4
 from tests import published
 from tests.oracles.multipliers import assemble
+
+TURN = np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
 
 
 def test_closure_as_printed_lacks_the_ground_link() -> None:
@@ -43,11 +47,33 @@ def test_refinement_of_the_programs_accepts_negative_corrections() -> None:
 def test_programs_halve_the_inertias_harmonics() -> None:
     """Label 17 of appendices 2 to 4, with a short crank, about its own datum."""
     p = with_crank(1e-3)
-    parts, right = listed(ratios(p), datum(1e-3)), slider_equation(p, 1.0, variant=Variant.FIRST_ORDER).mass
+    parts, equation = listed(ratios(p), datum(1e-3)), slider_equation(p, 1.0, variant=Variant.FIRST_ORDER)
+    right = equation.mass
     mass, spring = parts.inertia, parts.spring
     for name in ("cos", "sin"):
         first = (getattr(mass, name)[1] - mass.mean / spring.mean * getattr(spring, name)[1]) / spring.mean
         assert first / getattr(right, name)[1] == pytest.approx(0.5, abs=5e-3)
+        # U and V are not halved
+        force = getattr(parts.force, name)[1] / spring.mean
+        assert force / getattr(equation.force, name)[1] == pytest.approx(1.0, abs=5e-3)
+    # the terms in S2 of C, AA, G1 and G2 are half of those of (4.21)
+    p, still = (ratios(chapter_4(1.0))._replace(sigma2=x) for x in (published.SIGMA2, 0.0))
+    for name in ("inertia", "damper", "spring"):
+        half, whole = (getattr(of(p), name)(TURN) - getattr(of(still), name)(TURN) for of in (listed, as_printed))
+        assert half == pytest.approx(0.5 * whole, abs=1e-15)
+
+
+def test_stiffness_of_the_programs_has_another_first_harmonic() -> None:
+    """H2, D and E of appendices 2 to 4, over the mean of the spring's factor; it alone makes the first region too wide."""
+    short = with_crank(1e-5)
+    parts, right = listed(ratios(short)), slider_equation(short, 1.0, variant=Variant.FIRST_ORDER).stiffness
+    found = np.array([parts.stiffness.cos[1], parts.stiffness.sin[1]]) / parts.spring.mean
+    assert found * 1e5 == pytest.approx([0.0646, 0.0994], abs=5.1e-5)
+    assert [right.cos[1] * 1e5, right.sin[1] * 1e5] == pytest.approx([0.0444, -0.0770], abs=5.1e-5)
+    equation, parts = slider_equation(chapter_4(1.0), 1.0), listed(ratios(chapter_4(1.0)))
+    other = FourierSeries.from_samples(parts.stiffness(TURN) / parts.spring(TURN), 8)
+    wide, whole = (hill_regions(e.homogeneous(), 1)[1].width for e in (replace(equation, stiffness=other), equation))
+    assert wide / whole == pytest.approx(4.7, abs=0.05)
 
 
 def test_datum_of_the_programs_is_a_degree_off() -> None:
