@@ -55,7 +55,7 @@ class Variant(StrEnum):
     PRINTED
         Coefficients of (4.21) as the thesis prints them; see `analysis.youssef.printed_coefficients`.
     FORTRAN
-        Coefficients of the listings in appendices 2 and 4, which halve every term in the crank's length.
+        Coefficients of the listings in appendices 2 and 4, which halve the crank's terms in the inertia and have another K.
     APPENDIX_3
         Coefficients of appendix 3: the same with a sine where a cosine belongs.
     """

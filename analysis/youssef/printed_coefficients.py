@@ -4,7 +4,8 @@
 
 I, S, K and F have a mean and a first harmonic, since the thesis linearises about one position of the mechanism, the datum. Its
 results all hold for a coupler without mass and a rocker whose centre of mass is on the slider. The printed equation
-lacks M' zeta'. The programs lack it too, halve every term in the crank's length, and have another K.
+lacks M' zeta'. The programs lack it too, halve the crank's terms in the inertia and in the factors of spring and damper, and
+have another K.
 """
 
 from __future__ import annotations

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from analysis.studies.rules import SMALL
 from analysis.studies.youssef import chapter_4 as study
 from analysis.studies.youssef import linearised
 from analysis.youssef import Variant, nonlinear_harmonic_balance, resonance, slider_equation
@@ -35,6 +37,13 @@ def test_second_harmonic_is_the_plants() -> None:
     speed, right = study.peak(2, 1.0, study.COMPARED_AT)
     plant = nonlinear_harmonic_balance(chapter_4(1.0, study.COMPARED_AT), speed)
     assert right == pytest.approx(plant.harmonic(2) / chapter_4(1.0).rocker_length, rel=0.005)
+
+
+def test_second_harmonic_is_negligible_above_22_rad_s_alone() -> None:
+    for ratio, last in ((0.5, 22.3), (1.0, 22.1), (1.5, 21.9)):
+        speeds = np.arange(16.5, 40.05, 0.1).round(1)
+        shares = study.harmonic(2, speeds, ratio) / study.harmonic(1, speeds, ratio)
+        assert shares[speeds >= last].max() < SMALL < shares[speeds < last].min()
 
 
 @pytest.mark.parametrize(("inertia_ratio", "near"), [(1.0, 0.03), (0.5, 0.01)])

@@ -54,6 +54,12 @@ def test_first_region(inertia_ratio: float) -> None:
         assert (region.low, region.high) == pytest.approx(ends, abs=tolerance)
 
 
+@pytest.mark.parametrize(("inertia_ratio", "known"), [(0.5, 2.71), (1.0, 2.59), (1.5, 2.48), (2.0, 2.36)])
+def test_listing_makes_the_region_about_two_and_a_half_times_too_wide(inertia_ratio: float, known: float) -> None:
+    mechanism = chapter_4(inertia_ratio)
+    assert appendix_3(mechanism).width / right(mechanism).width == pytest.approx(known, abs=0.0051)
+
+
 def test_the_printed_coefficients_make_the_region_four_times_too_wide() -> None:
     mechanism = chapter_4(1.0)
     printed = first_order(mechanism, Variant.PRINTED)
@@ -100,13 +106,10 @@ def test_axis_of_a_short_crank(sigma2: float, inertia_ratio: float, by_listing: 
     assert axis(of(with_crank(sigma2, inertia_ratio))) == pytest.approx(known, abs=5e-4 if known == 1.936 else 5e-5)
 
 
-@pytest.mark.parametrize(("inertia_ratio", "known"), [(2.0, 1.87), (0.5, 1.965)])
-def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, known: float) -> None:
-    if inertia_ratio == 2.0:
-        assert axis(right(held(0.8, inertia_ratio))) == pytest.approx(1.873, abs=5e-4)
-    assert axis(appendix_3(held(0.8, inertia_ratio))) == pytest.approx(
-        known, abs=0.005 if inertia_ratio == 2.0 else 1e-3
-    )
+@pytest.mark.parametrize(("inertia_ratio", "listed", "true"), [(2.0, 1.8697, 1.8727), (0.5, 1.9649, 1.9655)])
+def test_axis_of_a_short_coupler_by_the_listing(inertia_ratio: float, listed: float, true: float) -> None:
+    for of, known in ((appendix_3, listed), (right, true)):
+        assert axis(of(held(0.8, inertia_ratio))) == pytest.approx(known, abs=5.1e-5)
 
 
 def test_held_angles_need_another_ground_link() -> None:
@@ -122,7 +125,10 @@ def test_linear_equation_and_true_orbit_at_unit_inertia() -> None:
 def test_formulas_of_the_perturbation_to_the_letter() -> None:
     """(5.16) and (5.24) to (5.26) with the coefficients of (4.29), whose h0 is 0."""
     e = slider_equation(chapter_4(1.0), 60.0, variant=Variant.PRINTED, form=Form.SERIES)
-    _, first, second = to_the_letter(e)
+    zeroth, first, second = to_the_letter(e)
+    # (5.12) with its minus
+    assert zeroth == pytest.approx(2 * (-2.605e-5,), abs=5.1e-9)
+    assert zeroth[0] == pytest.approx(boundary_stiffnesses(e.homogeneous(), 1, count=1)[0].real, rel=1e-3)
     region = perturbed_region(e.homogeneous(), 1, order=1)
     assert region is not None
     assert (region.low, region.high) == pytest.approx(first, abs=1e-9)
@@ -186,3 +192,7 @@ def test_zeroth_boundary_parts_a_stable_region_from_falling_away() -> None:
     below, above = (np.abs(np.linalg.eigvals(monodromy(exact.stiffened(x * zeroth)))).max() for x in (0.5, 1.5))
     assert below == pytest.approx(1.13041, abs=1e-5)
     assert above == pytest.approx(1.0, abs=1e-9)
+    # the mean of K puts it above 0
+    assert zeroth == pytest.approx(0.00081, abs=5e-6)
+    bare = replace(exact, c=exact.c + (-exact.c.mean))
+    assert boundary_stiffnesses(bare, 1, count=1)[0].real < 0.0

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.studies.youssef import search
 from analysis.studies.youssef.chapter_6 import best, half_units, pairing_area, rounded, straight_error
-from analysis.studies.youssef.packaging import nineteen_points
+from analysis.studies.youssef.packaging import TRAVEL_CM, nineteen_points, straightest
 from analysis.studies.youssef.problems import PROBLEMS, packaging_path
 from analysis.studies.youssef.quality import arguments, both, linkages
 from analysis.synthesis import Linkage, distance_to, evaluate, turn
@@ -74,6 +74,20 @@ def test_nineteen_points_on_the_desired_path() -> None:
     points = nineteen_points()
     assert len(points) == 19
     assert distance_to(packaging_path().points, points).max() < 1e-12
+
+
+def test_the_straightest_travel_of_the_printed_packaging_machine() -> None:
+    """Against every part, found by the ends of its points in cm; it takes less than the 120 degrees that are allowed."""
+    curve = 100.0 * PROBLEMS["packaging"].linkage.path(turn(72))
+    least = np.inf
+    for start in range(72):
+        for steps in range(1, 25):
+            x, y = curve[np.arange(start, start + steps + 1) % 72].T
+            if abs(x[-1] - x[0]) >= TRAVEL_CM:
+                least = min(least, np.ptp(y) / abs(x[-1] - x[0]))
+    part, count = straightest(curve / 100.0)
+    assert part.flatness / part.travel == pytest.approx(least, rel=1e-9)
+    assert 5 * (count - 1) < 120
 
 
 def test_error_over_the_rounding_of_printed_digits() -> None:

@@ -228,13 +228,14 @@ class TestSeries1:
         # squares on the edge count whole
         assert h * h * len(squares) == pytest.approx(area.area, rel=0.04)
 
-    def test_enclosed_area_is_what_is_reached_and_the_hole(self) -> None:
-        area = accessible_area(series_1.LINKAGE.to_five_bar(), (-0.4, 0.4), tolerance=1e-4)
+    @pytest.mark.parametrize("limits", series_1.LIMITS[2:])
+    def test_enclosed_area_is_what_is_reached_and_the_hole(self, limits: tuple[float, float]) -> None:
+        area = series_1.reach(*limits)
         holes = 0.0
         for ring in area.holes:
             w = ring @ np.array([1.0, 1j])
             holes += abs(0.5 * (w.conj() * np.roll(w, -1)).imag.sum())
-        assert series_1.enclosed(0.6, 1.4) == pytest.approx(area.area + holes, rel=2e-3)
+        assert series_1.enclosed(*limits) == pytest.approx(area.area + holes, rel=2e-3)
 
     def test_no_motion_is_nearer_than_the_variational_one(self) -> None:
         least = series_1.variational().error

@@ -388,12 +388,15 @@ class TestStatements:
                 if found.size:
                     np.testing.assert_allclose(found, rahman.dead_centres_deg(case), atol=0.005)
 
-    def test_the_offset_raises_the_forces_with_the_load_given_and_not_with_the_torque_given(self) -> None:
+    def test_the_offset_raises_the_forces_without_a_load_and_not_with_a_load_or_the_torque_given(self) -> None:
         growing = {label for label, case in judged("R8", "But with the increase of offset").items() if case.holds}
         assert growing == {"3F3j", "3F3k", "4F4i"}
         for symbol in QUANTITIES[1:-1]:
-            peaks = rahman.offsets_peaks(COMPONENTS[symbol], "load")
+            peaks = rahman.offsets_peaks(COMPONENTS[symbol], 0.0)
             assert peaks == sorted(peaks), symbol
+        pressed = rahman.offsets_peaks(COMPONENTS["1F1j"], -10.0)
+        assert pressed[1:3] == pytest.approx([57.81, 57.52], abs=0.005)
+        assert "57.81\nto 57.52 lb" in rahman.FINDINGS
 
     def test_why_forces_fall_with_the_offset_at_equal_distance_from_a_dead_centre(self) -> None:
         """The torque alone pulls the rod as hard at every a4; what it brings along j and k falls with the direction of crank

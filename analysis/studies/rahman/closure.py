@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwork.slider_crank.published import parameters
 
@@ -87,13 +88,20 @@ def _joint_freedoms() -> tuple[int, ...]:
     return tuple(ranks)
 
 
+def _settled(a4: float, shifts: FloatArray, off: float) -> NDArray[np.bool_]:
+    """Return (n, 3) whether the printed iteration settles at every angle at the shifts (in) less an amount, as is, and more."""
+    each = shifts[:, None] + off * np.array([-1.0, 0.0, 1.0])
+    return turn(parameters(a4), each.ravel()).settled.reshape(each.shape)
+
+
 def _limits() -> tuple[Statement, ...]:
     """Judge the stated limits of the iteration, and what is inferred from them for the mechanism."""
     place = text("section 3.2, L1121")
-    reached = {}
+    tried = np.arange(1.0, 3.5, 0.5)
+    reached = {0.0: float(np.max(tried[_settled(0.0, tried, 1e-9).any(-1)], initial=0.0))}
     for a4, first, stated in ((10.0, 3.5, 3.5), (20.0, 3.5, 3.5), (30.0, 0.0, 9.0)):
         tried = np.arange(first, stated + 4.5, 0.5)
-        settled = turn(parameters(a4), tried).settled
+        settled = _settled(a4, tried, 1e-6).all(-1)
         reached[a4] = first + 0.5 * (int(np.cumprod(settled).sum()) - 1)
     below = float(settled[tried <= 9.0].mean())
     between = np.linspace(*TWISTS_REACHED_DEG, 4)
@@ -120,15 +128,19 @@ def _limits() -> tuple[Statement, ...]:
             "For the particular link lengths as mentioned before, when offset [a4] is zero, the program fails to "
             "converge if the term [S1] is greater than 1.5 inches.",
             place,
-            why="where the iteration ends there depends on rounding: 1e-9 in more or less of S1 decide it",
+            "greatest S1, by halves of an inch from 1 to 3 in, at which the printed iteration settles at every angle for any "
+            "of S1 and S1 +- 1e-9 in",
+            f"0.5 in, the step of the limits; {own}",
+            (near("a4 = 0", "1.5", reached[0.0], 0.5, "in"),),
+            "up to 2 in rounding decides whether it settles, from 2.5 in on it never does",
         ),
         Statement(
             "When offset is increased to 10 inches or greater, the program fails to converge if the term [S1] is "
             "greater than 3.5 inches and when offset [a4] is 30 inches, the program converges as long as the term "
             "[S1] is less than or equal to 9 inches.",
             place,
-            "greatest S1, by halves of an inch, up to which the printed iteration settles at every angle; share of S1 = 0 to 9 "
-            "in by 0.5 in at which it settles, a4 = 30 in",
+            "greatest S1, by halves of an inch, up to which the printed iteration settles at every angle, also with 1e-6 in "
+            "more or less; share of S1 = 0 to 9 in by 0.5 in at which it so settles, a4 = 30 in",
             f"0.5 in, the step of the limits; none of the share; {own}",
             (
                 near("a4 = 10 in", "3.5", reached[10.0], 0.5, "in"),
@@ -136,7 +148,7 @@ def _limits() -> tuple[Statement, ...]:
                 near("a4 = 30 in", "9", reached[30.0], 0.5, "in"),
                 at_least("a4 = 30 in, S1 = 0 to 9 in", 1.0, below),
             ),
-            "the limit grows from 10 in on, as the sentence's second half has it",
+            "the limit grows from 10 in on, as the sentence's second half has it; at a4 = 10 in and 4.5 in rounding decides",
         ),
         Statement(
             "From this observation [of the limits of S1] it can be inferred that in order for the mechanism to work, with "
@@ -159,7 +171,7 @@ def _limits() -> tuple[Statement, ...]:
             "cannot close",
             "none, the sign decides",
             tuple(beyond),
-            "closure is lost",
+            "closure is lost; that the slider goes to the opposite side is not measured",
         ),
         Statement(
             "When offset [a4] is 20 inches and crank axial displacement [S1] is zero, the program converges as long "
@@ -260,6 +272,15 @@ def _unmet(case: Case) -> float:
     return float(np.abs(matrix @ delta - right[..., None]).max())
 
 
+def _by_name(case: Case) -> float:
+    """Return the greatest difference of (A'A)^-1 A'V from A^-1 V with the A^-1 of L457, at the first correction."""
+    matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
+    transposed = np.swapaxes(matrix, -1, -2)
+    inverse = np.linalg.inv(transposed @ matrix) @ transposed
+    delta = np.linalg.solve(transposed @ matrix, transposed @ right[..., None])
+    return float(np.abs(delta - inverse @ right[..., None]).max())
+
+
 def _at_right_angles() -> float:
     """Return A's least singular value relative to its greatest with the rod at right angles to the guide, a4 = a2 - a1."""
     p, zero = parameters(ROD - CRANK), np.zeros(1)
@@ -305,7 +326,8 @@ def closure() -> StudyResult:
             "possible and then solve the whole problem.",
             text("abstract, L45"),
             "shares of the shifts at which the crank turns fully, 0 to 48 in by 2 in at a4 = 0, 10, 20, 30 in; the iteration "
-            "as printed, by Newton and Raphson, from the planar estimate at every 30 deg",
+            "as printed, by Newton and Raphson, from the planar estimate at every 30 deg, each angle on its own, not from the "
+            "one before as in L465",
             f"none of a share; {NOTHING:g} rad, the rounding, of an open loop",
             (
                 at_most("a solution is possible, and the iteration does not settle", 0.0, missed),
@@ -351,12 +373,16 @@ def closure() -> StudyResult:
             "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "
             "A^-1 V].",
             text("section 2.6.1, eq 23a, L457-463"),
-            "whether Delta so found solves eq 23, A Delta = V, as it would by an inverse of A (L457 gives the name A^-1 to "
-            "(A'A)^-1 A'): greatest entry of A Delta - V at the first correction from the angle before, greatest of the turn, "
-            "lengths in inches",
+            "difference of the two sides, A^-1 being the name that L457 gives to (A'A)^-1 A'; whether Delta so found solves eq "
+            "23, A Delta = V, as it would by an inverse of A: greatest entry of A Delta - V; each at the first correction from "
+            "the angle before, greatest of the turn, lengths in inches",
             ROUNDING,
-            tuple(nothing(case.name, entry) for case, entry in zip((PLANE, *OPEN), unmet)),
-            "six rows for five unknowns: in the plane eq 23 is met only once the loop is closed, out of it never (erratum 1)",
+            (
+                nothing("the two sides, with A^-1 as L457 has it", max(map(_by_name, (PLANE, *OPEN)))),
+                *(nothing(f"as a form of eq 23; {case.name}", entry) for case, entry in zip((PLANE, *OPEN), unmet)),
+            ),
+            "the same by the name that L457 gives; six rows for five unknowns: in the plane eq 23 is met only once the loop is "
+            "closed, out of it never (erratum 1)",
         ),
         Statement(
             "The iterative process is continued until the absolute values of all error terms are less than or equal "
@@ -366,7 +392,8 @@ def closure() -> StudyResult:
             "rotation round the loop and error of S4 where the printed iteration ends, greatest of the turn",
             ROUNDING,
             tuple(determined),
-            "erratum 1: small steps are no closed loop",
+            "erratum 1: small steps are no closed loop; at the first position, theta1 = 0, the loop is already open by "
+            f"{', '.join(f'{followed(case).rotation_deg[0, 0]:.0f}' for case in OPEN)} deg in the three cases out of the plane",
         ),
         Statement(
             "From geometry the following formulas for the joint variables can be written.",
@@ -388,7 +415,8 @@ def closure() -> StudyResult:
                 at_most(f"out of the plane: {within}", 0.0, settled_out),
             ),
             f"in the plane it settles on the loop sought from {100.0 * on_it:.0f} % of these estimates, and from the others on "
-            "another closed loop, with the slider on the other side; out of the plane on open loops",
+            "another closed loop, with the slider on the other side; out of the plane on open loops, where the second digit of "
+            "the share depends on rounding",
         ),
         Statement(
             "Usually the process converges in 3 to 6 iterations if estimates are within 20 degrees, which is quite "

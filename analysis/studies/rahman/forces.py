@@ -161,6 +161,19 @@ def replacements() -> list[Judged]:
     return found
 
 
+def _roundoffs() -> dict[str, float]:
+    """Return the greatest roundoff in single precision of the rod's momentum in the plane, eq 50a over eq 52a."""
+    p, b = parameters(PLANE.offset_in), bodies(parameters())
+    single = Joints(*(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH]).T.astype(np.float32))
+    found = []
+    for q in (single, Joints(*(x.astype(float) for x in single))):
+        r = joint_rates(CRANK_AT_SPEED, q)
+        pair = (forward_rod_momentum(CRANK_AT_SPEED, b, q, r) * b.masses[1], momenta(CRANK_AT_SPEED, b, q, r)[1])
+        found.append([(h.real[:, 0], h.real[:, 1], h.dual[:, 2]) for h in pair])
+    forward, mixed = np.abs(np.subtract(*found)).max(-1)
+    return dict(zip(("component i", "component j", "moment, component k"), forward / mixed))
+
+
 def _apart(a: Dual, b: Dual) -> float:
     """Return the greatest difference of two dual vectors."""
     return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
@@ -231,7 +244,7 @@ def _momenta() -> tuple[Statement, ...]:
                 nothing("eq 52a", _apart(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
                 nothing("eq 53a", _apart(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
             ),
-            f"erratum 9: g3 for g2 in 52a, {MAYBE}",
+            f"erratum 9: g3, which is 0, for g2 in 52a, {MAYBE}",
         ),
         Statement(
             "In either case [all by the forward path, or some by the backward path], the same numerical results are "
@@ -242,7 +255,8 @@ def _momenta() -> tuple[Statement, ...]:
             f"by the mixed path (eqs 36, 52 with g2), over the turn, {AWAY}",
             ROUNDING,
             tuple(velocity_paths()),
-            "erratum 3: the paths differ by the unsolved row 37f out of the plane; that the mixed set is simpler is plain",
+            "erratum 3: the paths differ by the unsolved row 37f out of the plane; that the mixed set is simpler is plain. The "
+            "slider's momentum is judged by its rate, in the row on eqs 57 and 58",
         ),
         Statement(
             "Differentiating forward path equations (49a), (50a) and (51a) with respect to time the following "
@@ -271,12 +285,22 @@ def _momenta() -> tuple[Statement, ...]:
             "erratum 3: out of the plane they are no replacements, as the velocities differ that the two paths give",
         ),
         Statement(
+            "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
+            text("section 2.8, L750; L730, L859"),
+            "greatest roundoff of the rod's momentum over a turn, by single precision less double from the same joints, eq 50a "
+            "over eq 52a, in the plane, a4 = 10 in",
+            "none, the sign decides",
+            tuple(at_least(name, 1.0, ratio) for name, ratio in _roundoffs().items()),
+            "component i is one product in either, by 52a with the roundoff of S4' as well; component j and the moment are by "
+            "50a the difference of larger numbers",
+        ),
+        Statement(
             "In this step, equations for the inertia forces of link 1 (i.e. the crank) relative to frame {2}, for "
             "link 2 (i.e. the connecting rod) relative to frame {3} and for link 3 (i.e. the slider) relative to "
             "frame {4} are derived.",
             text("section 2.8, eqs 59 to 61, L863-881"),
             "difference from the rate of momentum in a frame at rest, by the binors, in a general position at constant speed "
-            "and shift; the sign with which it enters is judged at eqs 62 to 64",
+            "and shift, by 52a with g2 for g3; the sign with which it enters is judged at eqs 62 to 64",
             ROUNDING,
             tuple(nothing(label, size, "lb") for label, size in zip(("eq 59", "eq 60", "eq 61"), inertia)),
         ),
@@ -322,7 +346,8 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
     angle, at = np.radians(ANGLES_DEG), clear(PLANE)
     crank, b = CRANK_AT_SPEED, bodies(parameters())
     r = joint_rates(crank, GENERAL)
-    general = joint_forces(crank, b, GENERAL, r, joint_accelerations(crank, GENERAL, r), TORQUE)
+    a = joint_accelerations(crank, GENERAL, r)
+    general = joint_forces(crank, b, GENERAL, r, a, TORQUE)
     s, c, inertia = np.sin(angle), np.cos(angle), -(right["along crank"] + right["2F2i"])
     wrong = dict(right)
     wrong["2F2i"] = right["2F2i"] + 1.0
@@ -335,6 +360,8 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
         np.abs(right["2F2i"][np.abs(ANGLES_DEG - centre) < VERY_CLOSE_DEG]).max() / np.abs(right["2F2i"][at]).max()
         for centre in dead_centres_deg(PLANE)
     ]
+    of_rod = (velocities(crank, GENERAL, r), momenta(crank, b, GENERAL, r, slip=True), momentum_rates(b, GENERAL, r, a))
+    slip = float(inertia_force(*(vectors[1] for vectors in of_rod)).dual[0])
     (crank_mass, *_), volume = b.masses, np.pi * 1.5**2 * CRANK
     gravity = 0.28 * WATER * volume / 386.4 / crank_mass
     return (
@@ -352,9 +379,10 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
             "There are eighteen equations out of which one does not give any solution (equation (63b)), since it is "
             "of the form 0=0; confirmation of this was done by evaluating it in the computer program.",
             text("section 2.8, eq 63b, L923, L945"),
-            "f2xd in a general position",
+            "f2xd by eqs 52a, with g2 for g3 (erratum 9), 57 and 60 in a general position",
             ROUNDING,
             (nothing("f2xd", general["f2xd"], "lb.in"),),
+            f"with the g3 of our scan it would be {slip:.2g} lb.in; that the program found 0 speaks for a slip of the scan",
         ),
         Statement(
             "This [division by sin theta2], in fact, resulted in some abnormal outcomes when values of angle [theta2] were "

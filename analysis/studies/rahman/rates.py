@@ -185,6 +185,8 @@ def _printed_rates() -> tuple[Statement, ...]:
     )
 
 
+#: How far from a zero of sin theta2 accelerations are taken (deg).
+BESIDE_DEG = 1e-3
 #: What the printed equations of the accelerations give.
 EQUATIONS = {
     "th2": "theta2'' by 38a",
@@ -203,6 +205,28 @@ def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[st
     return {
         name: float(x[close_by].max() / x[~close_by].max()) for name, x in sizes.items() if x[~close_by].max() > NOTHING
     }
+
+
+def _ended(case: Case, angles_deg: FloatArray, start: FloatArray) -> FloatArray:
+    """Return the unknowns (n, 5) at which the printed iteration ends at crank angles, from a start for each."""
+    p, unit = parameters(case.offset_in, case.twist_deg), [1.0, 1.0, 1.0, 1.0, INCH]
+    shift = case.shift_in * INCH
+    ended = settle(p, np.radians(angles_deg), shift, rows="printed", start=start * unit, max_steps=MAX_STEPS)
+    return np.asarray(ended.unknowns / unit)
+
+
+def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
+    sine, step = np.sin(unknowns[:, 0]), np.diff(angles_deg).max()
+    small = np.abs(sine) < CLEAR_SINE
+    (at,) = np.nonzero((sine[:-1] * sine[1:] < 0.0) & small[:-1] & small[1:])
+    zeros, start = angles_deg[at], unknowns[at]
+    while step > 1e-5 * BESIDE_DEG:
+        step *= 0.5
+        before = np.sin(_ended(case, zeros + step, start)[:, 0]) * sine[at] > 0.0
+        zeros = np.where(before, zeros + step, zeros)
+    beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
+    return beside, _ended(case, beside, np.tile(start, (2, 1)))
 
 
 def _roundoff(q: Joints) -> float:
@@ -236,12 +260,12 @@ def _dead_centres() -> tuple[Statement, ...]:
             for which, angle in zip(("first", "second"), th2)
         ]
         # half degrees from the loops at every fifth
-        start = np.repeat(followed(shifted).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0) * [1.0, 1.0, 1.0, 1.0, INCH]
-        angles, shift = np.radians(ANGLES_DEG[:-1]), shifted.shift_in * INCH
-        ended = settle(p, angles, shift, rows="printed", start=start, max_steps=MAX_STEPS)
-        q = joints(ended.unknowns / [1.0, 1.0, 1.0, 1.0, INCH])
-        ratios = _near_dead_centres(shifted, q, ANGLES_DEG[:-1])
-        rough = max(rough, _roundoff(q))
+        angles = ANGLES_DEG[:-1]
+        unknowns = _ended(shifted, angles, np.repeat(followed(shifted).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0))
+        rough = max(rough, _roundoff(joints(unknowns)))
+        beside, closest = _beside_zeros(shifted, angles, unknowns)
+        all_angles, q = np.append(angles, beside), joints(np.concatenate([unknowns, closest]))
+        ratios = _near_dead_centres(shifted, q, all_angles)
         high += [
             at_least(f"{words}, {full_name(shifted)}", ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()
         ]
@@ -274,8 +298,9 @@ def _dead_centres() -> tuple[Statement, ...]:
             place,
             "distance of theta2 from 0 at the dead centres; greatest accelerations, at half degrees, within "
             f"{ABOUT_DEG:g} deg of a dead centre relative to those elsewhere: in the plane, where 40a and 41a are zero, and "
-            "where the printed iteration ends; there also the greatest share of the greatest acceleration that is roundoff, by "
-            "numbers with three digits more and joints off by the last digit of a turn",
+            f"where the printed iteration ends, there {BESIDE_DEG:g} deg before and after each zero of sin theta2 too; there, "
+            "at half degrees, also the greatest share of the greatest acceleration that is roundoff, by numbers with three "
+            "digits more and joints off by the last digit of a turn",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
             "for *on account of*",
             (
@@ -285,9 +310,9 @@ def _dead_centres() -> tuple[Statement, ...]:
                 at_least("share that is roundoff", 0.5, rough),
             ),
             "at the second spike theta2 is half a turn. Out of the plane 40a and 41a grow without bound there, and with them "
-            "38a, but not by roundoff: eq 41 divides by sin theta2, and row 37f is left out (erratum 3). 39a and 42a stay "
-            "finite, as all five are in the plane: the spikes of the forces come from the torque, which has no lever on the "
-            "slider there",
+            "38a, but not by roundoff, here in double precision (the thesis does not say which it used): eq 41 divides by sin "
+            "theta2, and row 37f is left out (erratum 3). 39a and 42a stay finite, as all five are in the plane: the spikes of "
+            "the forces come from the torque, which has no lever on the slider there",
         ),
     )
 

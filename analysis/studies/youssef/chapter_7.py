@@ -41,11 +41,12 @@ series with enough terms reaches what the variational method does. Cams of a few
 machine with twice the friction of the model, coupler and slider a tenth heavier and a load of 6 N a drive without feedback
 fails within half a turn, and feedback holds the motion to a quarter of a per cent of the stroke.
 
-*What does not.* The envelope has a hole where all curves of the family go round the same place: P reaches 24 to 85 % of
-what it encloses, by the limits of U. If the coupler cannot point at the desired point the rocker need not stand upright:
-for half of such places it hangs. The printed series for the rocker function gives the stated 4.8 deg2 in none of the
-readings tried (of its signs, of A0 and of its argument): as printed the links cannot be joined, and at best it has 47 deg2,
-more than with the pivot fixed. Neither printed series is an optimum.
+*What does not.* The envelope has a hole where all curves of the family go round the same place: P reaches 24 to 89 % of
+what it encloses, by the limits of U; between the widest within which the crank turns fully, -1.5 and 1.5, it reaches all.
+If the coupler cannot point at the desired point the rocker need not stand upright: for half of such places it hangs. The
+printed series for the rocker function gives the stated 4.8 deg2 in none of the readings tried (of its signs, of A0 and of
+its argument): as printed the links cannot be joined, and at best it has 47 deg2, more than with the pivot fixed. Neither
+printed series is an optimum.
 
 *What cannot be told.* Series 1 (Fig 7.4 to 7.10) stands on a desired curve that is lost. With a curve of ours most of what
 the thesis says of it comes out alike, and the numbers are given, but none of it is counted as holding. Of a mechanism that
@@ -66,6 +67,8 @@ LINKAGE = Linkage(ground_length=1.0, crank_length=0.5, coupler_length=1.0, rocke
 FAMILY = (0.6, 0.8, 1.0, 1.2, 1.4)
 #: Crank angles of the isochronous curves (deg).
 ISOCHRONES = range(0, 360, 30)
+#: Random guesses of the downhill simplex.
+GUESSES = 6
 #: Crank angles of the desired points, and which of them lie on p1 p2.
 ROTATION = turn(72)
 P1, P2 = radians(150.0), radians(210.0)
@@ -77,7 +80,9 @@ NO_LINKAGE = 1e3
 SERIES_1 = "Desired curve: ours, see Fig 7.4."
 LOST = "the desired curve is lost with its figure"
 #: Limits of U within which the family of coupler curves is drawn; the thesis's are lost.
-LIMITS = ((0.9, 1.1), (0.8, 1.2), (FAMILY[0], FAMILY[-1]), (0.501, 1.499))
+LIMITS = ((0.9, 1.1), (0.8, 1.2), (FAMILY[0], FAMILY[-1]), (0.501, 1.499), (-1.499, 1.499))
+#: Slider positions u of the isochronous arcs that are judged (l3).
+ALONG = np.linspace(0.501, 1.499, 101) - 1.0
 #: Slider positions u of Fig 7.5 (l3).
 POSITIONS = np.linspace(-3.0, 3.0, 24001)
 #: Number of precision points, and amplitudes of the slider between them.
@@ -129,10 +134,10 @@ def squared_errors(found: Solution) -> tuple[float, float]:
     return float(squares[WITHIN].sum()), float(squares[~WITHIN].sum())
 
 
-def ends_of_simplex(starts: int = 6, seed: int = 7) -> list[tuple[float, float]]:
+def ends_of_simplex(starts: int = GUESSES, seed: int = 7) -> list[tuple[float, float]]:
     """Return the errors of eleven terms at which the downhill simplex ends from random ones, and a descent from there.
 
-    Ends where the links cannot be joined are left out.
+    Guesses that cannot be assembled are left out, as are their ends.
     """
     random = np.random.default_rng(seed)
 
@@ -220,10 +225,13 @@ def family() -> StudyResult:
     for k, ring in enumerate((*shown.outer, *shown.holes)):
         columns |= xy(f"boundary {k}", ring @ np.array([1.0, 1j]))
     kept, changed, least = between_precision_points()
+    phi, along = (x.ravel() for x in np.meshgrid(TURN, ALONG))
+    radii = np.abs(point(phi, along) - LINKAGE.crank_length * np.exp(1j * phi))
+    off_arc = np.abs(radii - LINKAGE.point_distance).max()
     return StudyResult(
         number="7.2",
         claim="With the slider free P reaches any point on or within the outer boundaries of the family of coupler curves.",
-        assignment="The values of U are lost: 0.6 to 1.4 are our choice; the crank turns fully from 0.5 to 1.5.",
+        assignment="The values of U are lost: 0.6 to 1.4 are our choice; the crank turns fully from -1.5 to 1.5 but at +-0.5.",
         columns=padded(columns),
         statements=(
             Statement(
@@ -253,11 +261,21 @@ def family() -> StudyResult:
                         1.0,
                         area.area / enclosed(low, high),
                         0.01,
-                        why="what all curves of the family go round is out of reach; it is smaller with wider limits, but "
-                        "the crank turns fully for U from 0.5 to 1.5 only",
+                        why="what all curves of the family go round is out of reach",
                     )
                     for (low, high), area in areas.items()
                 ),
+                "within the widest limits the crank turns fully too, except at U = +-0.5",
+            ),
+            Statement(
+                "Such 'isochronous' curves, which are arcs of circles centred at the corresponding fixed position, of B, can "
+                "be regarded simply as a reference grid from which the resulting motion can be determined once a particular "
+                "continuous variation of U is specified.",
+                text("7.0, L5256"),
+                f"distance of P from B less r, the greatest of {TURN.size - 1} crank angles and {ALONG.size} values of U from "
+                f"{1.0 + ALONG[0]:g} to {1.0 + ALONG[-1]:g}",
+                "1e-12 l3, the rounding",
+                (at_most("", 1e-12, off_arc, "l3"),),
             ),
         ),
     )
@@ -270,12 +288,19 @@ def reach(low: float, high: float) -> AccessibleArea:
 
 
 def enclosed(low: float, high: float) -> float:
-    """Return the area that the coupler curves for U between two limits enclose together."""
+    """Return the area that the coupler curves for U between two limits enclose together.
+
+    What P sweeps from each of 21 curves to the next is the area that it reaches.
+    """
     import shapely
 
-    shapes = []
+    found = reach(low, high)
+    rings = [shapely.LinearRing(ring) for ring in (*found.outer, *found.holes)]
+    shapes = [shapely.build_area(shapely.GeometryCollection(rings))]
+    # dense at 0 and 180 deg, where P swings round B within half a degree at U near 0.5 and -0.5
+    turned = TURN[:-1] - 0.5 * np.sin(2.0 * TURN[:-1])
     for u in np.linspace(low, high, 21):
-        z = point(TURN[:-1], u - 1.0)
+        z = point(turned, u - 1.0)
         line = shapely.LinearRing(np.column_stack([z.real, z.imag]))
         shapes += shapely.get_parts(shapely.polygonize([shapely.node(line)])).tolist()
     return float(shapely.union_all(shapes).area)
@@ -476,9 +501,9 @@ def _unweighted() -> tuple[Statement, ...]:
         Statement(
             "Different initial guesses of the coefficients produced different optima.",
             text("7.3.1, L5743"),
-            why=f"{LOST}; with ours the simplex ends from {format_count(len(ends), 'random guess')} at "
-            f"{distinct} different errors, but a descent from each of these ends leads to one and the same optimum: it stops "
-            "before it is there",
+            why=f"{LOST}; with ours the simplex ends from {format_count(GUESSES, 'random guess')}, {GUESSES - len(ends)} of "
+            f"which cannot be assembled, at {distinct} different errors, but a descent from each of these ends leads to one "
+            "and the same optimum: it stops before it is there",
         ),
         Statement(
             "The variational method located the true global optimum which the direct search located as best as an "
@@ -506,13 +531,15 @@ def _unweighted() -> tuple[Statement, ...]:
         ),
         Statement(
             "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "
-            "greater effort than would otherwise be needed with a direct search.",
-            text("7.3.1, L5883"),
+            "greater effort than would otherwise be needed with a direct search. In fact, in some cases, the direct search "
+            "method is required to solve these equations.",
+            text("7.3.1, L5883-5891"),
             "equations (7.6), one for each of theta3, theta4 and U, and (7.3), the closure",
             "none of a count",
             (
                 replace(near("equations", 5.0, 3 + 2, 0.0), stated="n + m"),
                 Case(label="effort", computed=None, why="that of neither method is stated"),
+                Case(label="direct search required", computed=None, why="no such case is given"),
             ),
             "in this mechanism the equations are solved in closed form, see Fig 7.5",
         ),

@@ -270,7 +270,8 @@ def _launches(torque: float, stiffness: float) -> tuple[Trajectory, Trajectory]:
 SWINGS = "range of the crank speed in a turn over its mean; its mean relative to that of the turn before; in the free motions"
 UNDAMPED = (
     "greatest mean crank speed of a turn in the second half of the free motion, relative to that of its first turn, without "
-    "the damper and with it, over the same turns"
+    "the damper and with it, over the same turns; without it crank and slider exchange energy, so that the mean speed falls "
+    "and rises again: judged is whether it comes back"
 )
 
 
@@ -438,7 +439,8 @@ def launch_speeds_by_spring() -> StudyResult:
             "The speed fluctuates when the torque is removed and then decays due to the viscous dissipation of "
             "energy in the slider guide.",
             text("3.2.2, L2181-2185"),
-            f"{SWINGS} with all three springs; {UNDAMPED}",
+            f"{SWINGS} with all three springs; {UNDAMPED}; with 5e5 dyn/cm and without the damper the links are collinear "
+            "after five turns, so that only turns 3 to 5 are compared there",
             f"{ALIKE_WORDS}, and a loss of more than that; of the turn before {SIGN}",
             (
                 *_swings(_by_spring(), 1.0),
@@ -706,10 +708,11 @@ def stiff_phase_plane() -> StudyResult:
         Statement(
             "This speed is in fact an approximation to half the natural frequency of the system.",
             text("3.3, L2301-2305"),
-            "half the natural frequency with the least and the greatest effective mass of a turn, at u = 0; with the "
-            f"mean mass it is {half:.2f} rad/s",
-            "27 rad/s lies between the two, the range in which the thesis itself places the natural frequency (L2309)",
+            "half the natural frequency with the mean, the least and the greatest effective mass of a turn, at u = 0",
+            f"{ABOUT:g}, the rule for *approximately*; 27 rad/s lies between the others, the range in which the thesis itself "
+            "places the natural frequency (L2309)",
             (
+                near("mean mass", "27", half, 27.0 * ABOUT, "rad/s"),
                 at_least("least mass", "27", over_turn.max(), "rad/s"),
                 at_most("greatest mass", "27", over_turn.min(), "rad/s"),
             ),

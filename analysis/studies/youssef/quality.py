@@ -203,6 +203,7 @@ def compute() -> StudyResult:
                 f"{1.0 + ALIKE:g}, the rule for *the same*: at a minimum there is no descent",
                 (
                     *(at_most(name, 1.0 + ALIKE, ratio, why="it is no minimum") for name, ratio in ratios.items()),
+                    Case(label="Fig 6.11", computed=None, why="its nineteen points are lost"),
                     Case(label="other types of linkage", computed=None, why="none is given"),
                 ),
             ),

@@ -168,7 +168,7 @@ def _resonance() -> tuple[Statement, ...]:
             "These are in good agreement with theoretical calculations based on the equivalent mass of the linkage which "
             "are 582 and 829 for springs C and D respectively.",
             text(f"{section}, L6865"),
-            "natural frequency by the mean effective mass, and that of the sentence before over it",
+            "natural frequency by the mean effective mass, and the printed frequency of the sentence before, over it",
             f"0.5 rpm, half a unit of the last digit; {ALIKE:g}, for *good agreement* as for *the same*",
             (
                 *(

@@ -175,6 +175,8 @@ def moved_rocker() -> StudyResult:
     return StudyResult(
         number="7.11",
         claim="The slider moved by two harmonics brings the weighted error of the rocker function from 35.0 to 4.8 deg2.",
+        assignment='n is limited "to the value of 3" (L5925), but the parameters end with A2, B2: three terms, n = 0, 1, 2, '
+        "are taken.",
         columns=columns,
         statements=(
             Statement(
