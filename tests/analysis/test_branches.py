@@ -58,6 +58,11 @@ def test_every_point_is_a_periodic_orbit(softened: Branch) -> None:
         assert again.largest == pytest.approx(orbit.largest, rel=1e-6)
 
 
+def test_a_branch_is_shown_in_a_line(softened: Branch) -> None:
+    assert repr(softened).startswith(f"<Branch: {softened.family.vary} ")
+    assert "fold" in repr(softened)
+
+
 def test_fold_has_a_multiplier_of_one_and_no_orbit_beyond(softened: Branch) -> None:
     assert softened.reached
     (fold,) = softened.special
