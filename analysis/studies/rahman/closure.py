@@ -101,7 +101,7 @@ def _limits() -> tuple[Statement, ...]:
     reached = {0.0: float(np.max(tried[_settled(0.0, tried, 1e-9).any(-1)], initial=0.0))}
     for a4, first, stated in ((10.0, 3.5, 3.5), (20.0, 3.5, 3.5), (30.0, 0.0, 9.0)):
         tried = np.arange(first, stated + 4.5, 0.5)
-        settled = _settled(a4, tried, 1e-6).all(-1)
+        settled: NDArray[np.bool_] = np.asarray(_settled(a4, tried, 1e-6).all(-1))
         reached[a4] = first + 0.5 * (int(np.cumprod(settled).sum()) - 1)
     below = float(settled[tried <= 9.0].mean())
     between = np.linspace(*TWISTS_REACHED_DEG, 4)

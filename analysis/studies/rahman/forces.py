@@ -170,7 +170,7 @@ def _roundoffs() -> dict[str, float]:
         r = joint_rates(CRANK_AT_SPEED, q)
         pair = (forward_rod_momentum(CRANK_AT_SPEED, b, q, r) * b.masses[1], momenta(CRANK_AT_SPEED, b, q, r)[1])
         found.append([(h.real[:, 0], h.real[:, 1], h.dual[:, 2]) for h in pair])
-    forward, mixed = np.abs(np.subtract(*found)).max(-1)
+    forward, mixed = np.abs(np.array(found[0]) - np.array(found[1])).max(-1)
     return dict(zip(("component i", "component j", "moment, component k"), forward / mixed))
 
 

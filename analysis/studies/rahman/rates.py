@@ -31,6 +31,7 @@ from .method import (
     DOTS,
     MAYBE,
     MOVING,
+    PLANE,
     ROW_F,
     FloatArray,
     H,
@@ -44,6 +45,7 @@ from .printed import (
     GRID_DEG,
     MAX_STEPS,
     STEP_DEG,
+    Crank,
     Joints,
     joint_accelerations,
     joint_rates,
@@ -52,7 +54,7 @@ from .printed import (
     mended_row,
     separated_rates,
 )
-from .table import Case
+from .table import IDEAL, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
@@ -86,12 +88,21 @@ def _sinusoidal(ratio: float) -> tuple[float, float]:
     return float(printed_rate - shift.imag / h), float(printed_second - rate.imag / h)
 
 
+def _rows(crank: Crank, q: Joints) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients and constant part of eqs 37a to 37f in the rates of the joints."""
+    right = loop_rates(crank, q, Joints(*np.zeros(5)))
+    return np.stack([loop_rates(crank, q, Joints(*unit)) - right for unit in np.eye(5)], -1), right
+
+
 def _printed_rates() -> tuple[Statement, ...]:
     """Judge eqs 28a to 31 and 37 to 43, 38a to 42a in the general position, with the shift in motion."""
     crank = MOVING
-    right = loop_rates(crank, GENERAL, Joints(*np.zeros(5)))
-    matrix = np.stack([loop_rates(crank, GENERAL, Joints(*unit)) - right for unit in np.eye(5)], -1)
-    ranks = [int(np.linalg.matrix_rank(m)) for m in (matrix, np.column_stack([matrix, right]))]
+    matrix, right = _rows(crank, GENERAL)
+    flat = joints(planar(parameters(PLANE.offset_in), np.array([1.0])) / [1.0, 1.0, 1.0, 1.0, INCH])
+    at_rest = _rows(CRANK_AT_SPEED, Joints(*(x[0] for x in flat)))
+    ranks = [
+        int(np.linalg.matrix_rank(m)) for m in (matrix, np.column_stack([matrix, right]), np.column_stack(at_rest))
+    ]
     solved, rates = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
     seconds = joint_accelerations(crank, GENERAL, rates)
     quicker, moved, _ = later(crank, GENERAL, rates, seconds)
@@ -141,13 +152,15 @@ def _printed_rates() -> tuple[Statement, ...]:
         Statement(
             "Since rank of the coefficient matrix equals 5, the number of columns, a unique solution can be obtained.",
             text("section 2.7, L563"),
-            "ranks in a general position; a solution needs equal ones",
+            "ranks of eqs 37a to 37f in a general position with S1' = 1.3 in/s, and in the plane, a4 = 10 in, theta1 = 1 rad, "
+            "at constant shift; a solution needs equal ones",
             "none of a count",
             (
                 near("coefficients", "5", ranks[0], 0.0),
                 near("coefficients with the right side", 5.0, ranks[1], 0.0),
+                near("coefficients with the right side, in the plane", 5.0, ranks[2], 0.0),
             ),
-            "erratum 3: six equations for five unknowns, of which five are solved",
+            "erratum 3: six equations for five unknowns, of which five are solved; in the plane the sixth is met as well",
         ),
         Statement(
             "The final solutions for all the unknowns are as follows:",
@@ -242,17 +255,13 @@ def _roundoff(q: Joints) -> float:
 def _dead_centres() -> tuple[Statement, ...]:
     """Judge the cause that section 3.2 gives for the spikes, in the plane and where the printed iteration ends."""
     cases = [Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)]
-    worst, least, rough, zeros, near_zero, high = 0.0, np.inf, 0.0, [], [], []
+    worst, least, rough, near_zero, high = 0.0, np.inf, 0.0, [], []
     for case, shifted in zip(cases, OFFSETS):
         p, centres = parameters(case.offset_in), dead_centres_deg(case)
         q = joints(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH])
         worst = max(worst, *_near_dead_centres(case, q, ANGLES_DEG).values())
         least = min(least, float(np.abs(np.sin(q.th3)).min()))
         th2 = np.degrees(planar(p, np.radians(centres))[:, 0]) % 360.0
-        zeros += [
-            near(f"sin theta2 = 0, {case.name}, {which}", stated, at, ABOUT_DEG, "deg")
-            for which, stated, at in zip(("first", "second"), ("100", "300"), centres)
-        ]
         near_zero += [
             at_most(
                 f"theta2 at the {which} spike, {case.name}", VERY_CLOSE_DEG, float(min(angle, 360.0 - angle)), "deg"
@@ -269,6 +278,11 @@ def _dead_centres() -> tuple[Statement, ...]:
         high += [
             at_least(f"{words}, {full_name(shifted)}", ABNORMAL, ratios[name]) for name, words in EQUATIONS.items()
         ]
+    zeros = [
+        near(f"sin theta2 = 0, {case.name}, {which}", stated, at, ABOUT_DEG, "deg")
+        for case in (IDEAL, *cases)
+        for which, stated, at in zip(("first", "second"), ("100", "300"), dead_centres_deg(case))
+    ]
     place = text("section 3.2, L1115")
     return (
         Statement(
@@ -284,7 +298,12 @@ def _dead_centres() -> tuple[Statement, ...]:
             (
                 near("sines and cosines in denominators", 0.0, 0, 0.0),
                 *zeros,
-                at_most("theta3 from 0 or half a turn", VERY_CLOSE_DEG, np.degrees(np.arcsin(least)), "deg"),
+                at_most(
+                    "theta3 from 0 or half a turn, a4 = 10, 20, 30 in, S1 = 0, least",
+                    VERY_CLOSE_DEG,
+                    np.degrees(np.arcsin(least)),
+                    "deg",
+                ),
             ),
             "theta2 is 0 or half a turn at the dead centres, which the offset moves; sin theta3 does not vanish, so "
             "that 39a and 42a stay finite. Out of the plane 40a and 41a are unbounded, and with them 38a, because eq 41 "

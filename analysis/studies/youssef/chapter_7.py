@@ -34,7 +34,7 @@ coupler curves, so that the slider can correct what the links cannot trace; it f
 method, exact at each crank angle, and by a direct search for a Fourier series.
 
 *What stands.* Precision points may be kept while the motion between them changes. The coupler that points at the desired
-point gives the least error, exactly. Two harmonics of the slider reduce the error of all eight problems of chapter VI,
+point gives the least error, exactly. Two harmonics of the slider can reduce the error of all eight problems of chapter VI,
 that of the weighted rocker function fifty times where its stroke is not limited. For path (b) the printed series gives the
 stated 4.3 cm2, within the rounding of its numbers, once l4 is mended as in chapter VI and A0 = 3.1 is read as 0.31. A
 series with enough terms reaches what the variational method does. Cams of a few centimetres can drive such a slider; on a

@@ -18,6 +18,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
+from ...youssef import harmonic_balance, nonlinear_harmonic_balance, slider_equation
 from ..rules import ABOUT, ALIKE, SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
@@ -665,11 +666,26 @@ def soft_phase_plane() -> StudyResult:
         Statement(
             "Non-linear effects leading to higher harmonics in the slider motion are clearly shown in both figures.",
             text("3.3, L2293-2297"),
-            "second harmonic of u relative to the first, least of all turns",
-            f"more than {SMALL:g}, the rule for *small*",
-            tuple(at_least(label, SMALL, (t.second / t.first).min()) for label, t in turns.items()),
+            "second harmonic of u relative to the first, least of all turns; the same at a constant 27 rad/s, over that by the "
+            "equation linear in u",
+            f"more than {SMALL:g}, the rule for *small*; more than {1.0 + ALIKE:g}, the rule for *the same*, for a non-linear "
+            "effect",
+            (
+                *(at_least(label, SMALL, (t.second / t.first).min()) for label, t in turns.items()),
+                *(at_least(f"non-linear; {label}", 1.0 + ALIKE, beyond_linear(k)) for label, k in BOTH.items()),
+            ),
+            "the equation linear in u has these harmonics too: the geometry of the linkage forces them",
         ),
     )
+
+
+def beyond_linear(stiffness: float) -> float:
+    """Return the second harmonic of u over the first at a constant 27 rad/s, relative to that by the equation linear in u."""
+    parameters = table_3_1(stiffness)
+    full = nonlinear_harmonic_balance(parameters, HARMONIC_SPEED)
+    linear = harmonic_balance(slider_equation(parameters, HARMONIC_SPEED), full.order)
+    _, first, second, *_ = full.series.amplitudes
+    return float(second / first * linear.harmonic(1) / linear.harmonic(2))
 
 
 def stiff_phase_plane() -> StudyResult:
@@ -721,10 +737,15 @@ def stiff_phase_plane() -> StudyResult:
             "This suggests that the non-linearity is a second subharmonic resonance.",
             text("3.3, L2305-2307"),
             "mean crank speed at which the second harmonic over the speed squared, to which its force is "
-            "proportional, is greatest, relative to half the natural frequency with the mean mass",
-            f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator",
-            (Case(label="", computed=resonance / half, lower=1.0 - lowered, upper=1.0),),
-            "its frequency is twice the crank's, so that today it is called superharmonic",
+            "proportional, is greatest, relative to half the natural frequency with the mean mass; second harmonic over the "
+            "first at a constant 27 rad/s, over that by the equation linear in u",
+            f"{lowered:.3f} below 1, by which the damper of the thesis lowers the peak of an oscillator; more than "
+            f"{1.0 + ALIKE:g}, the rule for *the same*, for a non-linearity",
+            (
+                Case(label="resonance", computed=resonance / half, lower=1.0 - lowered, upper=1.0),
+                at_least("non-linearity", 1.0 + ALIKE, beyond_linear(STIFF)),
+            ),
+            "the equation linear in u has it too: the second harmonic of the force meets the natural frequency",
         ),
         Statement(
             "It is however appreciated that a natural frequency of the mechanism in study is not a sharply defined "
