@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from analysis import find_orbit
+from analysis.linkages import load_linkage
 from analysis.numerics.vectors import LANES
 from analysis.periodic import Drive, OrbitEquations, OrbitError, orbit_of
 from analysis.periodic.chart.grid import largest_multipliers
@@ -17,12 +19,15 @@ from analysis.periodic.motion.discretisation import Discretisation, collocation_
 from analysis.periodic.motion.variables import Family
 from linkwork.five_bar.published import SETS
 
+LINKAGES = Path(__file__).parents[2] / "examples" / "linkages"
 SMOOTH = SETS["rig-2-spring-c"].parameters
 
 
-def test_a_neighbour_followed_by_collocation_is_the_integrator_s() -> None:
+@pytest.mark.parametrize("linkage", [None, "elastic-bearing"], ids=["five-bar", "two free freedoms"])
+def test_a_neighbour_followed_by_collocation_is_the_integrator_s(linkage: str | None) -> None:
     """Ends, their derivatives by the beginnings and by the speed, from one speed to the next, in two pieces."""
-    family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
+    known = SMOOTH if linkage is None else load_linkage(LINKAGES / f"{linkage}.toml").first_set.parameters
+    family = Family(parameters=known, drive=Drive(speed=30.0))
     angles = np.array([0.0, pi, 2.0 * pi])
     path = Discretisation(angles, True)
     used = 0
