@@ -80,7 +80,7 @@ def expression(law: Law, about: bool, name: str) -> str:
 
 
 class _Powers(ast.NodeTransformer):
-    """Writes powers as `math.pow` has them, which has no value where ``**`` becomes complex; whole constant powers stay."""
+    """Writes powers as `math.pow`, which raises where ``**`` gives a complex number; whole constant powers stay."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
@@ -97,7 +97,7 @@ def constants(value: Any, name: str) -> dict[str, tuple[float, str]]:
 
 def _constant(value: Any, name: str) -> tuple[float, str]:
     # a radian has no dimension: whether one is meant is seen from the text alone
-    angular = bool(re.search("rad|deg|°|rpm|/min", str(value)))
+    angular = bool(re.search("rad|deg|°|rpm|/min|turn|rev|cycle", str(value)))
     for unit in sorted(_UNITS, key=lambda unit: ("rad" in unit) != angular):
         try:
             return quantity(value, unit, name), unit
@@ -113,7 +113,7 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
     if not names <= {"x", "v", *FUNCTIONS, *known}:
         raise ParameterError(name, formula, _WANTED)
     for own in known:
-        if own in ("x", "v", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
+        if own in ("x", "v", "pow", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
             where = f"{name.rpartition('.')[0]}.constants.{own}"
             raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
 

@@ -6,6 +6,7 @@ meshes with a known one, or a dyad: two bodies joined to each other and each to 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, islice
@@ -304,9 +305,12 @@ def analyse(description: Description) -> Structure:
             f"{says}, but linkage.freedoms has {len(freedoms)} ({', '.join(freedoms)}): they must be as many"
         )
     for name, freedom in freedoms.items():
-        # the second force of a pin of three bodies is called like C2
-        of = freedom.joint if freedom.joint in found else freedom.joint.rstrip("0123456789")
-        if freedom.joint not in found and (of not in found or len(found[of].bodies) == 2):
+        # the second force of a pin C of three bodies is called C2
+        shared = (
+            pin for pin in found if len(found[pin].bodies) > 2 and re.fullmatch(rf"{re.escape(pin)}\d+", freedom.joint)
+        )
+        of = freedom.joint if freedom.joint in found else next(shared, "")
+        if not of:
             raise unknown_name(freedom.joint, found, f"joint {freedom.joint}, of linkage.freedoms.{name}")
         if len(found[of].bodies) != 2:
             raise LinkageError(

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import LSODA, OdeSolver, solve_ivp
+from scipy import integrate
+from scipy.integrate import BDF, LSODA, OdeSolver, Radau, solve_ivp
 
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
@@ -20,7 +21,7 @@ from .prepared import Run, verdict
 from .sampling import NotFiniteError, release, sample
 from .trajectory import Occurrence, Trajectory
 
-#: Evaluations without a value in an interval after which LSODA is stopped, which would go on for ever.
+#: Evaluations without a value, while the time hardly advances, after which an implicit method is stopped: LSODA never would.
 MOST_LOSSES = 300
 
 #: What ends an interval early: an event of the user, the release of a torsion bar by its number, or None: the limit of
@@ -42,7 +43,7 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     rows = march.rows
     if rows and rows[-1][0] < march.t:
         rows = [*rows, (march.t, march.x, march.held)]
-    values = [run.mechanism.equations.outputs(tuple(x), held, march.energy, run.p) for _, x, held in rows]
+    values = [march.outputs(x, held) for _, x, held in rows]
     code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x, run.limit)
     if march.status == k.NO_STEP:
         message += run.undefined(march.good[1])
@@ -88,9 +89,11 @@ class March:
         self.evaluations = 0
         self.status = k.RUNNING
         #: the input that was not finite inside a step, which is then tried again shorter; evaluations without a value, and
-        #: time and state of the last one with a value
+        #: the latest time with a value, with its state
         self._lost: int | None = None
         self.losses = 0
+        #: derivative without a value: so large that errors are, or for Radau and BDF no number, which ends their iterations
+        self.nothing = 1e200
         self.good = self.t, self.x
         #: value of each event at the end of the interval before; zero where it happened just there
         self._gaps: list[float] | None = None
@@ -154,7 +157,7 @@ class March:
         if event.function is not None:
             return float(event.function(t, *x[:-2].tolist()))
         column = event.column(self.of.mechanism)
-        return float(self.equations.outputs(tuple(x), held, self.energy, self.of.p)[column] - event.level)
+        return self.outputs(x, held)[column] - event.level
 
     def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> Any:
         if self.settings.hold or (self.of.encoded.steady and not self.laws[:, 2].any()):
@@ -162,8 +165,8 @@ class March:
         return self.of.applied(sample(self.of.encoded, t, x, self.laws, left=t >= stop))
 
     def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
-        # where there is no configuration or no input, so large a derivative has the step tried again shorter
-        nothing = np.full(len(x), 1e200)
+        # where there is no configuration or no input, such a derivative has the step tried again shorter
+        nothing = np.full(len(x), self.nothing)
         try:
             held = self._inputs(t, x, stop)
         except NotFiniteError as error:
@@ -180,18 +183,47 @@ class March:
             self.good = t, x.copy()
         return result
 
-    def _lsoda(self) -> type[OdeSolver]:
-        """Return SciPy's LSODA, made to end where the equations have no value beyond."""
-        march = self
+    def _ending(self, method: str | type[OdeSolver], least: float) -> str | type[OdeSolver]:
+        """Return a method of SciPy, made to end where the equations have no value beyond; ``least`` is an advance in time (s).
 
-        class EndingLSODA(LSODA):  # type: ignore[misc]
+        The implicit methods may else accept a state without one, or try again for ever.
+        """
+        kind = getattr(integrate, method) if isinstance(method, str) else method
+        if not issubclass(kind, (BDF, LSODA, Radau)):
+            return method
+        march = self
+        self.nothing = 1e200 if issubclass(kind, LSODA) else np.nan
+
+        class Ending(kind):  # type: ignore[misc, valid-type]
+            reached = -np.inf
+
             def _step_impl(self) -> tuple[bool, str | None]:
-                done, message = super()._step_impl()
-                if march.losses > MOST_LOSSES or not np.isfinite(self.y).all():
+                try:
+                    done, message = super()._step_impl()
+                except ValueError:  # a Jacobian that is no number
+                    return False, self.TOO_SMALL_STEP
+                if self.t > self.reached + least:
+                    self.reached, march.losses = self.t, 0
+                if march.losses > MOST_LOSSES or not march.has_value(self.y):
                     return False, self.TOO_SMALL_STEP
                 return done, message
 
-        return EndingLSODA
+        return Ending
+
+    def has_value(self, x: NDArray[np.float64]) -> bool:
+        """Return whether the equations have a value at a state."""
+        try:
+            return bool(np.isfinite(self.equations.derivative(tuple(x), self.held, self.of.p)).all())
+        except (ArithmeticError, ValueError):
+            return False
+
+    def outputs(self, x: NDArray[np.float64], held: Any) -> tuple[float, ...]:
+        """Return the outputs at a state, NaN where a law of a spring has no value."""
+        try:
+            found: tuple[float, ...] = self.equations.outputs(tuple(x), held, self.energy, self.of.p)
+        except (ArithmeticError, ValueError):
+            return (np.nan,) * len(self.of.mechanism.output_names)
+        return found
 
     def _interval(
         self, stop: float, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None
@@ -213,7 +245,7 @@ class March:
                 right_side,
                 (t0, stop),
                 x0,
-                method=self._lsoda() if method == "LSODA" else method,
+                method=self._ending(method, SAME * (stop - t0)),
                 t_eval=np.append(inner, stop),
                 events=[function for _, function in watched],
                 rtol=max(self.settings.tolerance, 3e-14),

@@ -211,10 +211,10 @@ class Wiring:
             free = [i for i in inputs if _table(i) not in served]
             if free:
                 found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
-            starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.type in REAL}
-            gains = [gain for gain in part.named("parameter") if gain.endswith("gain")]
+            gains = [name for name in part.named("parameter") if f"_{name}".endswith("_gain")]
+            starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
-                found.append(f"{name}: it controls nothing, as its gains are 0: {', '.join(gains)}")
+                found.append(f"{name}: its gains are 0: {', '.join(gains)}")
         if loops := sorted(self.loops(), key=len):
             more = f", and {len(loops) - 1} more" if len(loops) > 1 else ""
             shortest = " -> ".join(map(str, loops[0]))

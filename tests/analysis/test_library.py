@@ -202,7 +202,7 @@ def test_a_linkage_beside_the_library_moves_as_with_multipliers(text, tmp_path):
     test_a_linkage_of_the_library_moves_as_with_multipliers(path)
 
 
-@pytest.mark.parametrize("method", ["compiled", "DOP853", "LSODA", "Hamming"])
+@pytest.mark.parametrize("method", ["compiled", "DOP853", "LSODA", "Radau", "BDF", "Hamming"])
 def test_a_run_that_leaves_a_law_behind_names_it(method, tmp_path):
     path = tmp_path / "own.toml"
     power = 'springs.stop = { at = "E", free = "-1.75 rad", law = "200*x**1.5" }'

@@ -569,10 +569,19 @@ def test_a_spring_that_a_wheel_winds_up_leaves_no_periodic_motion() -> None:
 
 
 def test_constants_of_a_law_keep_their_units() -> None:
-    given = {"a": "2 cm^2", "p": "10 bar", "c": "3e6 N/m^3", "k": "0.5 N*m/deg", "m": "3 N*m", "n": 2.5}
+    given = {
+        "a": "2 cm^2",
+        "p": "10 bar",
+        "c": "3e6 N/m^3",
+        "k": "0.5 N*m/deg",
+        "m": "3 N*m",
+        "n": 2.5,
+        "t": "2 N*m/turn",
+    }
     found = {"a": (2e-4, "m2"), "p": (1e6, "N/m2"), "c": (3e6, "N/m3"), "m": (3.0, "N.m"), "n": (2.5, "1")}
     read = laws.constants(given, "law")
     stiffness, unit = read.pop("k")
+    assert read.pop("t") == (pytest.approx(1.0 / math.pi), "N.m/rad")
     assert (stiffness, unit) == (pytest.approx(90.0 / math.pi), "N.m/rad")
     assert read == found
     made = wheel("gas", law="a*p*x/c", constants={name: given[name] for name in "apc"}).mechanism()
@@ -600,6 +609,7 @@ def test_a_freedom_at_a_pin_of_three_bodies_names_them() -> None:
 
 
 def test_powers_that_are_not_whole_have_no_complex_value() -> None:
+    assert laws.expression("-x**1.5 + x**-1.5 + 2**x", False, "law") == "-pow(x, 1.5) + pow(x, -1.5) + pow(2, x)"
     written = laws.expression("a*x**2 - 3*x**-1 + (x - 1)**(2*x**1.5)", False, "law")
     assert written.replace("(-1)", "-1") == "a * x ** 2 - 3 * x ** -1 + pow(x - 1, 2 * pow(x, 1.5))"
     with pytest.raises(ValueError, match="math domain error"):
