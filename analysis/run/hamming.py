@@ -135,6 +135,8 @@ class Hamming(OdeSolver):  # type: ignore[misc]
         y, f = self._back[0]
         d0, d1 = self._norm(y, np.abs(y)), self._norm(f, np.abs(y))
         h0 = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, span)
+        if h0 == 0.0:  # y' is beyond all bounds
+            return h0
         f1 = self.fun(self.t + self.direction * h0, y + self.direction * h0 * f)
         d2 = self._norm(f1 - f, np.abs(y)) / h0
         largest = max(d1, d2)

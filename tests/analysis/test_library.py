@@ -216,6 +216,16 @@ def test_a_run_that_leaves_a_law_behind_names_it(method, tmp_path):
     assert np.isfinite(found.values).all()
 
 
+@pytest.mark.parametrize("method", ["compiled", "DOP853", "LSODA", "Radau", "BDF", "Hamming"])
+def test_a_start_where_a_law_has_no_value_names_it(method):
+    arm = linkage("late-arm", ground={"A": (0, 0)}).body("arm", bar=("A", "Q"), length="0.1 m", mass=1.0)
+    made = arm.spring("stop", at="A", law="2*(x - 0.2)**1.5").freedom("arm", "A", start=0.5).mechanism()
+    start = made.initial(arm_angle=0.1)
+    found = simulate(made.first_set.parameters, Inputs(), initial=start, stop_time=0.5, method=method)
+    assert (found.status, len(found)) == (4, 1)
+    assert found.message.endswith("the law of stop has no value beyond")
+
+
 def test_a_law_that_ends_a_run_next_to_the_limit_of_assembly_is_named_alone():
     rocker = linkage("two-laws", ground={"A": (0, 0), "D": ("200 mm", 0)})
     rocker.body("left", bar=("A", "B"), length="150 mm", mass=0.2, inertia=1e-3)
