@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import analysis.synthesis as syn
 from analysis.synthesis.search.polish import sum_of_squares
-from analysis.synthesis.search.scan import SHAPES, Candidates, _placed, _shapes, _timed, scan
+from analysis.synthesis.search.scan import SHAPES, Candidates, _bounded, _placed, _shapes, _timed, scan
 from analysis.synthesis.search.start import make_linkage
 from analysis.synthesis.task.limits import Limits, make_limits
 from analysis.synthesis.task.task import Normal
@@ -56,6 +56,15 @@ class TestVariableProjection:
         found = _placed(normal, limits, shape(KNOWN, phase=1.1 / (2.0 * pi)), 1, 0)
         assert found.quality[0] == pytest.approx(0.0, abs=1e-10)
         same(first(found, normal), KNOWN)
+
+    def test_the_size_keeps_the_bound_of_the_coupler_point(self) -> None:
+        rotation = syn.turn(16)
+        task = syn.TimedPath(points=KNOWN.path(rotation), rotation=rotation)
+        normal, limits = stated(task, point_distance=(0.0, 0.2))
+        links, point = np.array([[1.0, 0.4, 0.9, 0.8, 0.0]]), np.array([0.5j])
+        size, scale = _bounded(np.array([50.0j]), links, point, limits)
+        assert size[0] * 0.5 * normal.unit == pytest.approx(0.2)
+        assert scale[0] == pytest.approx(1j * size[0])
 
     def test_the_coupler_angle_follows_as_well(self) -> None:
         rotation = np.linspace(0.0, 4.0, 9)
