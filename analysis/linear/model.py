@@ -384,7 +384,7 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
     mechanism = mechanism_of(parameters)
     its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
     if not its.free:
-        names = " and ".join(mechanism.freedoms[n].rate for n in its.commanded)
+        names = " and ".join(mechanism.freedoms[number].rate for number in its.commanded)
         raise InputError(
             f"no freedom of the {mechanism.name} is free, {names} being commanded: there is nothing to linearise; leave out a "
             "commanded speed"

@@ -20,6 +20,8 @@ Law: TypeAlias = str | tuple[tuple[Any, Any], ...]
 
 #: Functions of `math` that formulas may use.
 FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "fabs")
+#: Those that a written law may call.
+WRITTEN = (*FUNCTIONS, "pow")
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
 _ROWS = Many(Many(unchanged, length=2), least=2)
 _WANTED = f"be a formula in x, v and the constants with + - * / ** and {', '.join(FUNCTIONS)}, or a table of [x, force]"
@@ -113,7 +115,7 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
     if not names <= {"x", "v", *FUNCTIONS, *known}:
         raise ParameterError(name, formula, _WANTED)
     for own in known:
-        if own in ("x", "v", "pow", *FUNCTIONS) or not re.fullmatch("[a-z][a-z0-9_]*", own):
+        if own in ("x", "v", *WRITTEN) or not re.fullmatch("[a-z][a-z0-9_]*", own):
             where = f"{name.rpartition('.')[0]}.constants.{own}"
             raise ParameterError(where, known[own], "have a name of small letters that is no function, x or v")
 

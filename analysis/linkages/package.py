@@ -21,7 +21,7 @@ from .description import GROUND, Description, LinkageError, given
 from .drawing import Picture
 from .dynamics import Motion
 from .equations import Places
-from .laws import FUNCTIONS
+from .laws import WRITTEN
 from .mistakes import check_entries
 from .outputs import Outputs
 from .parameters import Drive, interface, size
@@ -344,12 +344,7 @@ class Package:
 def _imports(body: str) -> str:
     """Return the import lines that the text of the equations needs."""
     library = [name for name, value in vars(planar).items() if getattr(value, "__module__", "") == planar.__name__]
-    wanted = {
-        "math": (*FUNCTIONS, "pow"),
-        "typing": ("NamedTuple",),
-        "linkwork.friction": _FRICTION,
-        "linkwork.planar": library,
-    }
+    wanted = {"math": WRITTEN, "typing": ("NamedTuple",), "linkwork.friction": _FRICTION, "linkwork.planar": library}
     found = []
     for module, names in wanted.items():
         used = [name for name in names if re.search(rf"\b{name}\b", body)]

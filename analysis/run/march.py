@@ -92,6 +92,8 @@ class March:
         #: the latest time with a value, with its state
         self._lost: int | None = None
         self.losses = 0
+        #: times nearer than this are the same in the present interval (s)
+        self.same = 0.0
         #: derivative without a value: so large that errors are, or for Radau and BDF no number, which ends their iterations
         self.nothing = 1e200
         self.good = self.t, self.x
@@ -119,7 +121,7 @@ class March:
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
         """Integrate to the end, to a stopping event, or until the integrator fails."""
         times, end = self.settings.times, self.settings.times[-1]
-        interval = 0
+        method, interval = self._ending(method), 0
         while True:
             stop = self._end_of_interval(interval)
             release(self.of.encoded, self.x, self.laws)
@@ -173,9 +175,8 @@ class March:
             self._lost = error.number
             self.losses += 1
             return nothing
-        try:
-            result = np.array(self.equations.derivative(tuple(x), held, self.of.p))
-        except (ArithmeticError, ValueError):
+        result = self._value(x, held)
+        if result is None:
             self.losses += 1
             return nothing
         # a trial of a step too long may be anywhere
@@ -183,8 +184,15 @@ class March:
             self.good = t, x.copy()
         return result
 
-    def _ending(self, method: str | type[OdeSolver], least: float) -> str | type[OdeSolver]:
-        """Return a method of SciPy, made to end where the equations have no value beyond; ``least`` is an advance in time (s).
+    def _value(self, x: NDArray[np.float64], held: Any) -> NDArray[np.float64] | None:
+        """Return the derivative at a state, or None where the equations have none."""
+        try:
+            return np.array(self.equations.derivative(tuple(x), held, self.of.p))
+        except (ArithmeticError, ValueError):
+            return None
+
+    def _ending(self, method: str | type[OdeSolver]) -> str | type[OdeSolver]:
+        """Return a method of SciPy, made to end where the equations have no value beyond.
 
         The implicit methods may else accept a state without one, or try again for ever.
         """
@@ -202,20 +210,14 @@ class March:
                     done, message = super()._step_impl()
                 except ValueError:  # a Jacobian that is no number
                     return False, self.TOO_SMALL_STEP
-                if self.t > self.reached + least:
+                if self.t > self.reached + march.same:
                     self.reached, march.losses = self.t, 0
-                if march.losses > MOST_LOSSES or not march.has_value(self.y):
+                value = march._value(self.y, march.held)
+                if march.losses > MOST_LOSSES or value is None or not np.isfinite(value).all():
                     return False, self.TOO_SMALL_STEP
                 return done, message
 
         return Ending
-
-    def has_value(self, x: NDArray[np.float64]) -> bool:
-        """Return whether the equations have a value at a state."""
-        try:
-            return bool(np.isfinite(self.equations.derivative(tuple(x), self.held, self.of.p)).all())
-        except (ArithmeticError, ValueError):
-            return False
 
     def outputs(self, x: NDArray[np.float64], held: Any) -> tuple[float, ...]:
         """Return the outputs at a state, NaN where a law of a spring has no value."""
@@ -232,7 +234,7 @@ class March:
         t0, x0 = self.t, self.x
         times = self.settings.times
         watched = self._watched(stop)
-        self._lost, self.losses, self.good = None, 0, (t0, x0)
+        self._lost, self.losses, self.good, self.same = None, 0, (t0, x0), SAME * (stop - t0)
 
         def right_side(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             if show is not None:
@@ -245,7 +247,7 @@ class March:
                 right_side,
                 (t0, stop),
                 x0,
-                method=self._ending(method, SAME * (stop - t0)),
+                method=method,
                 t_eval=np.append(inner, stop),
                 events=[function for _, function in watched],
                 rtol=max(self.settings.tolerance, 3e-14),

@@ -211,7 +211,7 @@ class Wiring:
             free = [i for i in inputs if _table(i) not in served]
             if free:
                 found.append(f"{name}: not connected, and at their start values: {', '.join(free)}")
-            gains = [name for name in part.named("parameter") if f"_{name}".endswith("_gain")]
+            gains = [own for own in part.named("parameter") if f"_{own}".endswith("_gain")]
             starts = {v.name: float(v.start or 0.0) for v in part.description.modelVariables if v.name in gains}
             if gains and not any(part.values.get(gain, starts[gain]) for gain in gains):
                 found.append(f"{name}: its gains are 0: {', '.join(gains)}")

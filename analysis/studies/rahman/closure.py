@@ -265,20 +265,19 @@ def _condition(case: Case) -> float:
     return float(np.min(singular[:, -1] / singular[:, 0]))
 
 
-def _unmet(case: Case) -> float:
-    """Return the greatest entry of A Delta - V at the first correction from the angle before."""
-    matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
-    delta = np.linalg.pinv(matrix) @ right[..., None]
-    return float(np.abs(matrix @ delta - right[..., None]).max())
+def _first_correction(case: Case) -> tuple[float, float]:
+    """Return the greatest entries of A Delta - V and of Delta - A^-1 V, A^-1 by L457, for Delta = (A'A)^-1 A'V.
 
-
-def _by_name(case: Case) -> float:
-    """Return the greatest difference of (A'A)^-1 A'V from A^-1 V with the A^-1 of L457, at the first correction."""
+    They are those at the first correction from the angle before.
+    """
     matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
     transposed = np.swapaxes(matrix, -1, -2)
-    inverse = np.linalg.inv(transposed @ matrix) @ transposed
     delta = np.linalg.solve(transposed @ matrix, transposed @ right[..., None])
-    return float(np.abs(delta - inverse @ right[..., None]).max())
+    inverse = np.linalg.inv(transposed @ matrix) @ transposed
+    return (
+        float(np.abs(matrix @ delta - right[..., None]).max()),
+        float(np.abs(delta - inverse @ right[..., None]).max()),
+    )
 
 
 def _at_right_angles() -> float:
@@ -312,7 +311,8 @@ def closure() -> StudyResult:
                 GRID_DEG, sparse, rotation
             )
             columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(GRID_DEG, sparse, error)
-    singular, unmet = np.transpose([(_condition(case), _unmet(case)) for case in (PLANE, *OPEN)])
+    singular = [_condition(case) for case in (PLANE, *OPEN)]
+    unmet, by_name = np.transpose([_first_correction(case) for case in (PLANE, *OPEN)])
     missed, wrong = _detected()
     planes = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
     close_by = np.concatenate([found.steps for found in endings(20.0, planes)])
@@ -378,7 +378,7 @@ def closure() -> StudyResult:
             "the angle before, greatest of the turn, lengths in inches",
             ROUNDING,
             (
-                nothing("the two sides, with A^-1 as L457 has it", max(map(_by_name, (PLANE, *OPEN)))),
+                nothing("the two sides, with A^-1 as L457 has it", by_name.max()),
                 *(nothing(f"as a form of eq 23; {case.name}", entry) for case, entry in zip((PLANE, *OPEN), unmet)),
             ),
             "the same by the name that L457 gives; six rows for five unknowns: in the plane eq 23 is met only once the loop is "

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...numerics.decay import fit_decay
-from ...periodic import Turn, mean_effective_mass
+from ...periodic import Turn
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ALIKE, READ, SMALL
 from ..statements import Statement, at_least, at_most, near, text
@@ -32,6 +32,7 @@ from .rigs import (
     SLOWEST,
     amplitude,
     between,
+    dynamic_stiffness,
     harmonic,
     largest_multiplier,
     motions,
@@ -610,10 +611,8 @@ TYPICAL, RUN = (400.0, 585.0, 1000.0), (300.0, 1000.0)
 
 def _beyond_unbalance(spring: str, speeds: NDArray[np.float64], unbalance: float) -> float:
     """Return the greatest amplitude at speeds (rpm) over that of a mass on a spring under an unbalance (cm.kg)."""
-    p, rates = rig(spring), RAD_S_PER_RPM * speeds
-    part = p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates
-    amplitudes = np.array([amplitude(turn(spring, w)) for w in speeds.tolist()])
-    return float((amplitudes * np.abs(part) / (unbalance * rates**2)).max())
+    rates, amplitudes = RAD_S_PER_RPM * speeds, np.array([amplitude(turn(spring, w)) for w in speeds.tolist()])
+    return float((amplitudes * dynamic_stiffness(rig(spring), rates) / (unbalance * rates**2)).max())
 
 
 def _fig_8_18() -> tuple[Statement, ...]:
@@ -630,9 +629,8 @@ def _fig_8_18() -> tuple[Statement, ...]:
     for s in "CD":
         phases = [np.angle(np.fft.rfft(slider(turn(s, w))[:-1])[1]) for w in speeds]
         shift.append(np.degrees(np.ptp(np.unwrap(phases))))
-        p, rates = rig(s), RAD_S_PER_RPM * np.array(speeds)
-        part = p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates
-        force = sizes[s][:, 0] * np.abs(part)
+        rates = RAD_S_PER_RPM * np.array(speeds)
+        force = sizes[s][:, 0] * dynamic_stiffness(rig(s), rates)
         spread.append(np.ptp(force / rates**2) / np.mean(force / rates**2))
         growth.append(force.max() / force.min())
         beyond.append(_beyond_unbalance(s, np.array(sorted({*speeds, *about[s]})), float(np.mean(force / rates**2))))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
 
-from ...periodic import mean_effective_mass, natural_frequency
+from ...periodic import natural_frequency
 from ...run import Event, Inputs, Trajectory, simulate
 from ...slider import slider_motion
 from ...synthesis import Search, SliderUnknown, evaluate
@@ -33,7 +33,7 @@ from .linearised import with_crank
 from .problems import PROBLEMS
 from .regions import axis, hill, removing_estimate
 from .rig_2 import RANGE, length, linear_motion
-from .rigs import LOST, amplitude, overtones, turn
+from .rigs import LOST, amplitude, dynamic_stiffness, overtones, turn
 from .runs import SPEED, STIFFNESSES, plain, steady_turn, table_3_1
 from .series_2 import error_of, out_of_reach, path_motion, reduced, reduced_further
 
@@ -72,9 +72,7 @@ def harmonic(order: int, inertia_ratio: float, most: int = 2) -> NDArray[np.floa
 
 def unlike_oscillator(inertia_ratio: float) -> float:
     """Return the spread of the force, over the square of the speed, on an oscillator that gives the first harmonic."""
-    p, w = chapter_4(inertia_ratio, DAMPER), SPEEDS
-    part = p.slider_stiffness - mean_effective_mass(p) * w**2 + 1j * p.slider_damping * w
-    force = harmonic(1, inertia_ratio) * np.abs(part) / w**2
+    force = harmonic(1, inertia_ratio) * dynamic_stiffness(chapter_4(inertia_ratio, DAMPER), SPEEDS) / SPEEDS**2
     return float(np.ptp(force) / force.mean())
 
 

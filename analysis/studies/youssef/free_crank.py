@@ -679,6 +679,7 @@ def soft_phase_plane() -> StudyResult:
     )
 
 
+@cache
 def beyond_linear(stiffness: float) -> float:
     """Return the second harmonic of u over the first at a constant 27 rad/s, relative to that by the equation linear in u."""
     parameters = table_3_1(stiffness)

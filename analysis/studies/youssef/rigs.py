@@ -25,6 +25,7 @@ from ...periodic import (
     Turn,
     find_orbit,
     frequency_response,
+    mean_effective_mass,
     natural_frequency,
 )
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
@@ -109,6 +110,11 @@ def slider(of: Turn) -> NDArray[np.float64]:
     """Return the slider position over a turn (cm), with its first value repeated at the end."""
     u = CM_PER_METRE * of["slider.position"]
     return np.append(u, u[0])
+
+
+def dynamic_stiffness(p: FiveBarParameters, rates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return force over amplitude (N/m) of a damped mass on a spring, the mean effective mass, at angular speeds (rad/s)."""
+    return np.abs(p.slider_stiffness - mean_effective_mass(p) * rates**2 + 1j * p.slider_damping * rates)
 
 
 def amplitude(of: Turn) -> float:
