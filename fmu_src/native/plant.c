@@ -82,12 +82,11 @@ static bool inputs_of_jump(const Plant *a, const bool marked[ROOM(COMMANDS)], co
 }
 
 /* Apply the commands marked. */
-static bool apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[STATES]) {
+static void apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[STATES]) {
     double u[ROOM(INPUTS)], result[STATES];
-    if (!inputs_of_jump(a, marked, x, u)) return false;
+    if (!inputs_of_jump(a, marked, x, u)) return;
     call(equations_jump, (const double *[]){x, a->modes, u, a->p}, (double *[]){result});
     memcpy(x, result, sizeof result);
-    return true;
 }
 
 /* The commands that act on the state: in model exchange all of them. One that is not finite does not: the state stays good. */

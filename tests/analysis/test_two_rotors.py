@@ -34,7 +34,20 @@ from analysis.cli.vibration import _report_verdict
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.linear import find_equilibrium, linearise, linearise_along, settled_motion
 from analysis.mechanisms import MECHANISMS, register
-from analysis.periodic import Drive, Family, natural_frequency, orbit_of, stability_chart
+from analysis.periodic import (
+    Drive,
+    Family,
+    basins,
+    coexistence,
+    find_orbit,
+    find_orbits,
+    motion_gradient,
+    natural_frequency,
+    orbit_of,
+    plane,
+    stability_chart,
+    sweep,
+)
 from analysis.periodic.motion.orbit import first_guess
 from analysis.run import load_case
 from analysis.studio.tables import tables_of
@@ -223,6 +236,50 @@ def test_the_chart_has_the_multiplier_of_the_free_oscillator() -> None:
             wanted = np.exp(-0.5 * damping / K.mass * 4.0 * pi / speed)
             assert chart.grid.largest[row, column] == pytest.approx(wanted, rel=1e-6)
     assert not chart.boundaries
+
+
+def test_every_search_finds_the_one_motion_there_is() -> None:
+    ratio, turns = Fraction(3, 2), 2
+    inputs = Inputs(left_speed=20.0, right_speed=30.0)
+    met, (known,) = find_orbit(P, inputs), find_orbits(P, inputs).orbits
+    for orbit in (met, known):
+        turn = orbit.turn(256)
+        wanted = _cart((20.0, 30.0), (0.0, 0.0), turn.time)
+        np.testing.assert_allclose(turn["cart.position"], wanted, atol=1e-8 * np.abs(wanted).max())
+    speeds = np.array([18.0, 19.0, 20.0])
+    times = 2.0 * pi * turns / speeds[:, None] * np.linspace(0.0, 1.0, 100_001)
+    swings = [
+        0.5 * np.ptp(_cart((w, float(ratio) * w), (0.0, 0.0), t)) for w, t in zip(speeds.tolist(), times, strict=True)
+    ]
+    up = sweep(P, speeds, drive=_drive(18.0, ratio))
+    assert [orbit.amplitude for orbit in up.orbits if orbit] == pytest.approx(swings, rel=1e-6)
+    operation = plane(P, _drive(20.0, ratio), "left.speed", "cart.damping")
+    found = coexistence(operation, speeds, [1.0, 2.0])
+    assert found.count.tolist() == [[1, 1, 1], [1, 1, 1]]
+    decay = np.exp(-np.array([[1.0], [2.0]]) * pi * turns / (speeds * K.mass))
+    np.testing.assert_allclose(found.largest[:, :, 0], decay, rtol=1e-6)
+    all_of_it = basins(P, _drive(20.0, ratio), points=10)
+    assert [orbit.amplitude for orbit in all_of_it.motions] == pytest.approx(swings[2:], rel=1e-6)
+    assert (all_of_it.ends == 0).all()
+
+
+def test_the_motion_changes_with_the_parameters_of_the_cart_and_of_both_rotors_as_its_closed_form_does() -> None:
+    speeds, unbalances = np.array([20.0, 30.0]), np.array([K.unbalance1, K.unbalance2])
+    motion = motion_gradient(orbit_of(P, _drive(20.0, Fraction(3, 2))))
+    stiff = K.k - K.mass * speeds**2 + 1j * K.c * speeds
+    parts = unbalances * speeds**2 / stiff
+    expected = {
+        "left.radius": parts[0] / P.left_radius,
+        "right.radius": parts[1] / P.right_radius,
+        "cart.stiffness": (-parts / stiff).sum(),
+        "cart.damping": (-1j * speeds * parts / stiff).sum(),
+    }
+    position = [name for name, _ in motion.orbit.flow.components].index("cart.position")
+    for name, value in expected.items():
+        assert motion.start[position, motion.names.index(name)] == pytest.approx(value.real, rel=1e-7)
+    period = 2.0 * pi * 2 / 20.0
+    largest = np.exp(-K.c * period / (2.0 * K.mass))
+    assert motion.largest["cart.damping"] == pytest.approx(-largest * period / (2.0 * K.mass), rel=1e-8)
 
 
 @pytest.mark.slow

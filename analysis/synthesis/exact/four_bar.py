@@ -124,11 +124,15 @@ def _rows(th2: FloatArray, th4: FloatArray) -> FloatArray:
 
 
 def _roots(rows: Callable[[float], FloatArray]) -> list[float]:
-    """Return the angles at which the determinant of four equations is zero: a trigonometric polynomial of second degree."""
-    terms = np.fft.fft([np.linalg.det(rows(at)) for at in turn(5)]) / 5.0
-    # the powers -2 ... 2 of exp(i angle), the highest first
-    found = np.roots(terms[[2, 1, 0, 4, 3]])
-    return [float(np.angle(root)) for root in found if abs(abs(root) - 1.0) < ON_CIRCLE]
+    """Return the angles in (-pi/2, pi/2] at which the determinant of four equations is zero.
+
+    It is a trigonometric polynomial of first degree in twice the angle: half a turn on, a link is the same one that points in
+    the opposite direction.
+    """
+    terms = np.fft.fft([np.linalg.det(rows(0.5 * at)) for at in turn(3)]) / 3.0
+    # the powers -1 ... 1 of exp(2 i angle), the highest first
+    found = np.roots(terms[[1, 0, 2]])
+    return [0.5 * float(np.angle(root)) for root in found if abs(abs(root) - 1.0) < ON_CIRCLE]
 
 
 def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float) -> Links | None:

@@ -32,7 +32,7 @@ from ..task.task import Normal, normal_form
 from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
 from .start import USUAL_SEARCH, Answer, Search, Start, apart, inside, outside, over_cores, start_of
-from .statement import PARTS, Objective
+from .statement import Objective
 
 FloatArray = NDArray[np.float64]
 #: Number of untimed stations up to which least squares is as fast as IPOPT, whose Jacobian is sparse.
@@ -58,8 +58,6 @@ MOST = 32
 DIFFERENT = 1e-3
 #: The same for paths during refinement: closer ones end at the same optimum.
 RACED = 0.02
-#: Rotations during a task at which a start is checked, more than a search can afford.
-JUDGED = 400
 #: Quality below which points count as passed exactly (units squared).
 EXACT = 1e-14
 
@@ -259,13 +257,13 @@ class Polisher:
         few = normal.timed or normal.n <= FEW
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._refinement: Refinement | None = None
-        self._programs: dict[tuple[str, bool, int], Program] = {}
+        self._programs: dict[tuple[str, bool, bool], Program] = {}
 
-    def program(self, objective: Objective, *, exact: bool = False, parts: int = PARTS) -> Program:
+    def program(self, objective: Objective, *, exact: bool = False, judged: bool = False) -> Program:
         """Return the program with this objective; with a fixed pivot every program is exact."""
-        key = objective, exact and self.pivot is not None, parts
+        key = objective, exact and self.pivot is not None, judged
         if key not in self._programs:
-            self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1], parts=parts)
+            self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1], judged=judged)
         return self._programs[key]
 
     def fit(self, start: Start) -> Answer:
@@ -392,8 +390,7 @@ class Polisher:
                 feasible=within and np.isfinite(quality),
             )
         objective: Objective = "squares" if self.normal.outline is None else "curve"
-        parts = PARTS if self.limits.way is None else max(PARTS, -(-JUDGED // self.normal.n))
-        return self.program(objective, exact=True, parts=parts).kept(start)
+        return self.program(objective, exact=True, judged=self.limits.way is not None).kept(start)
 
 
 def violated(

@@ -31,8 +31,9 @@ Objective = Literal["squares", "worst", "transmission", "curve", "least", "least
 GRID, BETWEEN = 96, 2.5e-3
 #: Margin of a Grashof type, relative to the sum of the links: at zero a four-bar is a change-point.
 MARGIN = 1e-4
-#: Parts between two stations at whose ends a search bounds the transmission angle.
-PARTS = 4
+#: Parts between two stations at whose ends a search bounds the transmission angle, and the rotations of a whole task at which
+#: a start is judged, more than a search can afford.
+PARTS, JUDGED = 4, 400
 #: Least crank rotation between untimed stations, relative to equal steps.
 ADVANCE = 1e-3
 #: Least rotation over which an open path is traced (rad).
@@ -82,9 +83,9 @@ class Statement:
     exact : bool
         Whether bounds can be imposed at the extremes of the pivot's motion, see `Program.exact`; False makes a first search
         quicker.
-    parts : int
-        Number of parts between two stations at whose ends the transmission angle is bounded; a margin guarantees the bound
-        between them.
+    judged : bool
+        Whether linkages are only judged. For a search the transmission angle is bounded at few rotations between two
+        stations, with a margin that guarantees the bound between them; judged it is at its extremes, without one.
     """
 
     def __init__(
@@ -95,10 +96,10 @@ class Statement:
         objective: Objective = "squares",
         *,
         exact: bool = True,
-        parts: int = PARTS,
+        judged: bool = False,
     ) -> None:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
-        self._parts = parts
+        self._judged, self._parts = judged, max(PARTS, -(-JUDGED // normal.n)) if judged else PARTS
         #: Turns of the crank, and of a second one, while the rotation searched makes one.
         self._turns = geared(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
         casadi = self._casadi = symbolic.library()
@@ -391,14 +392,21 @@ class Statement:
             self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
         if limits.way is not None or (tilt is not None and limits.turn is None):
             x, step = self._way(phi)
-            d2 = self._reach(p, v, x)
-            # an extreme between two of these rotations is where the crank lies along the ground link: no more than this off
             slack = limits.linkage.slack(l1, l2, casadi.cos(0.5 * step))
+            if self._judged and self.pivot is None:
+                # the rotation nearest to where the crank lies along the ground link in each step, too; none beyond the end
+                step[self.normal.n - 1] = 0.0
+                turned = casadi.sign(step) * (x + p.crank_phase) / pi
+                nearest = casadi.fmin(pi * (casadi.floor(turned) + 1.0 - turned), casadi.fabs(step))
+                x, slack = casadi.vertcat(x, x + casadi.sign(step) * nearest), 0.0
+            d2 = self._reach(p, v, x)
+            # an extreme between two of these rotations is no more than the slack off
             self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """Constrain |cos mu| below cos(least), and below the tilt, from squares of the distance BD and without division."""
-        for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
+        least = least if self._judged else max(least, TURNING)
+        for cosine in (cos(least), *([] if tilt is None else [tilt])):
             links = p.coupler_length, p.rocker_length
             for excess in self.limits.linkage.transmission_excess(*links, nearest, farthest, cosine):
                 self._at_most(
