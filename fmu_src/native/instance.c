@@ -438,11 +438,11 @@ int instance_state(unsigned reference) {
     return -1;
 }
 
-/* Whether a variable can be changed in the present state: what is given, and the state itself in model exchange. */
+/* Whether a variable can be changed in the present state: what is given, and after initialisation the state itself. */
 static bool known(Instance *c, const char *function, unsigned reference, bool start) {
     const Variable *v = variable(c, function, reference, REAL);
     if (!v) return false;
-    bool state = v->causality == COMPUTED && !start && c->interface == MODEL_EXCHANGE && instance_state(reference) >= 0;
+    bool state = v->causality == COMPUTED && !start && instance_state(reference) >= 0;
     if (state || v->causality == INPUT || (v->causality == PARAMETER && start)) return true;
     instance_say(c, ERROR, "%s: %s is no known of a derivative %s", function, v->name, phase_name((int)c->s.phase));
     return false;

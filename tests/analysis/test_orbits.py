@@ -21,6 +21,7 @@ from analysis.periodic import (
     largest_multipliers,
     orbit_of,
 )
+from analysis.periodic.motion.kernels import eliminate
 from analysis.periodic.motion.orbit import _time
 from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import AssemblyError, InputError
@@ -294,3 +295,12 @@ def test_time_of_a_motion_of_several_turns(turns: int, n: int) -> None:
     time, period = _time(1.0 / (0.1 + 0.03 * np.cos(angle / turns)), way)
     np.testing.assert_allclose(time, 0.1 * angle + 0.03 * turns * np.sin(angle / turns), atol=1e-14)
     assert period == pytest.approx(0.1 * way, rel=1e-14)
+
+
+def test_a_system_without_a_solution_is_said_to_have_none() -> None:
+    singular = np.array([[1.0, 2.0, 1.0], [2.0, 4.0, 1.0]])
+    assert not eliminate.py_func(singular, 2)
+    assert not eliminate.py_func(np.array([[np.nan, 1.0]]), 1)
+    solved = np.array([[0.0, 2.0, 1.0], [4.0, 1.0, 1.0]])
+    assert eliminate.py_func(solved, 2)
+    np.testing.assert_allclose(solved[:, 2], [0.125, 0.5])
