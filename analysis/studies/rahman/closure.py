@@ -48,12 +48,18 @@ from .printed import (
 )
 from .table import TWISTS_REACHED_DEG, Case
 
+#: The operator of a rotation about k, eqs 2a and 3a.
+_ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+def _tilting(th: float) -> FloatArray:
+    """Return the operator of eta at an angle theta, eqs 2b and 3b."""
+    return np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
+
 
 def _operators() -> float:
     """Return the greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
     th, eta = float(GENERAL.th2), float(GENERAL.eta2)
-    about = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    tilting = np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
 
     def ball(beyond: Dual, change: FloatArray) -> Dual:
         return cast(Dual, about_k(th + change[0]) @ about_j(eta + change[1]) @ about_i(beyond))
@@ -61,12 +67,56 @@ def _operators() -> float:
     def guide(change: float) -> Dual:
         return cast(Dual, about_k(Dual(0.0, 1.3 + change)) @ about_i(Dual(4.0, 20.0)))
 
-    left = [Dual(0.0 * about, about) @ guide(0.0) - (guide(H) - guide(-H)) / (2.0 * H)]
+    left = [Dual(0.0 * _ABOUT, _ABOUT) @ guide(0.0) - (guide(H) - guide(-H)) / (2.0 * H)]
     for beyond in (Dual(0.0, ROD), Dual(0.5 * np.pi, 0.0)):
-        for operator, change in zip((about, tilting), H * np.eye(2)):
+        for operator, change in zip((_ABOUT, _tilting(th)), H * np.eye(2)):
             quotient = (ball(beyond, change) - ball(beyond, -change)) / (2.0 * H)
             left.append(Dual(operator) @ ball(beyond, 0.0 * change) - quotient)
     return max(float(np.abs([lack.real, lack.dual / ROD]).max()) for lack in left)
+
+
+def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the nine dual equations 19a by eqs 12 to 18: coefficients (9, 10), real and dual parts, right sides (3, 3, 2)."""
+    p, (th2, eta2, th3, eta3, s4) = parameters(case.offset_in, case.twist_deg), q.tolist()
+    m1 = about_k(Dual(angle, case.shift_in * INCH)) @ about_i(Dual(0.0, p.crank_length))
+    l2 = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, p.rod_length))
+    m4 = about_k(Dual(0.0, s4 * INCH)) @ about_i(Dual(p.guide_twist, p.guide_offset))
+    rod, guide = m1 @ l2, m1 @ l2 @ about_k(th3) @ about_j(eta3) @ about_i(0.5 * np.pi)
+    slide = Dual(0.0 * _ABOUT, _ABOUT * INCH)
+    sides = [
+        frame @ operator @ frame.T
+        for frame, operator in (
+            (m1, Dual(_ABOUT)),
+            (m1, Dual(_tilting(th2))),
+            (rod, Dual(_ABOUT)),
+            (rod, Dual(_tilting(th3))),
+            (guide, slide),
+        )
+    ]
+    off = (guide @ m4).T
+    right = np.stack([off.real - np.eye(3), off.dual / INCH], -1)
+    return np.stack([part.ravel() for h in sides for part in (h.real, h.dual / INCH)], -1), right
+
+
+def _independent() -> tuple[int, float, float]:
+    """Return how many of eqs 19a are independent, and of what order and size the others are at odds with them.
+
+    The first is the rank of the left sides in a general position. Their sums with the transposed vanish; those of the right
+    sides fall with a power of the angles (lengths in inches) by which a closed loop, in the plane, is opened, and have a
+    greatest entry where the iteration ends in the first case out of the plane.
+    """
+
+    def odds(case: Case, angle: float, q: FloatArray) -> float:
+        _, right = _nine_equations(case, angle, q)
+        return float(np.abs(right + np.swapaxes(right, 0, 1)).max())
+
+    (first, *_), at = OPEN, 0.9
+    left, _ = _nine_equations(first, at, np.array([float(x) for x in GENERAL]))
+    closed = planar(parameters(PLANE.offset_in), np.array([at]))[0] / [1.0, 1.0, 1.0, 1.0, INCH]
+    wide, narrow = (odds(PLANE, at, closed + off * np.array([0.3, 0.5, -0.4, 0.6, 0.2])) for off in (2e-3, 1e-3))
+    ended = zip(np.radians(GRID_DEG).tolist(), followed(first).unknowns[:, 0])
+    worst = max(odds(first, angle, q) for angle, q in ended)
+    return int(np.linalg.matrix_rank(left)), float(np.log2(wide / narrow)), worst
 
 
 def _joint_freedoms() -> tuple[int, ...]:
@@ -314,6 +364,7 @@ def closure() -> StudyResult:
     singular = [_condition(case) for case in (PLANE, *OPEN)]
     unmet, by_name = np.transpose([_first_correction(case) for case in (PLANE, *OPEN)])
     missed, wrong = _detected()
+    rank, order, odds = _independent()
     planes = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
     close_by = np.concatenate([found.steps for found in endings(20.0, planes)])
     outside = np.concatenate([followed(case).steps[:, 0] for case in OPEN])
@@ -368,6 +419,21 @@ def closure() -> StudyResult:
             "reference, a step by eq 23a is taken where it halves the sum of squares of eq 25, and a step of Davidon, Fletcher "
             "and Powell down that sum where it does not. This leaves of the rotation round the loop and of S4, greatest of the "
             f"turn: {', '.join(combined)}. Out of the plane the loop of eqs 2 and 3 cannot close (erratum 1)",
+        ),
+        Statement(
+            "So from equation (19a) nine dual equations can be written from this matrix equation, out of which only three are "
+            "independent.",
+            text("section 2.6.1, eqs 19a, 19b, L416"),
+            "rank of the nine left sides, by eqs 12 to 16, in a general position; order, in the angles by which a closed loop "
+            "in the plane is opened, of the sums of opposite right sides, which vanish if the three give the others, those on "
+            "the diagonal among them",
+            "none of a count; 2, the first order that eq 11 neglects; 0.05, as an order is a whole number",
+            (
+                replace(near("independent left sides", 3.0, rank, 0.0), stated="three"),
+                at_least("order of the rest of the right sides", 1.95, order),
+            ),
+            f"so it is to first order; out of the plane ({OPEN[0].name}), where the loop stays open (erratum 1), the other six "
+            f"contradict the three by up to {odds:.2g} where the iteration ends",
         ),
         Statement(
             "Hence the modified form of equation (23) is as follows: [Delta = (A'A)^-1 A'V] which is exactly same as [Delta = "

@@ -239,15 +239,15 @@ def family() -> StudyResult:
                 "anywhere in an infinite variety, yet still prescribing the same originally desired precision points.",
                 text("7.0, L5203"),
                 f"distance of P from the path at U = 1 with u = a sin^2({PRECISION} th2 / 2), a = "
-                f"{', '.join(f'{a:g}' for a in BETWEEN)} l3: the most at the {PRECISION} crank angles where u = 0; the most "
-                "in each part between them, the least of the parts",
+                f"{', '.join(f'{a:g}' for a in BETWEEN)} l3, ours: the most at the {PRECISION} crank angles where u = 0, by "
+                "any a; the most in each part between them, by the a that changes it most, the least of the parts",
                 f"1e-12 l3, the rounding; more than {READ:g} l3, what a graph can be read to",
                 (
                     at_most("at the precision points", 1e-12, kept, "l3"),
                     at_least("between the precision points", READ, changed, "l3"),
                 ),
-                "each amplitude gives another path, but P moves along the isochronous curve only; in one part one of the "
-                f"amplitudes moves it by {least:.3f} l3",
+                "each amplitude gives another path, but P moves along the isochronous curve only, so that not every one "
+                f"changes every part: {least}",
             ),
             Statement(
                 "First, any point lying on or within the outer boundaries of the family is accessible to the chosen "
@@ -306,16 +306,20 @@ def enclosed(low: float, high: float) -> float:
     return float(shapely.union_all(shapes).area)
 
 
-def between_precision_points() -> tuple[float, float, float]:
+def between_precision_points() -> tuple[float, float, str]:
     """Return how far P departs from its path at U = 1 (l3): at the precision points, and in the parts between them.
 
-    In the parts it is the most of all amplitudes, in the part where it is least, and the least of all parts and amplitudes.
+    In the parts it is the most of all amplitudes, in the part where this is least, and in words the least of all parts and
+    amplitudes.
     """
     change = np.sin(0.5 * PRECISION * TURN) ** 2
     away = np.array([np.abs(point(TURN, a * change) - point(TURN, 0.0)) for a in BETWEEN])
     parts = away[:, :-1].reshape(len(BETWEEN), PRECISION, -1).max(axis=2)
     kept = away[:, :: (TURN.size - 1) // PRECISION].max()
-    return float(kept), float(parts.max(axis=0).min()), float(parts.min())
+    which, part = np.unravel_index(parts.argmin(), parts.shape)
+    between = " and ".join(f"{360.0 / PRECISION * k:.0f}" for k in (part, part + 1))
+    least = f"between {between} deg a = {BETWEEN[which]:g} l3 moves P by {parts.min():.3f} l3 only"
+    return float(kept), float(parts.max(axis=0).min()), least
 
 
 def draw_family(result: StudyResult) -> Figure:
@@ -402,9 +406,10 @@ def two_positions() -> StudyResult:
     anywhere = variational_motion(LINKAGE, ROTATION, targets, assemblies=(1, -1), closed=False)
     outside = anywhere.kind == "perpendicular"
     above, standing = targets[outside, 1] > 0.0, np.sin(anywhere.rocker_angle[outside]) > 0.999
-    chosen = np.flatnonzero(outside)[above]
-    phi, pins, wanted = ROTATION[chosen], crank_pins[chosen][:, None], places[chosen]
-    arms = by_equations(phi, wanted)[0] + 1j * LINKAGE.rocker_length - pins
+    phi, pins, wanted = ROTATION[outside], crank_pins[outside][:, None], places[outside]
+    # (7.15) has no real U where the rocker hangs
+    with np.errstate(invalid="ignore"):
+        arms = by_equations(phi, wanted)[0] + 1j * LINKAGE.rocker_length - pins
     reached = pins + LINKAGE.point_distance / LINKAGE.coupler_length * arms
     by_7_15 = np.abs(reached - wanted[:, None]).min(axis=1) - [
         nearest(*at) for at in zip(phi.tolist(), wanted.tolist())
@@ -441,7 +446,24 @@ def two_positions() -> StudyResult:
                     near(
                         f"upright, the {(~above).sum()} points below it", 1.0, standing[~above].mean(), 0.0, why=hangs
                     ),
-                    at_most("error by (7.15), above the line", 1e-3, by_7_15.max(), "l3"),
+                    at_most("error by (7.15), above the line", 1e-3, by_7_15[above].max(), "l3"),
+                ),
+            ),
+            Statement(
+                "Now since a true global optimum may be found readily at first trial from the variational method, one may "
+                "argue the philosophy behind the use of any other method.",
+                text("7.3.1, L5772-5776"),
+                "share of the same points at which U by (7.14), solved once, or by (7.15) where (7.14) has no root, gives the "
+                f"least error of {POSITIONS.size} slider positions and both assemblies",
+                "1e-3 l3 of an error, more than P moves from one position to the next; none of the share",
+                (
+                    at_least(f"(7.14), {least.size} points", 1.0, np.mean(pointing[~missing] - least <= 1e-3)),
+                    at_least(
+                        f"(7.15), {standing.size} points",
+                        1.0,
+                        np.mean(by_7_15 <= 1e-3),
+                        why="below the slider's line (7.15) has no real U: there the rocker hangs",
+                    ),
                 ),
             ),
         ),
@@ -509,7 +531,9 @@ def _unweighted() -> tuple[Statement, ...]:
             "The variational method located the true global optimum which the direct search located as best as an "
             "eleven-term Fourier series could provide.",
             text("7.3.1, L5764"),
-            why=f"{LOST}; with ours the direct search has {found.error / least:.2f} times the squared error",
+            why=f"{LOST}; with ours the best eleven terms that we find have {found.error / least:.2f} times the squared error "
+            "of the variational motion, which is the least at every crank angle, and the best end of the simplex has "
+            f"{stopped[0] / found.error:.3f} times theirs",
         ),
         Statement(
             "If an infinite number of terms were used the direct search would have led to the variational results.",
@@ -553,6 +577,13 @@ def _weighted() -> tuple[Statement, ...]:
     bounds = (1.0, 0.9)
     relaxed = [squared_errors(direct(inside=WEIGHT, outside=0.01, acceleration=bound))[0] for bound in bounds]
     return (
+        Statement(
+            "The direct search permits an easier use of stricter error conditions or constraints at some portion of a desired "
+            "function.",
+            text("7.3.1, L5797-5799"),
+            why="there is no measure of *easier*; in the variational method a weight changes nothing, since (7.6) makes the "
+            "error (7.4) of each crank angle least by itself",
+        ),
         Statement(
             "It is clearly seen from Fig. (7.10) how a close generation of range [p1p2] is accomplished while larger errors "
             "are tolerated outside it.",

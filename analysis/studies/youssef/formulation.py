@@ -5,6 +5,8 @@ The equations are the thesis's, to the letter; what they give is compared with t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -27,6 +29,8 @@ OMEGA, STOP = SPEED * RAD_S_PER_RPM, 0.5
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 #: Torque of the launch that is compared (N.m), and relative rounding errors of a solution.
 TORQUE, ROUNDING = 10.0, 1e-9
+#: Step (s) at which the thesis's remarks on Runge-Kutta's method are judged, as appendix 1 begins.
+STEP = 1e-3
 
 
 def solved(q: ArrayLike, qd: ArrayLike, torque: float | None = None) -> NDArray[np.float64]:
@@ -90,13 +94,14 @@ class Integrated(NamedTuple):
     """Runs with a constant step of Hamming's method: times (s), and over them the failure of closure (cm).
 
     ``errors`` are the greatest of u (cm) by the first and the second approach of 3.1, ``unseen`` the greatest failure of
-    closure by the second (cm).
+    closure by the second (cm), ``slider`` its times (s) and u (cm).
     """
 
     times: NDArray[np.float64]
     gap: NDArray[np.float64]
     errors: tuple[float, float]
     unseen: float
+    slider: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @cache
@@ -108,13 +113,78 @@ def integrated(step: float) -> Integrated:
         solve_ivp(f, (0.0, STOP), start, **options)
         for f, start in ((all_derivatives, [*q[1:], *qd[1:]]), (slider_alone, [0.0, 0.0]))
     )
-    true = solve_ivp(slider_alone, (0.0, STOP), [0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-14, t_eval=first.t).y[
-        0
-    ]
-    error, other = (CM_PER_METRE * float(np.abs(u - true).max()) for u in (first.y[2], second.y[0]))
+    error, other = (CM_PER_METRE * float(np.abs(u - exact()(first.t)[0]).max()) for u in (first.y[2], second.y[0]))
     again = np.transpose([closed(OMEGA * t, u, OMEGA, 0.0)[0] for t, u in zip(second.t, second.y[0])])
     gaps = (opening(np.array([OMEGA * first.t, *first.y[:3]])), opening(again))
-    return Integrated(first.t, gaps[0], (error, other), float(gaps[1].max()))
+    slider = (second.t, CM_PER_METRE * second.y[0])
+    return Integrated(first.t, gaps[0], (error, other), float(gaps[1].max()), slider)
+
+
+@cache
+def exact() -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return (u, u') in SI over the time, accurate to rounding."""
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
+    solution: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    solution = solve_ivp(slider_alone, (0.0, STOP), [0.0, 0.0], **options).sol
+    return solution
+
+
+def change_on_halving(step: float) -> float:
+    """Return the greatest change of u (cm) by the second approach when the step is halved."""
+    (times, u), (finer, other) = (integrated(h).slider for h in (step, 0.5 * step))
+    return float(np.abs(u - np.interp(times, finer, other)).max())
+
+
+class RungeKutta(NamedTuple):
+    """A run of the classical method of fourth order: states at each step, and evaluations of the function."""
+
+    states: NDArray[np.float64]
+    evaluations: int
+
+
+def runge_kutta(
+    f: Callable[[float, NDArray[np.float64]], NDArray[np.float64]], y: ArrayLike, h: float, n: int
+) -> RungeKutta:
+    """Integrate n steps h of y' = f(t, y)."""
+    states, evaluations = [np.asarray(y, dtype=float)], 0
+    for i in range(n):
+        y0 = states[-1]
+        slope = total = np.zeros_like(y0)
+        for at, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+            slope = f((i + at) * h, y0 + at * h * slope)
+            total, evaluations = total + weight * slope, evaluations + 1
+        states.append(y0 + h / 6.0 * total)
+    return RungeKutta(np.array(states), evaluations)
+
+
+def of_runge_kutta(step: float) -> tuple[float, float]:
+    """Return the greatest error of u (cm) by the second approach, and its change when the step is halved, over 1 - 1/16."""
+    n = round(STOP / step)
+    u, halved = (runge_kutta(slider_alone, [0.0, 0.0], STOP / m, m).states[:: m // n, 0] for m in (n, 2 * n))
+    error = np.abs(u - exact()(np.linspace(0.0, STOP, n + 1))[0]).max()
+    return CM_PER_METRE * float(error), CM_PER_METRE * float(np.abs(u - halved).max()) / (1.0 - 2.0**-4)
+
+
+def stable_steps(turns: int = 400) -> tuple[float, float]:
+    """Return the greatest steps on y' = -y with which Runge-Kutta's and Hamming's methods do not grow."""
+
+    def classical(h: float) -> NDArray[np.float64]:
+        return runge_kutta(lambda t, y: -y, [1.0], h, turns).states[:, 0]
+
+    def hamming(h: float) -> NDArray[np.float64]:
+        options = {"method": Hamming, "first_step": h, "max_step": h, "rtol": 1e9, "atol": 1e99}
+        y: NDArray[np.float64] = solve_ivp(lambda t, y: -y, (0.0, turns * h), [1.0], **options).y[0]
+        return y
+
+    found = []
+    for method in (classical, hamming):
+        low, high = 0.1, 4.0
+        while high - low > 1e-3:
+            middle = 0.5 * (low + high)
+            before, last = np.abs(method(middle)[-100:]).reshape(2, 50).max(axis=1)
+            low, high = (middle, high) if last < before else (low, middle)
+        found.append(low)
+    return found[0], found[1]
 
 
 def opening(q: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -180,6 +250,11 @@ def compute() -> StudyResult:
         parasite(past, rates, 0.1)
         for past, rates in (((1, 0, -1), (1 / 3, 4 / 3, 1 / 3)), ((1, -9 / 8, 0, 1 / 8), (3 / 8, 6 / 8, -3 / 8, 0)))
     )
+    tells = {label: run.errors[1] / change_on_halving(step) for (label, run), step in zip(found.items(), STEPS)}
+    classical, stable = of_runge_kutta(STEP), stable_steps()
+    # as many evaluations: twice the step, with four a step instead of two
+    dearer = {label: of_runge_kutta(2.0 * step)[0] / run.errors[1] for (label, run), step in zip(found.items(), STEPS)}
+    used = runge_kutta(slider_alone, [0.0, 0.0], STEP, 1).evaluations
     return StudyResult(
         number="3.1",
         claim="The multipliers are the pin forces; with all second derivatives integrated, the closure of the loop "
@@ -216,6 +291,64 @@ def compute() -> StudyResult:
                 "kinematics, relative to its failure of closure",
                 "more than 100, ours as above: the check shows nothing of the error",
                 tuple(at_least(label, 100.0, run.errors[1] / run.unseen) for label, run in found.items()),
+            ),
+            Statement(
+                "[L]arge errors may be involved in the numerical integrations yet they are not realised by the designer "
+                "because the kinematics are used to force the closure of the mechanism and hence no simple check is available "
+                "to indicate whether the solution is accurate.",
+                text("3.1, L1763-1772"),
+                "greatest error of u by the second approach, as in the row before, relative to the greatest change of u when "
+                "the step is halved",
+                "more than 100, as above: this check shows nothing of the error; one simple check refutes *no*",
+                tuple(at_least(label, 100.0, ratio, why="halving the step shows it") for label, ratio in tells.items()),
+                "the thesis has another itself: the methods that it chooses estimate their errors easily (L1379)",
+            ),
+            Statement(
+                "Their [the Runge-Kutta methods'] serious drawbacks are, firstly, the lack of simple means of estimating the "
+                "errors; this makes them highly susceptible to numerical instabilities ...",
+                text("2.4, L1334-1340"),
+                "factor between the greatest error of u, by the second approach and the classical method of fourth order, and "
+                "its estimate by Richardson: the change when the step is halved, over 1 - 1/16; Table 3.1, step "
+                f"{1e3 * STEP:g} ms; greatest step with which the solution of y' = -y, ours, does not grow, over that of "
+                "Hamming's method, which the thesis prefers",
+                "more than 2, ours: an estimate is of use if it is right within a factor of 2; at most 1: *highly* is read as "
+                "more than Hamming's",
+                (
+                    at_least(
+                        "lack of an estimate",
+                        2.0,
+                        max(classical[0] / classical[1], classical[1] / classical[0]),
+                        why=f"halving the step estimates the error within {abs(classical[1] / classical[0] - 1.0):.2%}, for "
+                        "three times the evaluations",
+                    ),
+                    at_most(
+                        "susceptible to instabilities",
+                        1.0,
+                        stable[0] / stable[1],
+                        why=f"it is stable up to steps of {stable[0]:.1f}, Hamming's up to {stable[1]:.1f}",
+                    ),
+                ),
+            ),
+            Statement(
+                "... and, secondly, the large number of evaluation of the function [Phi]; four times for each step in a fourth "
+                "order method. The second of these drawbacks makes them unfavourable for use with our Lagrangian multiplier "
+                "formulation of the equations of the motion ...",
+                text("2.4, L1342-1356"),
+                "evaluations that a step of the classical method takes; its greatest error of u by the second approach "
+                "over that of Hamming's with half the step, which takes two evaluations a step and so as many in all",
+                "none of a count; more than 1, the sign, as *unfavourable* says",
+                (
+                    replace(near("evaluations a step", 4.0, used, 0.0), stated="four"),
+                    *(
+                        at_least(
+                            f"unfavourable; Hamming's {label}",
+                            1.0,
+                            ratio,
+                            why="at these steps it has the smaller error for as many evaluations",
+                        )
+                        for label, ratio in dearer.items()
+                    ),
+                ),
             ),
             Statement(
                 "... the errors, inherent, roundoff or truncation, from the information already calculated. These errors "

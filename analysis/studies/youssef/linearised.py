@@ -12,13 +12,14 @@ from scipy.optimize import fsolve
 
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import SIGMA2, chapter_4
+from linkwork.five_bar.published import SETS, SIGMA2, chapter_4
 
 from ...figures import Figure, Panel, plot_curves
 from ...numerics.fourier import FourierSeries
 from ...units import RAD_S_PER_RPM
 from ...youssef import Form, SliderEquation, Variant, slider_equation, two_harmonics
 from ...youssef.printed_coefficients import DATUM, Coefficients, Datum, convert, listed, printed, ratios
+from ..rules import SMALL
 from ..statements import Case, Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, curves_of
 from .runs import SPEED, table_3_1
@@ -117,6 +118,16 @@ def coefficients(sigma2: float, inertia_ratio: float = 1.0) -> dict[str, float]:
         )
         if abs(true) > ROUNDING
     }
+
+
+def constant_parts() -> dict[str, float]:
+    """Return the sizes of h0 and g0 over k0 by the right equation, for chapter IV's mechanism and rig 2."""
+    found = {}
+    for words, mechanism in (("I4 = 2", chapter_4(2.0)), ("rig 2, spring C", SETS["rig-2-spring-c"].parameters)):
+        equation = slider_equation(mechanism, 25.0)
+        for name, part in (("h0", equation.stiffness), ("g0", equation.force)):
+            found[f"{name}; {words}"] = abs(part.mean) / equation.spring_factor.mean
+    return found
 
 
 def _over(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
@@ -256,6 +267,15 @@ def compute() -> StudyResult:
                 text("4.3, L2797-2801"),
                 why=f"the factor cannot be read, and Q1 is our reading; at I4 = 1 the greatest of those that can is "
                 f"1/{apart:.0f} of A1",
+            ),
+            Statement(
+                "... where [epsilon] is a small parameter and [h0], g0 << k0.",
+                text("4.3, eq (4.22), L2837"),
+                "means of K and F of the right linear equation, in size, over that of the spring's factor, which is 1: G1 and "
+                "Q1 over A1; at I4 = 2, the greatest of Fig 4.3 to 5.4, and of rig 2, whose coupler has mass",
+                f"{SMALL:g}, the rule for *small*, as *<<* says",
+                tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
+                "G1 and Q1 as printed vanish with a massless coupler; what is left is of second order in the crank's length",
             ),
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "

@@ -77,9 +77,12 @@ def compute_rig_1() -> StudyResult:
     columns[f"speed; {SPECIAL} [rpm]"] = np.array([s.parameter for s in special]) / RAD_S_PER_RPM
     columns[f"amplitude; {SPECIAL} [cm]"] = CM_PER_METRE * np.array([s.orbit.amplitude for s in special])
     greatest = {"A": float(motions("A").branches[0].amplitude.max()), "B": upper_orbit(1000.0).amplitude}
-    accommodated = {s: max(map(amplitude, _up_to_stop(s))) for s in "AB"}
+    accommodated = {s: max(map(amplitude, _up_to_stop(s).values())) for s in "AB"}
     reached = {s: _reached(s) for s in "AB"}
-    why = f"{reached['B'][0]:.2f} cm there, {reached['B'][1]:.2f} cm near half the natural frequency"
+    why = (
+        f"with spring B it is {reached['B'][0]:.2f} cm at {STOPPED['B']} rpm, and {reached['B'][1]:.2f} cm at "
+        f"{reached['B'][2]:.0f} rpm, near half the natural frequency, where the rig did run (Fig 8.16)"
+    )
     return StudyResult(
         number="rig-1-resonance",
         claim="With spring A there is one motion at each speed; with spring B resonance leans over, and two exist at a time.",
@@ -104,22 +107,26 @@ def compute_rig_1() -> StudyResult:
                 "greatest displacement at this speed over that at lower speeds, which the guide did accommodate: every 5 rpm "
                 "from 240 (spring A) and 500 rpm (spring B) on, the lowest of the figures",
                 "at least 1: what the guide accommodated is no more than it can",
-                tuple(at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, a / b, why=why) for s, (a, b) in reached.items()),
+                tuple(
+                    at_least(f"spring {s}, {STOPPED[s]} rpm", 1.0, a / b, why=why) for s, (a, b, _) in reached.items()
+                ),
             ),
         ),
     )
 
 
-def _up_to_stop(spring: str) -> list[Turn]:
+def _up_to_stop(spring: str) -> dict[float, Turn]:
     """Return a turn of the motion every 5 rpm from the lowest speed of the figures to that at which the rig was stopped."""
     speeds = np.arange({"A": 240.0, "B": 500.0}[spring], float(STOPPED[spring]) + 1.0, 5.0).tolist()
-    return [turn(spring, w) for w in speeds]
+    return {w: turn(spring, w) for w in speeds}
 
 
-def _reached(spring: str) -> tuple[float, float]:
-    """Return the greatest displacement (cm) at the speed at which the rig was stopped, and at the speeds below."""
-    *before, there = (float(np.abs(slider(of)).max()) for of in _up_to_stop(spring))
-    return there, max(before)
+def _reached(spring: str) -> tuple[float, float, float]:
+    """Return the greatest displacement (cm) at the speed at which the rig was stopped, and below it with its speed (rpm)."""
+    found = {w: float(np.abs(slider(of)).max()) for w, of in _up_to_stop(spring).items()}
+    _, there = found.popitem()
+    at = max(found, key=found.__getitem__)
+    return there, found[at], at
 
 
 def draw_rig_1(result: StudyResult) -> Figure:
@@ -186,6 +193,19 @@ def lost_to_friction(speed: float, coefficient: float) -> float:
     return float(coefficient * np.mean(np.abs(of["slider.guide_force"] * v)) / viscous)
 
 
+def _constant_friction(force: float, varying: Turn) -> tuple[float, float, float]:
+    """Compare constant friction (N) with friction by the coefficient `SLIGHT`, spring A.
+
+    Returns the greatest difference of u in the turn over the amplitude without friction, the share of this that constant
+    friction takes off, and its work in a turn over that of the varying one, less 1.
+    """
+    even, free = turn("A", SHOWN["A"], slider_coulomb_friction=force), amplitude(turn("A", SHOWN["A"]))
+    work = SLIGHT * np.mean(np.abs(varying["slider.guide_force"] * varying["slider.velocity"]))
+    apart = np.abs(slider(varying) - slider(even)).max()
+    more = force * np.mean(np.abs(even["slider.velocity"])) / work - 1.0
+    return float(apart / free), 1.0 - amplitude(even) / free, float(more)
+
+
 def compute_friction() -> StudyResult:
     """Compute the amplitude over the speed with friction, and judge the statements on the amplitudes."""
     columns: dict[str, NDArray[np.float64]] = {}
@@ -207,12 +227,11 @@ def compute_friction() -> StudyResult:
     still_slight = brentq(
         lambda c: lowered("A", slider_friction_coefficient=c)[at] - SLIGHTLY, SLIGHT, STRONG, xtol=1e-4
     )
+    varying = turn("A", SHOWN["A"], slider_friction_coefficient=SLIGHT)
     constant = SLIGHT * float(force[SHOWN["A"]].mean())
-    varying, even = (
-        slider(turn("A", SHOWN["A"], **{name: value}))
-        for name, value in (("slider_friction_coefficient", SLIGHT), ("slider_coulomb_friction", constant))
-    )
-    within = float(np.abs(varying - even).max() / amplitude(joint))
+    within, takes, _ = _constant_friction(constant, varying)
+    # constant friction that does the same work in a turn
+    working = brentq(lambda c: _constant_friction(c, varying)[2], 0.5 * constant, 2.0 * constant, xtol=1e-4)
     shift = max(abs(lag("A", w, SLIGHT)) for w in COMPARED["A"])
     strong = f"with a coefficient of {STRONG:g} it takes {taken['A', STRONG].max():.0%} off the amplitude, which is not slight"
     heavy = f"the slider's weight, {rig('A').slider_mass * rig('A').gravity:.2f} N, comes on top of the joint's force"
@@ -267,10 +286,13 @@ def compute_friction() -> StudyResult:
                     at_least("with the speed", 1.0 + ALIKE, force[450.0].max() / force[390.0].max()),
                     at_most("from the joint's", ALIKE, apart / force[420.0].max(), why=heavy),
                     at_least("taken off, with the speed", 1.0 + ALIKE, max(lost) / min(lost)),
-                    at_least("explained within a cycle", ALIKE, within),
+                    at_least("within a cycle, from constant friction", ALIKE, within),
                 ),
                 f"friction takes off {min(lost):.3f} to {max(lost):.3f} cm; relative to the amplitude this is alike at the "
-                f"three speeds, {100.0 * taken['A', SLIGHT].min():.1f} to {100.0 * taken['A', SLIGHT].max():.1f} %",
+                f"three speeds, {100.0 * taken['A', SLIGHT].min():.1f} to {100.0 * taken['A', SLIGHT].max():.1f} %; constant "
+                f"friction of the same mean takes off {takes:.1%}; from one that does the same work in a turn, "
+                f"{working / constant:.2f} times as strong, u differs by {_constant_friction(working, varying)[0]:.2f} of the "
+                "amplitude too",
             ),
             Statement(
                 "Other factors contributing to the difference are (a) only an average estimation of the damping coefficient "
