@@ -22,23 +22,29 @@ from .runner import run_in_process
 START, SIZES = 1000.0, [1e-6, 1.2345e-5, 3e-4, 1e-3, 2.5e-3, 1e-6, 0.0137, 0.1]
 
 
-def outputs_of_fmu(
-    fmu: str, folder: str, values: dict[str, float], inputs: dict[str, float], times: list[float], sizes: list[float]
-) -> list[Any]:
-    """Outputs at the start, after each input is set and after each step, or None and the sentence where it is refused."""
+def outputs_of_fmus(
+    cases: list[tuple[str, str, dict[str, float], dict[str, float], list[float], list[float]]],
+) -> list[list[Any]]:
+    """Outputs at the start, after each input is set and after each step, or None and the sentence where it is refused.
+
+    Of each file, unpacked into its folder, with values, inputs, times and step sizes.
+    """
     from bare_master import Fmu
 
-    instance = Fmu(fmu, folder).instantiate().start(values, start=times[0])
-    found = [instance.outputs()]
-    for n, (time, size) in enumerate(zip(times, sizes), 1):
-        for name, value in inputs.items():
-            instance.set(name, value * (1.0 + 0.01 * n))
+    every = []
+    for fmu, folder, values, inputs, times, sizes in cases:
+        instance = Fmu(fmu, folder).instantiate().start(values, start=times[0])
+        found = [instance.outputs()]
+        for n, (time, size) in enumerate(zip(times, sizes), 1):
+            for name, value in inputs.items():
+                instance.set(name, value * (1.0 + 0.01 * n))
+                found.append(instance.outputs())
+            if instance.step(time, size):
+                found += [None, instance.get("solver.message"), instance.outputs()]
+                break
             found.append(instance.outputs())
-        if instance.step(time, size):
-            found += [None, instance.get("solver.message"), instance.outputs()]
-            break
-        found.append(instance.outputs())
-    return found
+        every.append(found)
+    return every
 
 
 def outputs_of_plant(plant: Plant, inputs: dict[str, float], sizes: list[float]) -> tuple[list[Any], list[float]]:
@@ -68,4 +74,5 @@ def test_outputs_are_the_plants(fmu: Path, model: Model, tmp_path: Path, seed: i
     case = drawn(model.name, seed)
     plant = Plant.of_values(FMUS[model.name], case.values, tolerance=1e-9, time=START)
     expected, times = outputs_of_plant(plant, case.inputs, SIZES)
-    assert run_in_process(outputs_of_fmu, fmu, tmp_path, case.values, case.inputs, times, SIZES) == expected
+    found = run_in_process(outputs_of_fmus, [(str(fmu), str(tmp_path), case.values, case.inputs, times, SIZES)])
+    assert found == [expected]
