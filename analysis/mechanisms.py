@@ -11,7 +11,7 @@ from typing import Any
 from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters as FiveBarParameters
-from linkwork.mechanism import PARTS, Channel, Mechanism
+from linkwork.mechanism import PARTS, Channel, Mechanism, PublishedSet
 from linkwork.parameters import Rules, fmi_name
 from linkwork.slider_crank.parameters import SliderCrankParameters as SliderCrankParameters
 from linkwork.variables import ROLES, UNITS, status_variables
@@ -229,6 +229,8 @@ def mechanism_of(parameters: Parameters) -> Mechanism:
     for mechanism in MECHANISMS.values():
         if isinstance(parameters, mechanism.parameters):
             return mechanism
+    if isinstance(parameters, PublishedSet):
+        raise InputError("parameters are a published set: they must be its parameters, as in variant(...).parameters")
     kinds = ", ".join(mechanism.parameters.__name__ for mechanism in MECHANISMS.values())
     raise InputError(f"parameters are {type(parameters).__name__}: they must be one of {kinds}")
 

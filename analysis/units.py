@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from inspect import signature
 from math import inf, isfinite
+from numbers import Real
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
@@ -54,6 +55,12 @@ def display_of(unit: str) -> tuple[str, float]:
     return displays[0] if displays else (unit, 1.0)
 
 
+def displayed(value: float, unit: str, digits: int = 6) -> str:
+    """Write a number in SI with the unit in which tables show it, such as "700 rpm" or "3 mm"."""
+    shown, factor = display_of(unit)
+    return f"{factor * value:.{digits}g}" + ("" if shown == "1" else f" {shown}")
+
+
 def with_unit(value: float, unit: str) -> str:
     """Write a number in SI as a text that `quantity` reads back exactly."""
     return f"{float(value)!r} {_PINT.get(unit, unit)}"
@@ -90,7 +97,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     wanted = f"be a number in {unit}" if unit != "1" else "be a number"
     if unit != "1":
         wanted += f", or a text with a unit of that kind{f', such as {_USUAL[unit]}' if unit in _USUAL else ''}"
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+    if isinstance(value, bool) or not isinstance(value, (int, float, str, Real)):  # the last for NumPy's numbers
         raise ParameterError(name, value, wanted)
     if isinstance(value, str):
         if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):
@@ -106,6 +113,22 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     if not isfinite(number):
         raise ParameterError(name, value, "be a finite number")
     return number
+
+
+def pair(value: Any, unit: str, name: str) -> tuple[float, float]:
+    """Convert two numbers, or texts with a unit, to SI, such as the ends of a range.
+
+    Raises
+    ------
+    ParameterError
+        If they are not two; or as `quantity`.
+    """
+    ends: Any = () if isinstance(value, (str, Mapping)) else value
+    try:
+        first, second = ends
+    except (TypeError, ValueError):
+        raise ParameterError(name, value, "be two values: [least, greatest]") from None
+    return quantity(first, unit, name), quantity(second, unit, name)
 
 
 def si(value: Any, unit: Units, name: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -62,12 +62,15 @@ class Chosen:
             hint = "; --speed prescribes the speed instead" if torque else ""
             raise InputError(f"{self.case.title}: {error}{hint}") from None
 
-    def start(self, drive: Any) -> list[float] | None:
-        """Return a guess of the orbit's start: none at prescribed speed, else zero with a crank speed."""
+    def start(self, drive: Any) -> list[float]:
+        """Return a guess of the orbit's start: rest at the coordinates of the case, with a crank speed under a torque."""
+        from ..periodic import resting
+
+        guess = partial(resting, self.case.parameters, drive, self.case.initial)
         if drive.speed_drive:
             if self.guess_speed is not None:
                 raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
-            return None
+            return guess()
         mechanism = mechanism_of(self.case.parameters)
         flow = drive.flow(mechanism)
         speed = float(getattr(self.case.initial, mechanism.freedoms[flow.crank].initial[1]))
@@ -76,8 +79,8 @@ class Chosen:
         elif speed <= 0.0:
             if drive.motor is None:
                 raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
-            return None
-        return [*[0.0] * (flow.size - 1), speed]
+            return guess()
+        return guess(speed)
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report the files and what could not be computed, and exit with what that means."""

@@ -63,9 +63,10 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
         click.echo(json.dumps(tables, indent=2))
     else:
         _print(chosen.title, tuned)
-    stem = folder_of(out) / f"{Path(case).stem}-tuned"
+    folder = folder_of(out)
+    stem = folder / f"{Path(case).stem}-tuned"
     written = [
-        write_tables(f"{stem}.toml", chosen.tuned_tables(tuned)),
+        write_tables(f"{stem}.toml", chosen.tuned_tables(tuned, folder)),
         write_tables(f"{stem}.json", tables),
     ]
     written += plotted(plot, tuned, f"{stem}.png", title=chosen.title)

@@ -144,7 +144,8 @@ def resonance(
     unit, factor = display_of(unit_of(mechanism, vary))
     if natural is not None:
         console.print(
-            f"natural frequency (mean effective mass): {natural / RAD_S_PER_RPM:.2f} rpm, {natural:.5g} rad/s",
+            f"natural frequency of the spring alone on the mean effective mass: {natural / RAD_S_PER_RPM:.2f} rpm, "
+            f"{natural:.5g} rad/s",
             highlight=False,
         )
     _branches(title, response, factor, unit)

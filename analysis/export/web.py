@@ -58,7 +58,7 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
 
 def crank_number(mechanism: Mechanism) -> int:
     """Return the number of the first freedom that turns; -1 without one."""
-    return next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
+    return next(iter(mechanism.cyclic), -1)
 
 
 def _header(mechanism: Mechanism) -> str:

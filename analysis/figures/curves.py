@@ -287,7 +287,7 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         axis.set_xticks([], minor=True)
     if panel.x_range:
         axis.set_xlim(*panel.x_range)
-    if panel.y_range:
+    if panel.y_range and panel.y_range[0] < panel.y_range[1]:
         axis.set_ylim(*panel.y_range)
     for log in panel.logarithmic if panel.x_ticks is None else "":
         _name_few_decades(getattr(axis, f"{log}axis"))

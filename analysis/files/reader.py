@@ -21,6 +21,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from math import inf, isfinite
+from numbers import Integral
 from typing import Any, NamedTuple, TypeVar
 
 from linkwork.errors import MissingParameterError, ParameterError, UnknownNameError
@@ -202,13 +203,14 @@ class Whole:
     least: int | None = None
 
     def __call__(self, value: Any, name: str) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
+        if isinstance(value, bool) or not isinstance(value, Integral):
             raise ParameterError(name, value, "be a whole number")
-        if self.least is not None and value < self.least:
+        whole = int(value)
+        if self.least is not None and whole < self.least:
             raise ParameterError(name, value, f"be at least {self.least}")
-        if abs(value) > _GREATEST:
+        if abs(whole) > _GREATEST:
             raise ParameterError(name, value, f"be at most {_GREATEST}")
-        return value
+        return whole
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from linkwork.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError
 from linkwork.mechanism import Mechanism
 
 from .. import files
@@ -37,18 +40,44 @@ def described_in(tables: Mapping[str, Any]) -> bool:
 def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     """Compile the linkage described in the tables of a case; return tables that name it as their published set.
 
+    What a named file has beside its linkage holds, too, unless the tables have it: `_over`.
+
     Raises
     ------
     InputError
-        If the file named in the tables describes no linkage.
+        If the file named in the tables describes no linkage, or the tables name a published set as well.
     LinkageError, ParameterError
         If the description is wrong.
     """
+    if LINKAGE in tables and not isinstance(tables[LINKAGE], str | Mapping):
+        raise ParameterError(LINKAGE, tables[LINKAGE], "be the name of a file, or a table that describes a linkage")
     if not described_in(tables):
         return tables
-    own = tables[LINKAGE]
-    made = (load_package(folder / own) if isinstance(own, str) else _package(tables)).mechanism()
-    return {"published": made.name, **{name: value for name, value in tables.items() if name != LINKAGE}}
+    own, rest = tables[LINKAGE], {name: value for name, value in tables.items() if name != LINKAGE}
+    if "published" in rest:
+        raise InputError(f"a case has one mechanism: leave out linkage, or published = {rest['published']!r}")
+    if isinstance(own, Mapping):
+        return {"published": _package(tables).mechanism().name, **rest}
+    path = Path(folder / own)
+    named = files.read_tables(path)
+    if not described_in(named):
+        raise _no_linkage(path)
+    base = with_linkage(named, path.parent)
+    return _over({name: value for name, value in base.items() if name not in ("title", "tune")}, rest)
+
+
+def _over(base: Mapping[str, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables with those of another file beneath them: entry by entry, but runs and drives as a whole."""
+    merged = {**base, **tables}
+    for name, table in tables.items():
+        whole = name == "run" or name.lower().endswith("drive")
+        if not whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
+            merged[name] = _over(below, table)
+    return merged
+
+
+def _no_linkage(path: str | Path) -> InputError:
+    return InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
 
 
 def _package(tables: Mapping[str, Any]) -> Package:
@@ -75,25 +104,25 @@ def load_package(path: str | Path) -> Package:
     InputError, LinkageError, ParameterError
     """
     tables = files.read_tables(path)
-    if isinstance(tables.get(LINKAGE), str):
+    while isinstance(tables.get(LINKAGE), str):
         path = Path(path).parent / tables[LINKAGE]
         tables = files.read_tables(path)
     if not isinstance(tables.get(LINKAGE), Mapping) or not described_in(tables):
-        raise InputError(f"{path} describes no linkage: it must have a table [linkage] with bodies")
+        raise _no_linkage(path)
     return _package(tables)
 
 
 #: A number in SI, or a text with a unit such as "50 mm".
 Amount = float | str
 #: Coordinates x, y; 0 means that a coordinate is always zero.
-Place = Sequence[Amount]
+Place = Sequence[Amount] | NDArray[np.float64]
 
 
 class Builder:
     """Builder of a description: each method adds one entry to the table of the same name in a linkage file.
 
     Amounts are numbers in SI or texts with a unit, such as ``"50 mm"``. An omitted argument has the default of the file. Every
-    method returns the builder.
+    method returns the builder, and raises InputError for a name that its table has already.
 
     Examples
     --------
@@ -111,7 +140,10 @@ class Builder:
         return f"<linkage {self.tables['name']}: {', '.join(self.tables['bodies']) or 'no bodies yet'}>"
 
     def _add(self, table: str, name: str, **entries: Any) -> Builder:
-        self.tables.setdefault(table, {})[name] = _given(entries)
+        named = self.tables.setdefault(table, {})
+        if name in named:
+            raise InputError(f"{self!r} has {table}.{name} already: another one needs a name of its own")
+        named[name] = _given(entries)
         return self
 
     def body(
@@ -391,7 +423,9 @@ def _given(entries: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Return mappings and sequences as the dicts and lists of a file."""
+    """Return mappings, sequences and arrays as the dicts and lists of a file."""
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
     return [_plain(inner) for inner in value] if isinstance(value, (list, tuple)) else value

@@ -112,8 +112,10 @@ def check_law(law: Law, known: Mapping[str, Any], name: str) -> None:
     """Raise ParameterError if a formula contains a name that is not a constant, or a constant has a reserved name."""
     formula = law if isinstance(law, str) else ""
     names = {node.id for node in ast.walk(ast.parse(formula)) if isinstance(node, ast.Name)}
-    if not names <= {"x", "v", *FUNCTIONS, *known}:
-        raise ParameterError(name, formula, _WANTED)
+    if unknown := sorted(names - {"x", "v", *FUNCTIONS, *known}):
+        own = unknown[0]
+        wanted = f"have x, v and its constants only: {own} is none of them; give its value, as in constants = {{ {own} = 2.5 }}"
+        raise ParameterError(name, formula, wanted)
     for own in known:
         if own in ("x", "v", *WRITTEN) or not re.fullmatch("[a-z][a-z0-9_]*", own):
             where = f"{name.rpartition('.')[0]}.constants.{own}"

@@ -135,13 +135,13 @@ class Variables:
     def freedoms(self) -> Iterator[str]:
         """Yield the freedoms."""
         for d in self.interface.drives:
-            mode, period = "None", "0.0"
+            mode, period = "None", f"{2.0 * d.turns_back} * pi" if d.turns_back else "0.0"
             if d.table:
                 arguments = f'("{self._argument(d, d.load)}", "{self._argument(d, "speed")}")'
                 mode = f'Mode("{d.table}.mode", ("{d.load}", "speed"), {arguments}, {int(d.commanded)})'
-                period = f"{2.0 * d.turns_back} * pi" if d.turns_back else "0.0"
             start = f'("{_last(d, d.coordinate)}", "{_last(d, d.rate)}")'
-            yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period})'
+            swings = ", swings=True" if d.turns_back and not d.table else ""
+            yield f'Freedom("{d.coordinate}", "{d.rate}", {start}, {mode}, {period}{swings})'
 
     def channels(self) -> Iterator[str]:
         """Yield the channels."""

@@ -53,6 +53,7 @@ from .motion.orbit import OrbitEquations as OrbitEquations
 from .motion.orbit import PeriodicOrbit as PeriodicOrbit
 from .motion.orbit import Turn as Turn
 from .motion.orbit import orbit_of as orbit_of
+from .motion.orbit import resting as resting
 from .motion.search import Jump as Jump
 from .motion.search import Orbits as Orbits
 from .motion.search import Sweep as Sweep

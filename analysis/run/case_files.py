@@ -103,7 +103,11 @@ def load_parameters(path: str | Path) -> Parameters:
 def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism of a file: its entry ``mechanism``, or else the mechanism with the parameters it names."""
     if "mechanism" in data:
-        return MECHANISMS[Choice(MECHANISMS)(data["mechanism"], "mechanism")]
+        try:
+            return MECHANISMS[Choice(MECHANISMS)(data["mechanism"], "mechanism")]
+        except UnknownNameError as error:
+            error.args = (f"{error}; a linkage of your own is loaded first: load_linkage(FILE)",)
+            raise
     names = set(files.flattened(data))
     found = {name: len(names & set(mechanism.mechanism_variables)) for name, mechanism in MECHANISMS.items()}
     best = [name for name, count in found.items() if count == max(found.values())]

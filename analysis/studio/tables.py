@@ -199,7 +199,7 @@ def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
 def _moving(mechanism: Mechanism) -> list[str]:
     """Return outputs with a rate and an acceleration, the crank's angle left out."""
     rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
-    crank = [freedom.coordinate for freedom in mechanism.freedoms if freedom.period > 0.0]
+    crank = [mechanism.freedoms[n].coordinate for n in mechanism.cyclic]
     return [n for n in mechanism.output_names if n in rate_of and rate_of[n] in rate_of and n not in crank]
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
-from ..periodic import Drive, default_variable, drive_of, unit_of
+from ..periodic import Drive, default_variable, drive_of, resting, unit_of
 from ..run import Case, case_from, mechanism_in
 from ..units import with_unit
 from .result import Tuned
@@ -72,32 +71,37 @@ class TuningCase:
     wish : Wish
     tables : mapping
         The file without the wish: the mechanism and its inputs.
+    folder : path
+        Where its files are.
     """
 
     title: str
     wish: Wish
     tables: Mapping[str, Any]
+    folder: Path
 
-    def tuned_tables(self, tuned: Tuned) -> dict[str, Any]:
-        """Return the tables of a case with the tuned values."""
+    def tuned_tables(self, tuned: Tuned, folder: str | Path) -> dict[str, Any]:
+        """Return the tables of a case with the tuned values, to be written to a folder."""
         mechanism = mechanism_of(self.wish.parameters)
         inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
         values = zip(self.wish.names, tuned.values.tolist())
         changes = {inputs.get(name, name): with_unit(value, unit_of(mechanism, name)) for name, value in values}
+        if isinstance(own := self.tables.get("linkage"), str):
+            changes["linkage"] = Path(os.path.relpath(self.folder / own, folder)).as_posix()
         return overridden(self.tables, changes)
 
 
-def _start(case: Case, drive: Drive) -> list[float] | None:
-    """Return a guess of the motion: rest but for the initial crank speed; None where no guess is needed."""
+def _start(case: Case, drive: Drive) -> list[float]:
+    """Return a guess of the motion: rest at the coordinates of the case, under a torque with its initial crank speed."""
     mechanism = mechanism_of(case.parameters)
     flow, state = drive.flow(mechanism), mechanism.state(case.initial)
     if not (flow.torque and drive.motor is None):
-        return None
+        return resting(case.parameters, drive, case.initial)
     speed = state[flow.places[-1]]
     if not speed > 0.0:
         name = mechanism.freedoms[flow.crank].initial[1]
         raise InputError(f"under a torque the speed of the crank must be guessed: give initial.{name}, above zero")
-    return [*np.zeros(flow.size - 1).tolist(), speed]
+    return resting(case.parameters, drive, case.initial, speed)
 
 
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
@@ -147,4 +151,4 @@ def tuning_case_from(
         limits=wanted.peak,
         least="" if wanted.objective == _LEAST_CHANGE else wanted.objective.removeprefix(_LEAST).strip(),
     )
-    return TuningCase(title=case.title, wish=wish, tables=tables)
+    return TuningCase(title=case.title, wish=wish, tables=tables, folder=folder)

@@ -9,6 +9,7 @@ from typing import Any
 from ..display import Shown, format_count
 from ..mechanisms import Parameters
 from ..run import parameters_to
+from ..units import displayed
 from .conditions import FloatArray
 from .survey import MARGINAL, Survey
 from .wishes import Wish
@@ -64,7 +65,7 @@ def wished(wish: Wish) -> dict[str, str]:
         found[JUMP] = "none"
     if wish.judged:
         found[STABLE] = f"largest multiplier at most {wish.radius:.6g}"
-    found |= {str(limit): f"below {limit.below:.6g} {limit.unit}" for limit in wish.limits}
+    found |= {str(limit): f"below {displayed(limit.below, limit.unit)}" for limit in wish.limits}
     return found if wish.judged else found | {STABLE: "one at each place of the range"}
 
 
@@ -93,8 +94,8 @@ def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]
         greatest = max((top for top in found.greatest if top.limit is limit), key=lambda top: top.value)
         over = greatest.value / limit.below - 1.0
         over = over if over > NO_EXCESS else 0.0
-        text_of = f"{greatest.value:.6g} {limit.unit} at {wish.say(greatest.spot.level)}"
-        missed = f"{text_of}, {greatest.value - limit.below:.3g} {limit.unit} too much" if over else ""
+        text_of = f"{displayed(greatest.value, limit.unit)} at {wish.say(greatest.spot.level)}"
+        missed = f"{text_of}, {displayed(greatest.value - limit.below, limit.unit, 3)} too much" if over else ""
         result[str(limit)] = Reading(text=text_of, excess=over, missed=missed)
     if not wish.judged:
         result[STABLE] = _stable_everywhere(found)

@@ -31,7 +31,7 @@ from ..periodic import (
     with_values,
 )
 from ..run import published_set
-from ..units import RAD_S_PER_RPM, Amount, quantity, si
+from ..units import RAD_S_PER_RPM, Amount, displayed, pair, quantity, si
 
 FloatArray = NDArray[np.float64]
 
@@ -72,8 +72,8 @@ class Limit:
     Attributes
     ----------
     output : str
-        An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C``, for the magnitude of the force in
-        it; or ``amplitude of`` an output, for half its range.
+        An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C`` or ``A`` of a linkage of one's own,
+        for the magnitude of the force in it; or ``amplitude of`` an output, for half its range.
     below : float
         The bound (SI).
     unit : str
@@ -167,7 +167,7 @@ class Wish:
             put("parameters", published_set(given).parameters)
         mechanism = self.mechanism
         put("over", self._required_over())
-        put("between", _span(mechanism, self.over, self.speeds or self.between))
+        put("between", _span(mechanism, self.over, self.between if self.speeds is None else self.speeds))
         drive = self.drive or drive_of(given, speed=self.span[0])
         require_variable(self.parameters, drive, self.over)
         alone = (
@@ -321,12 +321,13 @@ class Wish:
 
 
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
-    name = "speeds" if over in speed_names(mechanism) else over
-    low, high = (float(si(value, unit_of(mechanism, over), name)) for value in given)
-    if not (isfinite(low) and isfinite(high) and low < high):
-        raise ParameterError(name, list(given), "be a range: [least, greatest]")
+    name, unit = "speeds" if over in speed_names(mechanism) else over, unit_of(mechanism, over)
+    low, high = pair(given, unit, name)
+    shown = [displayed(end, unit) for end in (low, high)]
+    if not low < high:
+        raise ParameterError(name, shown, "be a range: [least, greatest]")
     if name == "speeds" and not low > 0.0:
-        raise ParameterError(name, list(given), "be a range above zero: [least, greatest]")
+        raise ParameterError(name, shown, "be a range above zero: [least, greatest]")
     return low, high
 
 
@@ -405,6 +406,9 @@ def _checked(mechanism: Mechanism, limit: Limit) -> Limit:
     name = limit.output.removeprefix(AMPLITUDE)
     units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
     known = {output: (output,) for output in units} | (mechanism.joints if name == limit.output else {})
+    joint = name.removesuffix(" force")  # as the table of a run has it
+    if joint != name and joint in known:
+        raise ParameterError("output", limit.output, f"be {joint!r}, the name of the joint, for the force in it")
     if name not in known:
         raise unknown_name(name, known, f"output {name!r}")
     parts = known[name]

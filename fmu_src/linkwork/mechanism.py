@@ -52,6 +52,8 @@ class Freedom(NamedTuple):
         How it can be driven, if it can.
     period : float
         Increase of the coordinate after which the mechanism is in the same configuration; 0 where there is none.
+    swings : bool
+        Whether nothing drives it, so that it is no crank: a pendulum.
     """
 
     coordinate: str
@@ -59,6 +61,7 @@ class Freedom(NamedTuple):
     initial: tuple[str, str]
     mode: Mode | None = None
     period: float = 0.0
+    swings: bool = False
 
 
 class Channel(NamedTuple):
@@ -376,8 +379,8 @@ class Mechanism:
 
     @cached_property
     def cyclic(self) -> tuple[int, ...]:
-        """Numbers of the freedoms that turn."""
-        return tuple(number for number, freedom in enumerate(self.freedoms) if freedom.period > 0.0)
+        """Numbers of the freedoms that turn as a crank does."""
+        return tuple(n for n, freedom in enumerate(self.freedoms) if freedom.period > 0.0 and not freedom.swings)
 
     @cached_property
     def torques(self) -> tuple[int, ...]:

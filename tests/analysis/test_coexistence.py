@@ -35,7 +35,7 @@ from analysis.periodic import (
 from analysis.periodic.chart import chart as charts
 from analysis.periodic.chart.boundary import line_branches
 from analysis.units import RAD_S_PER_RPM
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS
 
@@ -48,6 +48,20 @@ SPEED = 1000.0 * RAD_S_PER_RPM
 @pytest.fixture(scope="module")
 def picture() -> Basins:
     return basins(RIG_1_B, Drive(speed=SPEED), points=9, position=(-0.06, 0.06), rate=(-6.0, 6.0))
+
+
+def test_texts_with_units_are_the_numbers(picture: Basins) -> None:
+    texts: Any = {"position": ("-6 cm", "6 cm"), "rate": ("-6 m/s", 6.0)}
+    same = basins(RIG_1_B, Drive(speed=SPEED), points=9, **texts)
+    np.testing.assert_array_equal(same.position, picture.position)
+    np.testing.assert_array_equal(same.ends, picture.ends)
+    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
+    found = coexistence(operation, ["1000 rpm"], "11 N.s/m")
+    assert (found.x, found.y) == (pytest.approx([SPEED]), pytest.approx([11.0]))
+    with pytest.raises(ParameterError, match=r"drive\.speed is '300 mm'"):
+        coexistence(operation, ["300 mm"], [11.0])
+    with pytest.raises(InputError, match=r"the axis x of a grid is \['300 rpm'\]"):
+        coexistence(lambda x, y: operation(x, y), ["300 rpm"], [11.0])
 
 
 def test_every_point_has_the_motions_that_are_found_there_alone() -> None:

@@ -81,6 +81,7 @@ from linkwork.errors import InputError, Interrupted, MissingParameterError, Para
         ("20 Nm", "N.m", 20.0),
         (0.25, "m", 0.25),
         (3, "1", 3.0),
+        (np.float32(0.25), "m", 0.25),
     ],
 )
 def test_quantities_in_their_units(text, unit, value):

@@ -43,7 +43,8 @@ from analysis import (
     variant,
 )
 from analysis.display import format_count
-from analysis.run import published_case
+from analysis.periodic import basins
+from analysis.run import published_case, save_parameters
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 
 FUNCTIONS = [name for name in dir(analysis) if inspect.isfunction(getattr(analysis, name))]
@@ -166,6 +167,19 @@ def test_a_range_is_in_the_unit_of_what_varies() -> None:
         (lambda: frequency_response("table-3.1", "1 N", "2 rpm"), ParameterError, "low is '1 N'"),
         (lambda: stability_chart("table-3.1", ranges=((1, "2 m"), (1, 2))), ParameterError, "drive.speed is '2 m'"),
         (lambda: stability_chart(PUBLISHED["table-3.1"].parameters), InputError, "give a drive"),
+        (lambda: stability_chart("table-3.1", "300 rpm"), InputError, "drive is '300 rpm': give a drive"),
+        (lambda: stability_chart("table-3.1", names=("drive.speed",)), ParameterError, "names is .* must be two"),
+        (lambda: stability_chart("table-3.1", ranges=((1, 2),)), ParameterError, "ranges is .* must be two"),
+        (lambda: stability_chart("table-3.1", ranges=(1, 2)), ParameterError, "drive.speed is 1: .* two values"),
+        (lambda: stability_chart("table-3.1", points=1.5), ParameterError, "points is 1.5: .* whole number"),
+        (lambda: basins("table-3.1", "500 rpm"), InputError, "drive is '500 rpm': give a drive"),
+        (lambda: basins("table-3.1", Inputs(speed=50.0)), InputError, r"drive is Inputs\(speed=50.0\): give a drive"),
+        (lambda: basins("table-3.1", Drive(speed=50.0), position=1), ParameterError, "position is 1: .* two values"),
+        (lambda: basins("table-3.1", Drive(speed=50.0), rate=("0 m/s", "1 m")), ParameterError, "rate is '1 m'"),
+        (lambda: basins("table-3.1", Drive(speed=50.0), points=1.5), ParameterError, "points is 1.5: .* whole number"),
+        (lambda: Drive(speed="-300 rpm"), InputError, "above zero; for a crank that turns the other way"),
+        (lambda: Drive(speeds={"left.speed": -5.0}), InputError, "above zero; for a crank that turns the other way"),
+        (lambda: save_parameters("never.toml", variant("table-3.1")), InputError, r"variant\(\.\.\.\)\.parameters"),
         (lambda: variant("table-3.1", slider_stifness=1.0), UnknownNameError, "did you mean slider_stiffness"),
         (lambda: variant("table-3.1", slider_stiffness="3 kg"), ParameterError, "slider_stiffness is '3 kg'"),
         (lambda: variant(FiveBarParameters, ground_length="1 m"), MissingParameterError, "is missing, and so are"),

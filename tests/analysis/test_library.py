@@ -559,7 +559,7 @@ def test_ranges_of_motion():
     slotted.body("block", points={"P": (0, 0)}, mass=1.0, inertia=1e-3).slide("G", body="block", through="O")
     slotted.slot("S", pin="P", on="arm", through="A")
     for start in (90.2, 0.2, 179.8):
-        slotted.tables["name"] = f"slotted-arm-{10 * start:.0f}"
+        slotted.tables |= {"name": f"slotted-arm-{10 * start:.0f}", "freedoms": {}}
         found = reach(slotted.freedom("arm", "A", start=f"{start} deg", driven=False).mechanism())
         assert (np.rad2deg(found.low), np.rad2deg(found.high)) == pytest.approx((0.0, 180.0), abs=0.1)
 

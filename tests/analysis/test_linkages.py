@@ -554,6 +554,25 @@ def test_pins_and_drives_of_the_builder(tmp_path):
         built.pin("A", wheel=(0, 0))
 
 
+def test_the_builder_refuses_a_name_given_twice() -> None:
+    with pytest.raises(InputError, match=r"has springs\.wind already"):
+        wheel("twice", stiffness=1.0).spring("wind", at="Q", damping=1.0)
+
+
+def test_the_builder_takes_numbers_and_arrays_of_numpy() -> None:
+    def built(mass: Any, point: Any) -> Any:
+        return linkage("of-numpy", ground={"A": point}).body("rod", bar=("A", "B"), length=0.5, mass=mass, inertia=0.1)
+
+    made = built(np.float32(1.5), np.array([0.0, 0.1])).tables
+    assert made == built(1.5, (0.0, 0.1)).tables
+    assert described({**made, "freedoms": {"swing": "A"}}).ground == {"A": (0.0, 0.1)}
+
+
+def test_a_name_that_is_no_constant_of_a_law_is_named() -> None:
+    with pytest.raises(LinkworkError, match=r"wind\.law is 'a \* x \*\* 3'.*: a is none of them.*constants = \{ a = "):
+        wheel("nameless", law="a*x**3", constants={"b": 1.0}).mechanism()
+
+
 def wheel(name: str, **changes: Any) -> Any:
     """A driven wheel with a pendulum on its rim."""
     built = linkage(name, ground={"A": (0, 0)}, **changes.pop("more", {}))

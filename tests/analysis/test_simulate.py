@@ -625,6 +625,7 @@ def test_steps_that_do_not_suffice_end_a_run_with_all_data(monkeypatch: pytest.M
         whole = table_3_1(tolerance=1e-12)
         assert np.array_equal(ours.values[:-1], whole.values[: len(ours) - 1])
         assert SPEED * ours.time[-1] == pytest.approx(ours["crank.angle"][-1])
+    assert table_3_1(max_steps=1).statistics["steps"] == 1
 
 
 def test_steps_that_do_not_suffice_within_a_held_interval() -> None:

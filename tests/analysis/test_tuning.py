@@ -31,7 +31,7 @@ from analysis.run import case_from, load_case
 from analysis.tuning import load_tuning_case
 from analysis.tuning.cases import tuning_case_from
 from analysis.tuning.optimisation import _conditions, _unwanted, _ways
-from analysis.tuning.result import STABLE, readings
+from analysis.tuning.result import STABLE, readings, wished
 from analysis.tuning.survey import other_motions, survey
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS
@@ -368,10 +368,12 @@ def test_what_is_met_already_is_not_changed():
         ({"no_jump": True, "change": {"slider.stiffness": {"tolerance": "0 %"}}}, ParameterError, "above zero"),
         ({"no_jump": True, "change": {"slider.damping": "200 %"}}, ParameterError, r"200 %.*zero or greater"),
         ({"no_resonance": True, "resonance_margin": -0.1}, ParameterError, "resonance_margin"),
-        ({"no_jump": True, "speeds": ("600 rpm", "570 rpm")}, ParameterError, "be a range"),
+        ({"no_jump": True, "speeds": ("600 rpm", "570 rpm")}, ParameterError, "'600 rpm', '570 rpm'.*be a range"),
+        ({"no_jump": True, "speeds": "500 rpm"}, ParameterError, "speeds is '500 rpm': it must be two values"),
         ({"least_margin": 1.5}, ParameterError, "less than one"),
         ({"no_jump": True, "least": "gravity"}, InputError, "may not be changed"),
         ({"limits": [Limit(output="pin.E", below=1.0)]}, UnknownNameError, r"pin\.[A-D]"),
+        ({"limits": [Limit(output="pin.C force", below=1.0)]}, ParameterError, r"be 'pin\.C', the name of the joint"),
         ({"limits": [Limit(output="pin.C", below="-1 N")]}, ParameterError, "above zero"),
         ({"limits": [Limit(output="pin.C", below="1 m")]}, ParameterError, "unit of that kind"),
     ],
@@ -379,6 +381,10 @@ def test_what_is_met_already_is_not_changed():
 def test_errors_in_words(of, kind, words):
     with pytest.raises(kind, match=words):
         wish(**of)
+
+
+def test_limits_are_in_the_units_of_tables():
+    assert wished(wish(limits=[AMPLITUDE, PIN]))[str(AMPLITUDE)] == "below 16 mm"
 
 
 def test_what_may_be_changed_is_measured_in_its_tolerance():
@@ -417,7 +423,7 @@ def test_numbers_of_the_drive_are_changed_in_the_case_too():
     assert (drive.motor.breakdown_torque, drive.motor.synchronous_speed) == (pytest.approx(1.9), 55.0)
     assert drive.forces["slider.force"] == pytest.approx(2.5)
     written = case_from(
-        case.tuned_tables(SimpleNamespace(values=values)), folder=Path(), overrides={"run.stop_time": 1.0}
+        case.tuned_tables(SimpleNamespace(values=values), Path()), folder=Path(), overrides={"run.stop_time": 1.0}
     )
     again = drive_of(written.parameters, written.inputs, written.initial)
     assert again.motor.breakdown_torque == pytest.approx(1.9)

@@ -208,6 +208,17 @@ class TestSeries1:
         errors = np.array([np.abs(series_1.point(series_1.ROTATION, near_by[:, k]) - targets) ** 2 for k in range(3)])
         assert np.abs(errors[2] - errors[0]).max() / 2e-6 < 1e-5
 
+    def test_tangents_are_vertical_where_the_coupler_ceases_to_point_at_the_target(self) -> None:
+        """The equation (7.14) has a root on one side alone; near it U goes as the root of the distance."""
+        at = np.radians(series_1.vertical_tangents())
+        _, upright = series_1.by_equations(at + 1e-6, series_1.desired(at + 1e-6))
+        assert upright.tolist() == [True, False]
+        off = np.outer([-1.0, 1.0], [0.0, 1e-8, 4e-8])
+        reached = at[:, None] + off
+        u, _ = series_1.by_equations(reached.ravel(), series_1.desired(reached.ravel()))
+        change = np.ptp(u, axis=1).reshape(reached.shape)
+        assert change[:, 2] / change[:, 1] == pytest.approx(2.0, rel=1e-2)
+
     def test_isochronous_curves_are_circles_about_the_crank_pin(self) -> None:
         for phi in np.radians(series_1.ISOCHRONES).tolist():
             arc = series_1.point(np.full(9, phi), np.linspace(-0.4, 0.4, 9))

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from analysis import studies
 from analysis.cli import main
+from analysis.numerics.dual import Dual
 from analysis.slider_crank import JointLoads, close, follow, joint_loads
 from analysis.slider_crank.closure import Rows
+from analysis.slider_crank.dual_dynamics import Binor
 from analysis.studies import ENTRIES, RAHMAN
 from analysis.studies.rahman import closure, forces, method, rates
 from analysis.studies.rahman import figures as rahman
@@ -510,6 +512,16 @@ class TestMethod:
         assert left["eq 62"].computed == pytest.approx(2.0 * MASSES_LB_S2_IN[0] * 0.5 * CRANK_IN * W * W, rel=1e-6)
         inertia = MASSES_LB_S2_IN[2] * np.abs(second_difference(plane)[clear(plane)]).max()
         assert left["eq 64"].computed == pytest.approx(2.0 * inertia, rel=1e-6)
+
+    def test_the_moment_of_the_bearing_about_j_is_that_of_the_slider_off_its_joint(self) -> None:
+        """4T4 balances the moment of f3 by eq 61, which g3 makes -m3 g3 S4'' about j alone, by a Binor."""
+        mass, g3, rate, acceleration = 2.0, 0.3, 4.0, -7.0
+        body = Binor(mass=mass, moment=mass * np.array([g3, 0.0, 0.0]), inertia=np.zeros((3, 3)))
+        zero = np.zeros(3)
+        moment = body.rate(
+            Dual(zero, np.array([0.0, 0.0, -rate])), Dual(zero, np.array([0.0, 0.0, -acceleration]))
+        ).dual
+        assert -moment == pytest.approx([0.0, -mass * g3 * acceleration, 0.0])
 
     def test_both_mended_the_planar_forces_are_the_plants(self) -> None:
         found = forces.planar_forces(erratum_5=True, erratum_6=True)

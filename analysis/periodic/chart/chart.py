@@ -6,7 +6,7 @@ mechanism and two parameters by their FMI names, the crank speed among them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,12 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
 
 from ...display import Shown, format_count, format_range
-from ...files import write_csv
+from ...files import Whole, write_csv
 from ...mechanisms import Parameters, mechanism_of
 from ...numerics.boundaries import Box, chart
 from ...numerics.continuation import ContinuationError, End, Reason
 from ...run import shown, takes_published
-from ...units import RAD_S_PER_RPM, Amount, si
+from ...units import RAD_S_PER_RPM, Amount, pair
 from ..motion import (
     Crossing,
     Drive,
@@ -34,6 +34,7 @@ from ..motion import (
     format_value,
     plane,
     published_drive,
+    require_drive,
     require_variable,
     speed_names,
     unit_of,
@@ -262,8 +263,8 @@ def stability_chart(
 
     Raises
     ------
-    InputError
-        If a name or a range is not usable.
+    InputError, ParameterError
+        If the drive, a name, a range or the number of points is not usable.
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
 
@@ -275,11 +276,14 @@ def stability_chart(
     (True, ())
     """
     mechanism = mechanism_of(parameters)
-    if drive is None:
-        raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
+    drive = require_drive(drive)
     names = names or (default_variable(mechanism, drive), damping_name(mechanism))
+    for what, given in (("names", names), ("ranges", ranges)):
+        if given is not None and (isinstance(given, str) or not isinstance(given, Sized) or len(given) != 2):
+            raise ParameterError(what, given, "be two, along x and y")
+    points = Whole(least=2)(points, "points")
     spans = tuple(
-        default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
+        default_range(parameters, drive, name) if ranges is None else pair(ranges[n], unit_of(mechanism, name), name)
         for n, name in enumerate(names)
     )
     box = Box(x=spans[0], y=spans[1])

@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 
 from ...display import Shown, format_count
-from ...files import write_csv
+from ...files import Whole, write_csv
 from ...mechanisms import Parameters
 from ...run import takes_published
-from ..motion.discretisation import OperatingPoint
+from ...units import Amount, pair
+from ..motion.discretisation import OperatingPoint, operating_point
 from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
@@ -133,6 +134,7 @@ def coexistence(
     operation : callable
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
+        See `grid`.
     start : array_like, shape (n,), optional
         A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
     folder, n_jobs, progress, what
@@ -142,6 +144,8 @@ def coexistence(
     ------
     InputError
         If an axis is empty or not finite, or there are no cores.
+    ParameterError
+        If a text on an axis is no quantity.
     GridInterrupted
         On Ctrl-C.
     """
@@ -256,8 +260,8 @@ def basins(
     *,
     turns: int = 1,
     points: int = 200,
-    position: tuple[float, float] | None = None,
-    rate: tuple[float, float] | None = None,
+    position: tuple[Amount, Amount] | None = None,
+    rate: tuple[Amount, Amount] | None = None,
     start: ArrayLike | None = None,
     folder: str | Path | None = None,
     n_jobs: int | None = None,
@@ -274,8 +278,8 @@ def basins(
     points : int
         Number of starts along each axis.
     position, rate : (float, float), optional
-        Ranges of the first free coordinate and of its rate at crank angle 0; by default as far as the mechanism can be
-        assembled.
+        Ranges of the first free coordinate and of its rate at crank angle 0, in SI or as text such as "5 mm"; by default as
+        far as the mechanism can be assembled.
     start : array_like, shape (n,), optional
         Under a torque a guess of y with the crank speed; see `find_orbits`.
     folder, n_jobs, progress
@@ -284,7 +288,9 @@ def basins(
     Raises
     ------
     InputError
-        If there is no stable motion, a range does not increase, or there are no cores.
+        If the drive is no `Drive`, there is no stable motion, a range does not increase, or there are no cores.
+    ParameterError
+        If a range is not two quantities, or ``points`` is no whole number.
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
 
@@ -296,14 +302,23 @@ def basins(
     (2, True)
     """
     require_turns(turns)
+    points, flow = Whole(least=1)(points, "points"), operating_point(parameters, drive).flow
+    if position is not None:
+        position = pair(position, flow.components[0][1], "position")
+    if rate is not None:
+        rate = pair(rate, flow.components[flow.size // 2][1], "rate")
     found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
         raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one")
     first = motions[0].start
     low, high = (side[0] for side in coordinate_ranges(parameters, drive, first))
-    extent, scale, half = min(-low, high), motions[0].scale, len(first) // 2
-    spans = position or (-extent, extent), rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0))
+    rest, scale, half = float(motions[0].flow.rest[0]), motions[0].scale, len(first) // 2
+    extent = min(rest - low, high - rest)
+    spans = (
+        position or (rest - extent, rest + extent),
+        rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0)),
+    )
     for name, (low, high) in zip(("position", "rate"), spans):
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")

@@ -17,16 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from ...files import load_array, save_array
-from ...mechanisms import Parameters
+from ...mechanisms import Parameters, mechanism_of
 from ...numerics.cache import cache_root
 from ...numerics.codegen import fingerprint
 from ...numerics.workers import check_jobs, interruptible, over_workers
 from ...run import shown
+from ...units import si
 from ..motion import TOLERANCE, Drive, Plane, Stability, multipliers, starts_of
 from ..motion.discretisation import INTEGRATOR_TOLERANCE, operating_point
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from ..motion.kernels import REASONS, Status
 from ..motion.orbit import first_guess
+from ..motion.variables import NamedPlane, unit_of
 from . import kernels
 from .kernels import Row
 from .rows import PointRow, row_of, rows_of
@@ -178,7 +180,7 @@ def grid(
     operation : callable
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
-        Values of the axes.
+        Values of the axes: in SI, or texts with units if they are of named parameters.
     start : array_like, shape (n,), optional
         Guess of the first orbit of each row; see `find_orbit`. If it leads to none, others are tried.
     tolerance : float
@@ -197,7 +199,7 @@ def grid(
     InputError
         If an axis is empty or not finite, or there are no cores.
     ParameterError
-        If a point is no mechanism.
+        If a point is no mechanism, or a text no quantity.
     GridInterrupted
         On Ctrl-C.
     """
@@ -234,16 +236,25 @@ def grid_points(
 ) -> tuple[FloatArray, FloatArray, list[PointRow], FloatArray]:
     """Return the values of the axes of a grid, its operating points by rows, and the guesses for each row, shape (k, n).
 
-    Raises InputError if an axis is empty or not finite.
+    Raises InputError if an axis is empty or not finite, ParameterError if a text on an axis is no quantity.
     """
-    xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
-    for name, axis in (("x", xs), ("y", ys)):
-        if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
-            raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
+    if isinstance(operation, NamedPlane):
+        mechanism = mechanism_of(operation.parameters)
+        x, y = (si(axis, unit_of(mechanism, name), name) for axis, name in ((x, operation.x), (y, operation.y)))
+    xs, ys = _axis("x", x), _axis("y", y)
     first = operating_point(*operation(float(xs[0]), float(ys[0])))
     guess = first_guess(first.flow, first.drive, start)
     starts = np.vstack([guess, starts_of(first.parameters, first.drive, guess, count)])
     return xs, ys, rows_of(operation, xs, ys, guess), starts
+
+
+def _axis(name: str, values: ArrayLike) -> FloatArray:
+    """Return the values of an axis as an array; raises InputError if they are not finite numbers, at least one."""
+    with suppress(TypeError, ValueError):
+        axis = np.array(values, dtype=float, ndmin=1)
+        if axis.ndim == 1 and len(axis) > 0 and np.isfinite(axis).all():
+            return axis
+    raise InputError(f"the axis {name} of a grid is {values!r:.200}: it must be finite numbers, at least one")
 
 
 def row_code(*functions: Any) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from ..motion.kernels import (
     begin_hunt,
     deflated,
     deflated_next,
-    difference,
+    difference_within,
     magnitude,
     make_room,
     newton,
@@ -294,12 +294,12 @@ def solve_row(section, points, search, guesses, found):
 
 
 @inner
-def _is_known(start, known, scale, away):
-    """Return whether a start is among the known ones."""
+def _is_known(start, known, section, away):
+    """Return whether a start is among the known ones, whole turns aside."""
     found = False
     for k in range(known.shape[0]):
-        difference(start, known[k], away)
-        found = found or magnitude(away, scale) < SAME
+        difference_within(start, known[k], section.ways, away)
+        found = found or magnitude(away, section.scale) < SAME
     return found
 
 
@@ -361,7 +361,7 @@ def _record(lane, point, seekers, v, room, carry):
     """Add the motion that a lane has found, if it is a new one."""
     count, start = point.count[0], seekers.hunts.start[lane]
     single = v.z[: start.shape[0]]
-    if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own.scale, single):
+    if count == MOST_ORBITS or _is_known(start, point.starts[:count], point.own, single):
         return
     copy(start, point.starts[count])
     copy(v.z[start.shape[0] :], point.monodromies[count])
@@ -461,12 +461,12 @@ LOST, UNSETTLED = -1, -2
 
 
 @inner
-def _arrived(z, known, near, scale, away):
-    """Return the number of the known motion that a state is near to; UNSETTLED if there is none."""
+def _arrived(z, known, near, section, away):
+    """Return the number of the known motion that a state is near to, whole turns aside; UNSETTLED if there is none."""
     end = UNSETTLED
     for k in range(known.shape[0]):
-        difference(z, known[k], away)
-        if magnitude(away, scale) < near:
+        difference_within(z, known[k], section.ways, away)
+        if magnitude(away, section.scale) < near:
             end = k
     return end
 
@@ -491,7 +491,7 @@ def _settle(section, turn, near, most, starts, known, ends, tables):
                 else:
                     break
                 row = rows[lane]
-                ends[row] = _arrived(v.z, known, near, section.scale, away) if v.status[lane] == DONE else LOST
+                ends[row] = _arrived(v.z, known, near, section, away) if v.status[lane] == DONE else LOST
                 if ends[row] != UNSETTLED or turns[lane] == most:
                     rows[lane], v.status[lane] = -1, IDLE
                 else:

@@ -3,6 +3,7 @@ from .drive import SAME as SAME
 from .drive import Drive as Drive
 from .drive import drive_of as drive_of
 from .drive import published_drive as published_drive
+from .drive import require_drive as require_drive
 from .drive import starts_of as starts_of
 from .floquet import TOLERANCE as TOLERANCE
 from .floquet import Crossing as Crossing

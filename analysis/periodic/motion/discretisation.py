@@ -32,7 +32,7 @@ from linkwork.parameters import field_name
 from ...mechanisms import MECHANISMS, Parameters, mechanism_of
 from ...run import repeats, takes_published
 from . import collocation, kernels
-from .drive import Direction, Drive, is_smooth, scale_in
+from .drive import Direction, Drive, is_smooth, require_drive, scale_in
 from .flow import DIRECTIONAL, GAP, IN_LANES, PLAIN, Flow
 from .kernels import Section, Status
 
@@ -167,6 +167,7 @@ class OperatingPoint:
             np.concatenate([self.vector, d_drive]),
             np.concatenate([self.constants, d_p]),
             self.scale(start),
+            self.flow.ways,
             along,
             tolerance,
             self.flow.torque,
@@ -209,6 +210,7 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
     Raises InputError if the drive does not suit the mechanism, or if a gear ratio or a force law was changed so that the period
     is another.
     """
+    require_drive(drive)
     mechanism = mechanism_of(parameters)
     constants = np.array(parameters.constants())
     point = OperatingPoint(parameters, drive, mechanism, drive.flow(mechanism), drive.vector(mechanism), constants)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from fractions import Fraction
 from functools import cache
-from math import isfinite, lcm, pi
+from math import inf, isfinite, lcm, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,11 @@ from ...run import InductionMotor, Inputs, driven, given, speed_ratio, started, 
 from ...units import Amount, in_si
 from .flow import Crank, Flow, crank_of, flow
 
+#: What to do about a negative speed.
+_MIRROR = (
+    "; for a crank that turns the other way describe the mirror image: y and angles, that of gravity too, with the opposite "
+    "sign, and assemblies to match"
+)
 #: A torque on the crank: constant, a motor's, or both.
 Torque = float | InductionMotor | Sequence[float | InductionMotor]
 
@@ -108,7 +113,10 @@ class Drive:
             known = {name: value for name, value in speeds.items() if isfinite(value)}
             first = next((name for name, value in known.items() if value > 0.0), None)
             if first is None or len(known) < len(speeds):
-                raise InputError(f"speeds are {dict(speeds)} rad/s: they must be finite, and one of them above zero")
+                mirror = _MIRROR if known and first is None and min(known.values()) < 0.0 else ""
+                raise InputError(
+                    f"speeds are {dict(speeds)} rad/s: they must be finite, and one of them above zero{mirror}"
+                )
             ratios = {name: speed_ratio(name, v, first, speeds[first]) for name, v in speeds.items() if name != first}
             for name, value in (("speed", speeds[first]), ("crank", first), ("ratios", {**self.ratios, **ratios})):
                 object.__setattr__(self, name, value)
@@ -119,7 +127,8 @@ class Drive:
             }
             object.__setattr__(self, "ratios", ratios)
         if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
-            raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero")
+            mirror = _MIRROR if self.speed < 0.0 else ""
+            raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero{mirror}")
         for name, value in {"torque": self.torque, **self.forces, **self.held}.items():
             if not isfinite(value):
                 raise InputError(f"{name} is {value}: it must be a finite number")
@@ -254,6 +263,13 @@ class Drive:
         for argument in self.arguments(mechanism).values():
             acting.setdefault(argument, 0.0 if argument in names else True)
         return Inputs(**acting)
+
+
+def require_drive(drive: object) -> Drive:
+    """Return a drive; raise InputError if it is no `Drive`."""
+    if not isinstance(drive, Drive):
+        raise InputError(f"drive is {drive!r}: give a drive, such as Drive(speed=44.0) or Drive(speed='420 rpm')")
+    return drive
 
 
 class Direction(NamedTuple):
@@ -470,15 +486,17 @@ def coordinate_ranges(
     for sign in (-1.0, 1.0):
         found = scale[: flow.size // 2].copy()
         for i in range(len(found)):
-            while found[i] < _WIDEST * scale[i]:
+            half = 0.5 * flow.ways[i]
+            while found[i] < (half or _WIDEST * scale[i]):
                 y = guess.copy()
-                y[i] = sign * found[i]
+                y[i] = flow.rest[i] + sign * found[i]
                 try:
                     mechanism.check_assembly(parameters, flow.state(y, vector))
                 except AssemblyError:
                     break
                 found[i] *= _WIDER
-        sides.append(sign * found)
+            found[i] = min(found[i], half or inf)
+        sides.append(flow.rest[: len(found)] + sign * found)
     return sides[0], sides[1]
 
 
@@ -487,8 +505,9 @@ def starts_of(
 ) -> NDArray[np.float64]:
     """Return initial states of many amplitudes and phases within the coordinate ranges, from a scrambled Sobol sequence.
 
-    In the plane of a coordinate and its rate they fill the greatest ellipse about zero. If a coordinate can move much further
-    to one side, as many again fill the ellipse about the middle of its range; shape (count or 2 count, n).
+    In the plane of a coordinate and its rate they fill the greatest ellipse about the place where it starts by default. If a
+    coordinate can move much further to one side, as many again fill the ellipse about the middle of its range; shape (count or
+    2 count, n).
 
     Parameters
     ----------
@@ -507,8 +526,9 @@ def starts_of(
     sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
     # the centre and the half axes of each ellipse
-    ellipses = [(np.zeros(half), np.minimum(-low, high))]
-    if (np.maximum(-low, high) > _ONE_SIDED * np.minimum(-low, high)).any():
+    rest = flow.rest[:half]
+    ellipses = [(rest, np.minimum(rest - low, high - rest))]
+    if (np.maximum(rest - low, high - rest) > _ONE_SIDED * ellipses[0][1]).any():
         ellipses.append((0.5 * (low + high), 0.5 * (high - low)))
     sets = []
     for centre, extent in ellipses:

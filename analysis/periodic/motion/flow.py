@@ -112,6 +112,10 @@ class Flow:
         Components of the state of a run that make up y.
     size : int
         Number of components of y.
+    rest : ndarray, shape (n,)
+        The coordinates with which a mechanism starts by default, without rates.
+    ways : ndarray, shape (n,)
+        Increase of each component after which the motion is the same: a whole turn of an angle; 0 where there is none.
     """
 
     def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int) -> None:
@@ -146,7 +150,11 @@ class Flow:
         ]
         self.labels = (*labels, *[label(variables[crank_rate])] * self.torque)
         self.components = tuple((name, variables[name].unit) for name in names)
-        self.size = len(names)
+        self.size, free = len(names), len(freedoms)
+        initial = mechanism.state(mechanism.initial())
+        self.rest, self.ways = np.zeros(self.size), np.zeros(self.size)
+        self.rest[:free] = [initial[n] for n in self.free]
+        self.ways[:free] = [freedom.period for freedom in freedoms]
         self.inputs = self.motors = len(mechanism.channels)
         self.held = self.motors + len(MOTOR) * len(mechanism.torques)
         self.drive_size = self.held + rates + len(self.others)
@@ -193,6 +201,11 @@ class Flow:
         for place, value in zip(self.places, y.tolist()):
             x[place] = value
         return tuple(x)
+
+    def within(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return differences of y, shape (..., n), without whole turns."""
+        near: NDArray[np.float64] = away - self.ways * np.round(away / np.where(self.ways > 0.0, self.ways, 1.0))
+        return near
 
     def unknowns(self, states: NDArray[np.float64], drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return y from states of a run, shape (..., states), and the numbers of the drive; shape (..., n)."""

@@ -59,18 +59,19 @@ class Section(NamedTuple):
     drive: NDArray[np.float64]  # numbers of the drive, then their derivatives by lambda
     p: NDArray[np.float64]  # constants of the equations, likewise
     scale: NDArray[np.float64]  # magnitudes of y, shape (n,)
+    ways: NDArray[np.float64]  # whole turns of its angles, or 0, likewise
     along: float  # magnitude of lambda
     tolerance: float  # bound of the local error of a step
     torque: bool  # whether the crank's rate is the last component of y
 
 
-SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
+SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
 
 
 @part
 def numbered(section, drive, p, scale, tolerance):
     """Return the section with other numbers."""
-    return Section(section.equations, section.modes, drive, p, scale, 1.0, tolerance, section.torque)
+    return Section(section.equations, section.modes, drive, p, scale, section.ways, 1.0, tolerance, section.torque)
 
 
 class Room(NamedTuple):
@@ -177,6 +178,15 @@ def difference(a, b, out):
     """Write a - b into ``out``, as many components as it has."""
     for i in range(out.shape[0]):
         out[i] = a[i] - b[i]
+
+
+@inner
+def difference_within(a, b, ways, out):
+    """Write a - b into ``out``, without whole turns."""
+    for i in range(out.shape[0]):
+        out[i] = a[i] - b[i]
+        if ways[i] > 0.0:
+            out[i] -= ways[i] * np.floor(out[i] / ways[i] + 0.5)
 
 
 @inner

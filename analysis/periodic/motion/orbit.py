@@ -58,6 +58,8 @@ MOST_ITERATIONS = 40
 SETTLING_TURNS, SETTLED = 200, 1e-4
 #: Samples of a turn for amplitudes and harmonics.
 SAMPLES = 256
+#: Rounding of an amplitude, relative to the scale of the coordinate.
+_ROUNDING = 1e-12
 #: Outputs that an orbit does not have: they count from the start of a run.
 _OF_A_RUN = ("energy.dissipated", "energy.supplied", "energy.residual")
 
@@ -86,6 +88,8 @@ class Turn:
     swing : str
         Output whose amplitude is returned by default: the first free coordinate, such as ``slider.position``, or the
         crank's speed if nothing else is free.
+    rounding : float
+        Amplitude of ``swing`` that is no more than rounding.
 
     Notes
     -----
@@ -102,6 +106,7 @@ class Turn:
     modes: tuple[int, ...]
     names: tuple[str, ...]
     swing: str
+    rounding: float
 
     def __getitem__(self, name: str) -> FloatArray:
         if name not in self.names:
@@ -111,6 +116,8 @@ class Turn:
     @property
     def amplitude(self) -> float:
         """Half the distance between the least and the greatest value of ``swing``, such as a slider position (m).
+
+        It is zero where it is no more than rounding, as of a pendulum that hangs still.
 
         The Fourier series of the turn is evaluated on a grid eight times as fine, and parabolas are laid through its greatest
         and its least values: good to a millionth of the amplitude if the samples are enough for the series.
@@ -122,7 +129,8 @@ class Turn:
         before, at, after = fine[top - 1], fine[top], fine[(top + 1) % n]
         bend = before - 2.0 * at + after
         beyond = np.divide((after - before) ** 2, -8.0 * bend, out=np.zeros(2), where=bend != 0.0)
-        return 0.5 * float(np.ptp(at + beyond))
+        size = 0.5 * float(np.ptp(at + beyond))
+        return size if size > self.rounding else 0.0
 
     def harmonic(self, name: str, order: float) -> float:
         """Return the amplitude of a harmonic of an output; its order counts per turn of the crank: 1/2 has two turns.
@@ -294,6 +302,7 @@ class PeriodicOrbit(Shown):
             modes=flow.modes,
             names=tuple(mechanism.output_names[n] for n in keep),
             swing=flow.components[0][0],
+            rounding=_ROUNDING * float(self.scale[0]),
         )
 
     @property
@@ -356,7 +365,7 @@ def orbit_of(
     turns : int
         Turns of the crank in one period.
     start : array_like, shape (n,), optional
-        Guess of y at crank angle 0; zero without it.
+        Guess of y at crank angle 0; without it the coordinates with which the mechanism starts, at rest.
     settle : bool
         Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles by
         itself, and those of `starts_of`.
@@ -432,12 +441,14 @@ def approach(
 
 
 def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray:
-    """Return the guess for Newton's method: ``start``, or else rest with the crank at a speed of the prescribed drive or motor.
+    """Return the guess for Newton's method: ``start``, or else rest at the coordinates with which the mechanism starts.
+
+    The crank then has a speed of the prescribed drive or motor.
 
     Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
     """
     if start is None:
-        guess = np.zeros(flow.size)
+        guess = flow.rest.copy()
         if flow.torque:
             if drive.motor is None:
                 raise InputError(
@@ -456,6 +467,19 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray
     if flow.torque and not guess[-1] > 0.0:
         raise InputError(f"{flow.labels[-1]} at the start is {guess[-1]} rad/s: it must be above zero")
     return guess
+
+
+@takes_published()
+def resting(parameters: Parameters, drive: Drive, initial: Any, speed: float | None = None) -> list[float]:
+    """Return a guess of a periodic motion: rest at the coordinates of a start, with a crank speed (rad/s) if one is given.
+
+    Raises InputError if a crank speed is needed.
+    """
+    mechanism = mechanism_of(parameters)
+    flow = drive.flow(mechanism)
+    guess = first_guess(flow, drive, None if speed is None else [*flow.rest[:-1], speed])
+    state = mechanism.state(initial)
+    return [*(state[n] for n in flow.free), *guess[len(flow.free) :].tolist()]
 
 
 def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:

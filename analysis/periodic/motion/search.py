@@ -119,7 +119,7 @@ def sweep(
     Parameters
     ----------
     parameters : parameters of a mechanism
-    speeds : array_like, shape (m,)
+    speeds : array_like, shape (m,) or ()
         rad/s, increasing or decreasing.
     drive : Drive, optional
         Other inputs; its own speed is replaced, or the synchronous speed of its motor if it has no speed.
@@ -133,7 +133,7 @@ def sweep(
     InputError
         If the speeds are not positive or not in order.
     """
-    grid = np.asarray(speeds, dtype=float)
+    grid = np.array(speeds, dtype=float, ndmin=1)
     steps = np.diff(grid)
     if grid.ndim != 1 or len(grid) == 0 or not (np.isfinite(grid).all() and (grid > 0.0).all()):
         raise InputError("speeds must be positive finite numbers, at least one")
@@ -460,7 +460,7 @@ class _Found:
 
     def knows(self, start: FloatArray, near: float = SAME) -> bool:
         """Return whether a start belongs to a known motion."""
-        away = np.abs(self.known - start) / self.scale
+        away = np.abs(self.point.flow.within(self.known - start)) / self.scale
         return bool((away.max(axis=1) < near).any()) if len(away) else False
 
     def seek(self, place: FloatArray, *, divide: bool) -> bool:
@@ -468,8 +468,10 @@ class _Found:
         start = approach(self.point, self.turns, place, self.known if divide else None)
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
+        flow = self.point.flow
         try:
-            return self.add(solve_orbit(self.point, self.turns, start))
+            # of the motions that are whole turns apart the one that is nearest to rest
+            return self.add(solve_orbit(self.point, self.turns, flow.rest + flow.within(start - flow.rest)))
         except OrbitError:
             return False
 
@@ -479,7 +481,7 @@ class _Found:
             return False
         passed = orbit.passages()
         # a motion that is back at its start before the last turn has a shorter period
-        away = np.abs(passed - orbit.start) / self.scale
+        away = np.abs(self.point.flow.within(passed - orbit.start)) / self.scale
         period = next((n for n in range(1, orbit.turns) if away[n].max() < SAME), orbit.turns)
         self.known = np.vstack([self.known, passed[:period]])
         self.index += period * int(np.sign(np.linalg.det(np.eye(len(orbit.start)) - orbit.monodromy)))

@@ -19,7 +19,7 @@ from ...mechanisms import Parameters, mechanism_of
 from ...numerics import symbolic
 from ...run import InductionMotor, of_parameters, takes_published
 from ...units import RAD_S_PER_RPM
-from .drive import Direction, Drive, forces_of, require_acting
+from .drive import Direction, Drive, forces_of, require_acting, require_drive
 from .flow import Flow, crank_of, cranks_of
 
 #: A mechanism and its drive.
@@ -94,6 +94,7 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     InputError
         If it does not act in this drive: a speed under a torque, a torque at prescribed speed, a motor's where there is none.
     """
+    require_drive(drive)
     mechanism = mechanism_of(parameters)
     unit_of(mechanism, name)
     what, freedom = _crank_inputs(mechanism).get(name, ("", -1))

@@ -37,6 +37,8 @@ _POINTS, _PANELS, _HALVINGS = 8, 32, 16
 _RESOLVED, _EFFECT = 1e-10, 1e-8
 #: Imaginary part below which a root counts as real.
 _REAL = 1e-9
+#: Change of the rates by a parameter, relative to that by the motion for changes as large as both are, that is rounding.
+_NO_EFFECT = 1e-10
 #: Difference of the monodromy matrix from the orbit's, relative to its greatest entry, that is an error.
 _AGREES = 1e-6
 #: Least singular value, relative to the norm, up to which a matrix is singular to within rounding.
@@ -101,6 +103,10 @@ class Variations:
         if self.orbit.stations is not None:
             edges = np.union1d(edges, self.orbit.stations.angles)
         relative = self.scale[:, None] / self.scale
+        # magnitudes of the parameters, from the numbers that they change
+        numbers = np.abs(np.concatenate([self._drive, self._p]))[:, None]
+        sizes = np.divide(numbers, np.abs(along), out=np.full(along.shape, np.inf), where=along * numbers != 0.0)
+        least = _NO_EFFECT / sizes.min(axis=0, initial=np.inf)
         for _ in range(_HALVINGS):
             self.h = np.diff(edges)
             self.angles = edges[:-1, None] + self.h[:, None] * _GAUSS.nodes
@@ -108,8 +114,9 @@ class Variations:
             self.rates, first = self._first()
             self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
             self.forcing = self.by_constant @ along
-            # a parameter counts by its greatest effect
+            # a parameter counts by its greatest effect; on a motion that stands still many have none but rounding
             effect = np.abs(self.forcing / self.scale[:, None]).max(axis=(0, 1, 2), initial=1e-300)
+            effect = np.maximum(effect, least * np.abs(self.by_y / relative).max())
             rough = np.zeros(len(self.h), dtype=bool)
             for values, size in (
                 (self.rates, self.scale),

@@ -162,6 +162,8 @@ def _limits() -> tuple[Statement, ...]:
         while turn(parameters(20.0, found + way), 0.0).settled.all():
             found += way
         twists.append(near(f"{which} alpha4", f"{limit:g}", found, 1.0, "deg"))
+    at_ends = (*TWISTS_REACHED_DEG, TWISTS_REACHED_DEG[1] + 1.0)
+    *needed, too_many = (int(turn(parameters(20.0, twist), 0.0).steps.max()) for twist in at_ends)
     shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in (0.0, 10.0, 20.0, 30.0)}
     beyond = [
         at_most(
@@ -231,7 +233,8 @@ def _limits() -> tuple[Statement, ...]:
             "deg by 26 deg at which it settles",
             f"1 deg, the step of the limits; none of the share; {own}",
             (*twists, at_least("232 to 310 deg", 1.0, within)),
-            "the loops on which it settles are open, at 232 deg by up to "
+            f"if {max(needed)} to {too_many - 1} corrections are allowed at an angle, and not {MAX_STEPS} as here, the limits "
+            "are the stated ones exactly; the loops on which it settles are open, at 232 deg by up to "
             f"{np.max(followed(OPEN[1]).rotation_deg):.0f} deg (erratum 1); the mechanism itself turns fully at every "
             "alpha4",
         ),

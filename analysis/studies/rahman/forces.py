@@ -161,17 +161,30 @@ def replacements() -> list[Judged]:
     return found
 
 
-def _roundoffs() -> dict[str, float]:
-    """Return the greatest roundoff in single precision of the rod's momentum in the plane, eq 50a over eq 52a."""
+def _roundoffs() -> list[Judged]:
+    """Judge the greatest roundoffs in single precision of the momenta in the plane, eqs 50a and 51a against 52a and 53a."""
     p, b = parameters(PLANE.offset_in), bodies(parameters())
     single = Joints(*(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH]).T.astype(np.float32))
     found = []
     for q in (single, Joints(*(x.astype(float) for x in single))):
         r = joint_rates(CRANK_AT_SPEED, q)
-        pair = (forward_rod_momentum(CRANK_AT_SPEED, b, q, r) * b.masses[1], momenta(CRANK_AT_SPEED, b, q, r)[1])
-        found.append([(h.real[:, 0], h.real[:, 1], h.dual[:, 2]) for h in pair])
-    forward, mixed = np.abs(np.array(found[0]) - np.array(found[1])).max(-1)
-    return dict(zip(("component i", "component j", "moment, component k"), forward / mixed))
+        _, *mixed = momenta(CRANK_AT_SPEED, b, q, r)
+        forward = (
+            forward_rod_momentum(CRANK_AT_SPEED, b, q, r) * b.masses[1],
+            forward_slider_momentum(CRANK_AT_SPEED, b, q, r, 0.0),
+        )
+        found.append([[np.concatenate([h.real, h.dual], -1) for h in path] for path in (forward, mixed)])
+    by_forward, by_mixed = np.abs(np.array(found[0], dtype=float) - np.array(found[1])).max(-2)
+    names = [f"{part}component {axis}" for part in ("", "moment, ") for axis in "ijk"]
+    judged = []
+    for body, ones, others in zip(("rod", "slider"), by_forward, by_mixed):
+        for name, one, other in zip(names, ones, others):
+            if other:
+                judged.append(at_least(f"{body}, {name}", 1.0, one / other))
+            elif one:
+                unit = "lb.in.s" if name.startswith("moment") else "lb.s"
+                judged.append(at_least(f"{body}, {name}; by 53a none", 0.0, one, unit))
+    return judged
 
 
 def _apart(a: Dual, b: Dual) -> float:
@@ -287,12 +300,12 @@ def _momenta() -> tuple[Statement, ...]:
         Statement(
             "Finally the second set [the mixed path's] is used in the program to have better accuracy.",
             text("section 2.8, L750; L730, L859"),
-            "greatest roundoff of the rod's momentum over a turn, by single precision less double from the same joints, eq 50a "
-            "over eq 52a, in the plane, a4 = 10 in",
+            "greatest roundoff of the momenta over a turn, by single precision less double from the same joints, eq 50a over "
+            "52a for the rod, 51a over 53a for the slider, or that by 51a where 53a has none; in the plane, a4 = 10 in",
             "none, the sign decides",
-            tuple(at_least(name, 1.0, ratio) for name, ratio in _roundoffs().items()),
-            "component i is one product in either, by 52a with the roundoff of S4' as well; component j and the moment are by "
-            "50a the difference of larger numbers",
+            tuple(_roundoffs()),
+            "component i of the rod is one product in either, by 52a with the roundoff of S4' as well; the others are by 50a "
+            "and 51a sums of larger numbers",
         ),
         Statement(
             "In this step, equations for the inertia forces of link 1 (i.e. the crank) relative to frame {2}, for "
@@ -408,13 +421,14 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
         Statement(
             "Interestingly, by manual manipulation of the equation those components [4T4 and 2F2k] are also found to be zero.",
             text("section 3.2, L1117"),
-            "by the printed equations in a general position",
+            "by the printed equations in a general position, g3 = 0 (L1089)",
             ROUNDING,
             tuple(
                 nothing(symbol, general[symbol], "lb.in" if "T" in symbol else "lb")
                 for symbol in ("4T4i", "4T4j", "4T4k", "2F2k")
             ),
-            "the equations put 1F1k to zero, and with it 2F2k (erratum 7)",
+            "4T4j is -m3 g3 S4'', which is zero only because g3 is; 4T4i and 4T4k are zero for any g3; the equations put 1F1k "
+            "to zero, and with it 2F2k (erratum 7)",
         ),
         Statement(
             "By manual manipulation that force component [2F2j] is found to be negative of the ratio of input torque (100 "

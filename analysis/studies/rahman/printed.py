@@ -289,7 +289,8 @@ def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
 
 def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
     """Build a dual vector (..., 3) of components that are numbers or arrays."""
-    joined = np.stack(np.broadcast_arrays(*real, *dual), -1)
+    # numbers among arrays of single precision leave them so
+    joined = np.stack(np.broadcast_arrays(*real, *dual), -1, dtype=np.result_type(*real, *dual))
     return Dual(joined[..., :3], joined[..., 3:])
 
 
@@ -354,12 +355,13 @@ def _to_slider(q: Joints) -> FloatArray:
 def forward_slider_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
     """Return the slider's dual velocity by eq 45."""
     rod, rotation = forward_rod_velocity(c, q, r), _to_slider(q)
-    return Dual(rotation @ (rod.real + np.array([0.0, r.eta3, r.th3])), rotation @ rod.dual)
+    joint = np.stack([0.0 * r.th3, r.eta3, r.th3], -1)
+    return Dual(*(np.einsum("ij...,...j->...i", rotation, x) for x in (rod.real + joint, rod.dual)))
 
 
 def _of_slider(v: Dual, mass: float, g3: float) -> Dual:
     """Return the slider's dual momentum, or its rate, by the terms of eqs 51a and 56 in the components of eq 45."""
-    (x, y, z), (xd, yd, zd) = v.real, v.dual
+    (x, y, z), (xd, yd, zd) = np.moveaxis(v.real, -1, 0), np.moveaxis(v.dual, -1, 0)
     square = SLIDER_SQUARE
     found = _dual([xd, yd + g3 * z, zd - g3 * y], [square * x, square * y - g3 * zd, square * z + g3 * yd])
     return cast(Dual, mass * found)
@@ -367,7 +369,7 @@ def _of_slider(v: Dual, mass: float, g3: float) -> Dual:
 
 def forward_slider_momentum(c: Crank, b: Bodies, q: Joints, r: Joints, g3: float, *, slip: bool = False) -> Dual:
     """Return the slider's dual momentum by eq 51a; ``slip`` keeps its cos theta3 for cos eta3 (erratum 9)."""
-    mass, across = b.masses[2], forward_rod_velocity(c, q, r).dual[2]
+    mass, across = b.masses[2], forward_rod_velocity(c, q, r).dual[..., 2]
     wrong = mass * (np.cos(q.th3) - np.cos(q.eta3)) * across if slip else 0.0
     found = _of_slider(forward_slider_velocity(c, q, r), mass, g3) + _dual([0.0, wrong, 0.0], [0.0, 0.0, 0.0])
     return cast(Dual, found)

@@ -561,6 +561,7 @@ def torque_result() -> StudyResult:
         [apart_on_the_graph(angle / 360.0, curves[i], curves[j]) for i, j in ((0, 1), (0, 2), (1, 2))], axis=0
     )
     elsewhere = seen[away > 10.0].max()
+    at_one_angle = np.where(away > 10.0, np.ptp(curves, axis=0), 0.0)
     soft, stiff = parts(STIFFNESSES[0]), parts(STIFFNESSES[-1])
     placed = by_position(STIFFNESSES[0], STIFFNESSES[-1])
     damped, whole = (of(STIFFNESSES[-1]) - of(STIFFNESSES[0]) for of in (damper_torque, lambda k: turns[k].torque[:-1]))
@@ -602,9 +603,9 @@ def torque_result() -> StudyResult:
                 "stiffness k. The exception is at the maximum and minimum values where a slight variation is "
                 "recorded.",
                 text("3.2.1, L1995-2001"),
-                "distance between the curves as it is seen, square to them, on a graph as wide as it is high, "
+                "distance between the curves as it is seen, square to them, on a graph as wide as it is high, our choice, "
                 "relative to its size, farther than 10 deg, the rule for *near*, from an extreme; spread of the extremes "
-                "between the springs, relative to the greatest torque in size at k = 1e6 dyn/cm",
+                "between the springs, relative to the size of the least torque at k = 1e6 dyn/cm, which is the greater",
                 f"{ALIKE_WORDS}; {ALIKE:g} to {SLIGHTLY:g}, the rule for *slight*",
                 (
                     at_most("distance of the curves", ALIKE, elsewhere),
@@ -614,11 +615,14 @@ def torque_result() -> StudyResult:
                             computed=np.ptp(x) / peak,
                             lower=ALIKE,
                             upper=SLIGHTLY,
-                            why=f"at the {name} torque the springs differ by {100 * np.ptp(x) / peak:.0f} %, which is not seen",
+                            why=f"at the {name} torque the springs differ by {100 * np.ptp(x) / peak:.1f} % of the size of the "
+                            f"least, {100 * np.ptp(x) / abs(x[1]):.1f} % of its own, which is not seen",
                         )
                         for name, x in (("greatest", torque.max(axis=1)), ("least", torque.min(axis=1)))
                     ),
                 ),
+                f"at the same crank angle the curves differ by up to {at_one_angle.max():.3f} of the graph's height, in the "
+                f"steep reversal at {angle[at_one_angle.argmax()]:.0f} deg",
             ),
             Statement(
                 "These variations are due to the differences in the slider accelerations at these instances.",

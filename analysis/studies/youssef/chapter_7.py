@@ -2,8 +2,8 @@
 
 The mechanism of Fig 7.2 to 7.10 has links of 0.5 and 1 without a unit: lengths are in units of l3. The desired curve is
 lost with its figure. Ours, Fig 7.4, shows the methods at work, but no statement is judged by it. The variational motion (a)
-is nearest at every crank angle, but has corners that no slider follows at speed. The eleven terms of the direct search (b)
-have none, at the cost of an eighth more squared error. Series 2 is in `analysis.studies.youssef.series_2`.
+is nearest at every crank angle, but has two vertical tangents, which no slider follows at speed. The eleven terms of the
+direct search (b) have none, at the cost of an eighth more squared error. Series 2 is in `analysis.studies.youssef.series_2`.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
+from itertools import pairwise
 from math import degrees, inf, pi, radians
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares, minimize
+from scipy.optimize import brentq, least_squares, minimize
 
 from ...display import format_count
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
@@ -178,6 +179,18 @@ def in_line(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, Flo
     th3 = np.angle(target - l2 * np.exp(1j * rotation))
     centre = l2 * np.cos(rotation) + l3 * np.cos(th3)
     return centre, centre**2 - (l2**2 + l3**2 - l4**2 + 2.0 * l2 * l3 * np.cos(rotation - th3))
+
+
+def vertical_tangents() -> list[float]:
+    """Return the crank angles (deg) at which the root in (7.14) vanishes, so that U has a vertical tangent."""
+
+    def square(angle: float) -> float:
+        at = np.array([angle])
+        return float(in_line(at, desired(at))[1][0])
+
+    return [
+        degrees(brentq(square, *ends)) for ends in pairwise(TURN.tolist()) if square(ends[0]) * square(ends[1]) < 0.0
+    ]
 
 
 def by_equations(rotation: FloatArray, target: ComplexArray) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -509,11 +522,14 @@ def columns_of_motions() -> dict[str, FloatArray]:
 def _unweighted() -> tuple[Statement, ...]:
     """Return the statements on Fig 7.6 to 7.8, with what they come to with our curve."""
     least, found, ends = variational().squared_error, direct(), ends_of_simplex()
-    corners = []
+    slope = slider(found.linkage).series.derivative()
+    smooth = [np.abs(of(TURN)).max() for of in (slope, slope.derivative())]
+    slopes, bends = [], []
     for n in (720, 2880):
         fine = np.append(variational(n).u, variational(n).u[:2])
-        corners.append(np.abs(np.diff(fine, 2)).max() / (2.0 * pi / n) ** 2)
-    smooth = np.abs(slider(found.linkage).series.derivative().derivative()(TURN)).max()
+        slopes.append(np.abs(np.diff(fine)).max() / (2.0 * pi / n))
+        bends.append(np.abs(np.diff(fine, 2)).max() / (2.0 * pi / n) ** 2 / smooth[1])
+    vertical = [f"{at:.1f}" for at in vertical_tangents()]
     stopped = np.sort([end for end, _ in ends])
     distinct = 1 + int((np.diff(stopped) > 0.01 * stopped[0]).sum())
     spread = np.ptp([descended for _, descended in ends]) / found.error
@@ -549,9 +565,10 @@ def _unweighted() -> tuple[Statement, ...]:
             "By studying curve (a) of Fig. (7.6) we find it very difficult, if not impossible, to accomplish at high speeds "
             "while curve (b) of the same figure is a more feasible task.",
             text("7.3.1, L5789"),
-            why=f"{LOST}; with ours U has corners in (a), where its second derivative has no bound: by differences over "
-            f"0.5 deg it is {corners[0] / smooth:.0f} times the greatest of (b), over 0.125 deg "
-            f"{corners[1] / smooth:.0f} times",
+            why=f"{LOST}; with ours U has a vertical tangent in (a) at {' and '.join(vertical)} deg, where even its velocity "
+            f"has no bound: by differences over 0.5 deg |U'| is at most {slopes[0]:.1f} l3/rad, over 0.125 deg "
+            f"{slopes[1]:.1f}, in (b) {smooth[0]:.1f}; the second derivative is {bends[0]:.0f} and {bends[1]:.0f} times the "
+            "greatest of (b)",
         ),
         Statement(
             "The variational method requires the solution of (n+m) non-linear equations. In many cases this entails a far "

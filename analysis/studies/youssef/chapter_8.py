@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ...numerics.decay import fit_decay
+from ...numerics.decay import LEAST_SWING, fit_decay
 from ...periodic import Turn
 from ...units import CM_PER_METRE, RAD_S_PER_RPM
 from ..rules import ABOUT, ALIKE, READ, SMALL
@@ -198,12 +198,15 @@ def impulse_response(spring: str, time: NDArray[np.float64], friction: float = 0
 def compute_decay() -> StudyResult:
     """Compute records like those of the thesis, and the damping that their logarithmic decrement gives."""
     time = np.linspace(0.0, LENGTH, 4001)
-    columns, added = {"time [s]": time}, []
+    columns, added, by_cycle = {"time [s]": time}, [], []
     for number, (stated, spring) in FOUND.items():
         name, rubbed = f"rig {number}; spring {spring}", impulse_response(spring, time, DRY)
         columns[f"slider position u; {name} [cm]"] = CM_PER_METRE * impulse_response(spring, time)
         columns[f"slider position u with {DRY:g} N of dry friction; {name} [cm]"] = CM_PER_METRE * rubbed
-        added.append(f"{fit_decay(time, rubbed).damping(rig(spring).slider_mass)[0] - stated:.1f}")
+        decay, mass = fit_decay(time, rubbed), rig(spring).slider_mass
+        added.append(f"{decay.damping(mass)[0] - stated:.1f}")
+        first, *_, last = mass / pi * decay.frequency * decay.cycle_decrements - stated
+        by_cycle.append(f"{first:.1f} to {last:.1f}")
     return StudyResult(
         number="8.6",
         claim="The slider, disconnected and struck, swings out; its logarithmic decrement gives the damping coefficient.",
@@ -216,8 +219,9 @@ def compute_decay() -> StudyResult:
                 "x 10^3 dyne.Sec/cm.] for Experimental Rig 2 (linearised rig).",
                 text("8.3.3, L6401"),
                 why=f"{LOST}; {DRY:g} N of dry friction, our choice, if it counts as damping, adds {' and '.join(added)} N.s/m "
-                f"to the 9 and 5.5 N.s/m of the two rigs after a blow that gives the slider {KICK:g} m/s, and more after a "
-                "weaker one",
+                f"to the 9 and 5.5 N.s/m of the two rigs after a blow that gives the slider {KICK:g} m/s, fitted over the "
+                f"swings down to {LEAST_SWING:g} of the record's range; from the first to the last of these cycles it adds "
+                f"{' and '.join(by_cycle)} N.s/m, and more after a weaker blow",
             ),
             Statement(
                 "Theoretical calculations of the stiffness, based on the number of coils, the wire and mean coil diameters "
@@ -434,7 +438,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
             "which it increases with increase of speed.",
             text("8.4.1.2, L6734"),
             "amplitude over the speed with spring A, from 240 rpm on",
-            f"{TENS}; 2.5 rpm, half the step of the other; {ALIKE:g}, the rule for *the same*; of rises the sign alone",
+            f"{TENS}; 0.5 rpm of 345 rpm, by the same rule; {ALIKE:g}, the rule for *the same*; of rises the sign alone",
             (
                 at_least("least rise to the next of 240, 260, 280, 290 rpm", 0.0, rising, "cm"),
                 near(
@@ -451,8 +455,7 @@ def _fig_8_14() -> tuple[Statement, ...]:
                     "speed of the minimum",
                     "345",
                     lowest,
-                    2.5,
-                    "rpm",
+                    unit="rpm",
                     why=f"it is at {lowest / natural_speed('A'):.2f} of the natural frequency",
                 ),
                 at_least("least rise by 10 rpm, 370 to 500 rpm", 0.0, _least_rise("A", range(370, 501, 10)), "cm"),

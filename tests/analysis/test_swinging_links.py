@@ -1,0 +1,175 @@
+"""Linkages that start elsewhere than at zero, or have a link that swings: a pendulum on a yoke, by Mathieu's equation."""
+
+from __future__ import annotations
+
+import os
+from math import pi
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from analysis.linear import find_equilibria, find_equilibrium
+from analysis.linkages import linkage
+from analysis.mechanisms import PUBLISHED
+from analysis.periodic import Drive, basins, find_orbit, find_orbits, frequency_response, orbit_of, sweep
+from analysis.run import load_case, load_parameters
+from analysis.tuning import Wish, load_tuning_case, tune
+from analysis.units import RAD_S_PER_RPM
+from linkwork.errors import InputError, ParameterError
+from linkwork.mechanism import PublishedSet
+
+pytestmark = pytest.mark.usefixtures("own_linkages")
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+STROKE, ARM, MASS, INERTIA, GRAVITY, DAMPING = 0.02, 0.15, 0.5, 4e-3, 9.81, 0.01
+
+
+def yoke(name: str, *, hanging: float = 0.0, **spring: Any) -> PublishedSet[Any, Any]:
+    """A crank moves a yoke up and down, and on that a pendulum hangs at this angle of its pin, half turns."""
+    built = linkage(name, ground={"O": (0, 0)}, gravity=GRAVITY)
+    built.body("crank", bar=("O", "B"), length=STROKE, mass=1.0, inertia=1e-3)
+    built.body("yoke", points={"A": (0, 0)}, mass=1.0, inertia=1e-3)
+    built.body("pendulum", bar=("A", "T"), length=2.0 * ARM, mass=MASS, inertia=INERTIA)
+    # the yoke's x axis, from which the pin counts, is turned so that the pendulum hangs where it is wanted
+    built.slide("G", body="yoke", on="ground", through="O", direction=-0.5 * pi - hanging)
+    built.slot("S", pin="B", on="yoke", through="A", direction=0.5 * pi + hanging)
+    built.spring("hinge", at="A", damping=DAMPING, **spring)
+    built.freedom("crank", "O", speed="100 rpm").freedom("swing", "A", start=hanging)
+    built.mechanism()
+    return PUBLISHED[name]
+
+
+def mathieu(speed: float, *, stiffness: float = 0.0, damping: float = DAMPING, upright: bool = False) -> Any:
+    """Return the Floquet multipliers of the pendulum: J s'' + c s' + (k +- m l (g + y'')) s = 0, y = r sin(w t)."""
+    inertia, sign = INERTIA + MASS * ARM**2, -1.0 if upright else 1.0
+
+    def rates(t: float, x: Any) -> Any:
+        lift = -STROKE * speed**2 * np.sin(speed * t)
+        pull = stiffness + sign * MASS * ARM * (GRAVITY + lift)
+        return np.concatenate([x[2:], -(damping * x[2:] + pull * x[:2]) / inertia])
+
+    ends = solve_ivp(rates, (0.0, 2.0 * pi / speed), np.eye(2).ravel(), rtol=1e-11, atol=1e-13).y[:, -1]
+    return np.sort_complex(np.linalg.eigvals(ends.reshape(2, 2)))
+
+
+@pytest.mark.parametrize("hanging", [0.0, -pi, 3.0 * pi])
+def test_a_motion_is_sought_from_where_the_linkage_starts(hanging: float) -> None:
+    parameters = yoke(f"yoke-{abs(hanging):.0f}", hanging=hanging).parameters
+    for speed in (100.0 * RAD_S_PER_RPM, 134.0 * RAD_S_PER_RPM):
+        orbit = orbit_of(parameters, Drive(speed=speed))
+        np.testing.assert_allclose(np.sort_complex(orbit.multipliers), mathieu(speed), rtol=1e-7)
+        assert orbit.amplitude == 0.0
+        np.testing.assert_allclose(find_orbit(parameters, speed=speed).start, [hanging, 0.0], atol=1e-9)
+
+
+def test_one_speed_is_a_sweep_too() -> None:
+    (orbit,) = sweep(yoke("yoke-at-a-speed").parameters, "100 rpm").orbits
+    assert orbit is not None
+    assert orbit.drive.speed == pytest.approx(100.0 * RAD_S_PER_RPM)
+
+
+def test_what_hangs_and_what_stands_are_two_motions_however_often_the_pin_has_turned() -> None:
+    parameters, speed = yoke("yoke-free", hanging=-pi).parameters, 100.0 * RAD_S_PER_RPM
+    found = find_orbits(parameters, speed=speed)
+    assert sorted(orbit.start[0] for orbit in found.orbits) == pytest.approx([-pi, 0.0], abs=1e-9)
+    (hangs,) = found.stable
+    (stands,) = (orbit for orbit in found.orbits if orbit is not hangs)
+    np.testing.assert_allclose(np.sort_complex(stands.multipliers), mathieu(speed, upright=True), rtol=1e-7)
+    settled = basins(parameters, Drive(speed=speed), points=8)
+    assert settled.share(0) > 0.9  # it comes to hang, from many starts after whole turns
+    angles = [found.coordinates[1] for found in find_equilibria(parameters)]
+    assert sorted(abs(angle) for angle in angles) == pytest.approx([0.0, pi], abs=1e-9)
+    assert abs(find_equilibrium(parameters).coordinates[1]) == pytest.approx(pi)
+
+
+def test_a_slider_that_is_measured_from_elsewhere_has_the_same_motion() -> None:
+    orbits = []
+    for name, datum in (("press-at-zero", 0.25), ("press-off-zero", 0.0)):
+        start = 0.25 - datum
+        built = linkage(name, ground={"A": (0, 0), "F": (datum, 0)}, gravity=GRAVITY)
+        built.body("crank", bar=("A", "B"), length=0.04, mass=0.3, inertia=1e-4)
+        built.body("coupler", bar=("B", "C"), length=0.22, mass=0.7, inertia=3e-3)
+        built.body("rocker", bar=("H", "C"), length=0.16, mass=0.5, inertia=1e-3)
+        built.body("guide", points={"H": (0, 0)}, mass=6.0, inertia=0.02)
+        built.slide("S", body="guide", on="ground", through="F", direction=0.0)
+        built.spring("support", at="S", stiffness=6e4, free=start, damping=80.0)
+        built.freedom("crank", "A", speed="200 rpm").freedom("guide", "S", start=start)
+        built.mechanism()
+        orbits.append(orbit_of(PUBLISHED[name].parameters, Drive(speed=200.0 * RAD_S_PER_RPM)))
+    np.testing.assert_allclose(orbits[1].multipliers, orbits[0].multipliers, rtol=1e-8)
+    np.testing.assert_allclose(orbits[1].start - orbits[0].start, [0.25, 0.0], atol=1e-10)
+    assert orbits[0].amplitude > 1e-5
+
+
+@pytest.mark.slow
+def test_where_the_amplitude_is_rounding_it_has_no_extremum_and_a_damping_is_found() -> None:
+    """Parametric excitation: the pendulum hangs still until twice its natural frequency is near the crank's."""
+    sprung = yoke("yoke-sprung", stiffness=1.0).parameters
+    low, high = 190.0 * RAD_S_PER_RPM, 215.0 * RAD_S_PER_RPM
+    response = frequency_response(sprung, low, high, doublings=0)
+    assert response.maxima() == response.minima() == ()
+    name = "hinge.damping"
+    wish = Wish(parameters=sprung, speeds=(low, high), change={name: (0.002, 0.2)}, no_unstable=True, least=name)
+
+    def excess(damping: float) -> float:
+        speeds = np.linspace(low, high, 26).tolist()
+        return float(max(abs(mathieu(speed, stiffness=1.0, damping=damping)).max() for speed in speeds)) - 1.0
+
+    # the greatest of 26 speeds is that of all to the square of their distance
+    assert tune(wish).values[0] == pytest.approx(brentq(excess, 0.01, 0.1, xtol=1e-5), rel=2e-3)
+
+
+FILE = """
+title = "a pendulum"
+[linkage]
+name = "named-pendulum"
+source = "own"
+gravity = 9.81
+ground = { O = [0, 0] }
+bodies.rod = { bar = ["O", "P"], length = "0.3 m", mass = "1 kg", inertia = "0.01 kg*m^2" }
+springs.hinge = { at = "O", stiffness = "2 N*m/rad", damping = "0.1 N*m*s/rad" }
+freedoms.swing = { joint = "O" }
+[hinge]
+stiffness = "3 N*m/rad"
+damping = "0.2 N*m*s/rad"
+[run]
+stop_time = 0.1
+step = 0.01
+"""
+
+
+def test_a_case_has_what_stands_in_the_file_of_its_linkage(tmp_path: Path) -> None:
+    (tmp_path / "rod.toml").write_text(FILE)
+    (tmp_path / "chain.toml").write_text('linkage = "rod.toml"\n[hinge]\ndamping = "0.5 N*m*s/rad"\n')
+    case = tmp_path / "case.toml"
+    case.write_text('linkage = "chain.toml"\n[run]\nstop_time = 0.3\n')
+    found = load_case(case)
+    assert (found.title, found.stop_time, found.step) == ("case", 0.3, 1e-3)
+    assert (found.parameters.hinge_stiffness, found.parameters.hinge_damping) == (3.0, 0.5)
+    case.write_text('linkage = "rod.toml"\npublished = "table-3.1"\n')
+    with pytest.raises(InputError, match=r"one mechanism: leave out linkage, or published = 'table-3.1'"):
+        load_case(case)
+    case.write_text("linkage = 7\n")
+    with pytest.raises(ParameterError, match="linkage is 7: it must be the name of a file"):
+        load_case(case)
+    case.write_text('mechanism = "not-loaded"\n')
+    with pytest.raises(InputError, match="a linkage of your own is loaded first"):
+        load_parameters(case)
+    (tmp_path / "chain.toml").write_text("[run]\n")
+    case.write_text('linkage = "chain.toml"\n')
+    with pytest.raises(InputError, match="describes no linkage"):
+        load_case(case)
+
+
+def test_the_file_of_a_linkage_is_found_from_where_the_tuned_case_is_written(tmp_path: Path) -> None:
+    file = EXAMPLES / "linkages" / "elastic-bearing.toml"
+    case = tmp_path / "tuning.toml"
+    wish = '[tune]\nspeeds = ["280 rpm", "320 rpm"]\nno_jump = true\nchange = { "coupler.mass" = "20 %" }\n'
+    case.write_text(f"linkage = {Path(os.path.relpath(file, tmp_path)).as_posix()!r}\n{wish}")
+    tables = load_tuning_case(case).tuned_tables(SimpleNamespace(values=np.array([0.4])), tmp_path / "out")  # type: ignore[arg-type]
+    assert (tmp_path / "out" / tables["linkage"]).resolve() == file.resolve()
