@@ -214,7 +214,7 @@ def test_many_random_linkages_move_as_with_multipliers(tmp_path, first):
     for seed in range(first, first + 50):
         package = compared(seed, tmp_path, dyads=(1, 4) if seed % 3 else (3, 6))
         made = imported(package, tmp_path).MECHANISM
-        known, free = made.published[package.name], {mode.arguments[0]: 0 for mode in made.modes}
+        known, free = made.published[made.name], {mode.name.replace(".", "_"): 0 for mode in made.modes}
         plant = Plant(made, known.parameters, known.initial, tolerance=1e-10, **free)
         for _ in range(5):
             plant.step(plant.time, 2e-3)

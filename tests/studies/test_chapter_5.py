@@ -6,10 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import Drive, Stability, confirm
-from analysis.studies.youssef.chapter_5 import SAME_GROUND, closed, held, removing, to_the_letter, without_factor
+from analysis.studies.youssef.chapter_5 import (
+    ALL_HARMONICS,
+    SAME_GROUND,
+    closed,
+    cut_errors,
+    held,
+    nine_terms,
+    removing,
+    to_the_letter,
+    without_factor,
+)
 from analysis.studies.youssef.linearised import with_crank
 from analysis.studies.youssef.regions import (
     appendix_3,
@@ -138,12 +149,45 @@ def test_formulas_of_the_perturbation_to_the_letter() -> None:
     assert (region.low, region.high) == pytest.approx(second, abs=1e-5)
 
 
+def galerkin(inertia_ratio: float, harmonics: int) -> NDArray[np.float64]:
+    """Return boundaries 1 and 3 in lambda_k^2 by (5.27) with four terms of half the crank angle, the coefficients cut."""
+    e = slider_equation(chapter_4(inertia_ratio), 60.0)
+    x = np.linspace(0.0, 4.0 * np.pi, 512, endpoint=False)
+
+    def cut(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        c = np.fft.rfft(values)
+        c[2 * harmonics + 1 :] = 0.0
+        return np.fft.irfft(c, len(x))
+
+    psi1, rest, factor = (cut(v / e.mass(x)) for v in (e.mass.derivative()(x), e.stiffness(x), 1.0))
+    k = np.array([[0.5], [1.5]])
+    cos, sin = np.cos(k * x), np.sin(k * x)
+    terms, slopes, curvatures = (
+        np.vstack([cos, sin]),
+        np.vstack([-k * sin, k * cos]),
+        np.vstack([-(k**2) * cos, -(k**2) * sin]),
+    )
+    left = terms @ (curvatures + psi1 * slopes + rest * terms).T
+    return np.sort(np.linalg.eigvals(np.linalg.solve(terms @ (factor * terms).T, -left)).real)
+
+
 def test_cut_after_the_ninth_term() -> None:
     """(5.35) as the thesis cuts it, less Hill's determinant."""
     for ratio in (0.5, 1.0, 1.5):
-        nine = boundary_stiffnesses(equation(chapter_4(ratio)), -1, count=2, order=2).real
         whole = hill(chapter_4(ratio))
-        assert nine == pytest.approx([whole.low, whole.high], abs=1e-6)
+        assert galerkin(ratio, 2)[:2] == pytest.approx([whole.low, whole.high], abs=1e-6)
+
+
+@pytest.mark.parametrize(("harmonics", "first", "third"), [(2, 4.88e-5, 0.479), (ALL_HARMONICS, 4.90e-5, 0.0281)])
+def test_nine_terms_of_the_divided_equation(harmonics: int, first: float, third: float) -> None:
+    """The third region needs the third harmonic of the coefficients; undivided it would be 1.08 of its width off."""
+    ends, wholes = galerkin(1.0, harmonics).reshape(2, 2), hill_regions(equation(chapter_4(1.0)), 3)
+    errors = cut_errors(harmonics=harmonics, terms=nine_terms)
+    for number, found, known in ((1, ends[0], first), (3, ends[1], third)):
+        whole = wholes[number]
+        error = np.abs(found - (whole.low, whole.high)).max() / whole.width
+        assert error == pytest.approx(known, rel=2e-3)
+        assert errors[number] == pytest.approx(error, rel=1e-4)
 
 
 def test_equation_without_the_factor_has_the_same_multipliers_but_for_the_factor() -> None:
