@@ -55,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import format_turns, orbits_of
+    from ..periodic import format_turns, orbits_of, unsought
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -68,7 +68,8 @@ def basins(
     found = [orbits_of(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
     _motions(f"{chosen.case.title}: periodic motions of {format_turns(turns)}", found)
     if not any(part.stable for part in found):
-        raise InputError(f"no stable motion of {format_turns(turns)} was found: no start ends in one")
+        also = unsought(parameters, drive)
+        raise InputError(f"no stable motion of {format_turns(turns)} was found: no start ends in one{also}")
     picture = find_basins(
         parameters,
         drive,
@@ -104,7 +105,8 @@ def _motions(title: str, found: Sequence[Orbits]) -> None:
         stays = word is not Stability.UNSTABLE
         number += stays
         size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}"
-        rows.append((str(number) if stays else "", str(orbit.turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
+        turns = str(orbit.turns * orbit.flow.turns)
+        rows.append((str(number) if stays else "", turns, size_of_it, word.value, f"{orbit.largest:.6g}"))
     show_table(title, headings, rows, words=("stability",))
     for turns, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"

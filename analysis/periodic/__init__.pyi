@@ -61,6 +61,7 @@ from .motion.search import find_orbit as find_orbit
 from .motion.search import find_orbits as find_orbits
 from .motion.search import orbits_of as orbits_of
 from .motion.search import sweep as sweep
+from .motion.search import unsought as unsought
 from .motion.variables import Family as Family
 from .motion.variables import Operation as Operation
 from .motion.variables import Plane as Plane

@@ -173,3 +173,32 @@ def test_the_file_of_a_linkage_is_found_from_where_the_tuned_case_is_written(tmp
     case.write_text(f"linkage = {Path(os.path.relpath(file, tmp_path)).as_posix()!r}\n{wish}")
     tables = load_tuning_case(case).tuned_tables(SimpleNamespace(values=np.array([0.4])), tmp_path / "out")  # type: ignore[arg-type]
     assert (tmp_path / "out" / tables["linkage"]).resolve() == file.resolve()
+
+
+def test_motions_in_which_a_link_goes_round_are_said_not_to_be_sought() -> None:
+    """On a turning crank an arm hangs, so that its pin turns back once a period."""
+    built = linkage("hanging-arm", ground={"O": (0, 0)}, gravity=GRAVITY)
+    built.body("crank", bar=("O", "B"), length=0.03, mass=0.2, inertia=1e-4)
+    built.body("arm", bar=("B", "T"), length=0.15, mass=0.2, inertia=4e-4)
+    built.spring("hinge", at="B", damping=4e-4)
+    built.freedom("crank", "O", speed="100 rpm").freedom("swing", "B", start=-0.5 * pi)
+    built.mechanism()
+    with pytest.raises(InputError, match=r"motions in which swing\.angle goes round in a period were not sought"):
+        basins("hanging-arm", Drive(speed=100.0 * RAD_S_PER_RPM), points=4)
+
+
+def test_turns_in_a_period_are_those_of_the_crank() -> None:
+    """A wheel at half the crank's speed is back after two turns, and so is the pendulum on its rim."""
+    built = linkage("two-wheels", ground={"A": (0, 0), "E": (0.1, 0)}, gravity=GRAVITY)
+    built.body("one", points={"A": (0, 0)}, mass=1.0, inertia=2e-3)
+    built.body("two", points={"E": (0, 0), "F": (0.06, 0)}, mass=2.0, inertia=5e-3)
+    built.body("bob", bar=("F", "H"), length=0.1, mass=0.3, inertia=1e-5)
+    built.gear("mesh", bodies=("one", "two"), ratio=-0.5)
+    built.spring("hinge", at="F", stiffness=4.0, damping=0.02)
+    built.freedom("one", "A", speed="300 rpm").freedom("bob", "F")
+    built.mechanism()
+    orbit = find_orbit("two-wheels", speed="300 rpm")
+    assert orbit.turn().period == pytest.approx(0.4)
+    assert "2 turns at" in repr(orbit)
+    response = frequency_response("two-wheels", "300 rpm", "302 rpm", doublings=0)
+    assert (response.branches[0].columns()["turns in a period [1]"] == 2.0).all()

@@ -23,7 +23,7 @@ from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
 from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
 from ..motion.orbit import PeriodicOrbit, require_turns
-from ..motion.search import Orbits, orbits_of
+from ..motion.search import Orbits, orbits_of, unsought
 from ..motion.variables import Plane
 from . import kernels
 from .grid import Keeping, grid_points, row_code, row_name
@@ -310,7 +310,8 @@ def basins(
     found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one")
+        also = unsought(parameters, drive)
+        raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one{also}")
     first = motions[0].start
     low, high = (side[0] for side in coordinate_ranges(parameters, drive, first))
     rest, scale, half = float(motions[0].flow.rest[0]), motions[0].scale, len(first) // 2

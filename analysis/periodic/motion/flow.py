@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,6 +166,11 @@ class Flow:
     def period(self) -> float:
         """Return the crank angle (rad) of the common period of all cranks: one turn if there is one crank."""
         return self.mechanism.freedoms[self.crank].period * self.base
+
+    @property
+    def turns(self) -> int:
+        """Return the turns of the crank in the common period: several with other cranks, or with gears that come back later."""
+        return max(1, round(self.period / (2.0 * pi)))
 
     def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
         """Return the addresses of the compiled functions ``which``, with the mechanism's switch on or off."""

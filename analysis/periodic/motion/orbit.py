@@ -219,7 +219,7 @@ class PeriodicOrbit(Shown):
             swing = f"; amplitude of {turn.swing} {turn.amplitude:.4g} {unit}"
         except LinkworkError as error:
             said, swing = f" that cannot be followed ({error})", ""
-        turns = format_count(self.turns, "turn")
+        turns = format_count(self.turns * self.flow.turns, "turn")
         others = f"; {format_count(self.others, 'other motion')} there: find_orbits" if self.others else ""
         return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 

@@ -272,6 +272,14 @@ class Orbits(Shown):
         return tuple(orbit for orbit in self.orbits if orbit.verdict().stability is not Stability.UNSTABLE)
 
 
+@takes_published()
+def unsought(parameters: Parameters, drive: Drive) -> str:
+    """Return what an error adds on motions that no search finds, in which a swinging link goes round; empty without one."""
+    flow = drive.flow(mechanism_of(parameters))
+    names = [flow.mechanism.freedoms[n].coordinate for n in flow.free if flow.mechanism.freedoms[n].swings]
+    return f"; motions in which {' or '.join(names)} goes round in a period were not sought" if names else ""
+
+
 @takes_published(inputs=driven, initial=started)
 @in_si(speed="rad/s", torque="N.m")
 def find_orbit(

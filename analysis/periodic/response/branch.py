@@ -109,7 +109,7 @@ class Branch(Shown):
         signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
         first = {
             f"{self.family.name}{unit}": self.parameter,
-            "turns in a period [1]": np.full(len(self), float(self.turns)),
+            "turns in a period [1]": np.full(len(self), float(self.turns * self.orbits[0].flow.turns)),
             "largest multiplier [1]": largest,
             "stable (1), marginal (0), unstable (-1)": signs,
         }
