@@ -265,19 +265,6 @@ def test_a_looser_constraint_is_no_worse(seed: int) -> None:
         assert loose <= 1.002 * strict
 
 
-@pytest.mark.parametrize("n", [4, 5])
-@pytest.mark.parametrize("seed", [1, 4, *(pytest.param(n, marks=pytest.mark.slow) for n in range(5, 27))])
-def test_poses_that_a_sound_linkage_takes_exactly_are_taken_by_the_search(n: int, seed: int) -> None:
-    """Of the four poses of seed 4 the one linkage known comes to 0.03 deg from the limit of assembly."""
-    random = np.random.default_rng([n, seed, 7])
-    points = random.uniform(-1.0, 1.0, (n, 2))
-    task = syn.PrecisionPoints(points=points, angle=np.sort(random.uniform(-1.2, 1.2, n)) * random.choice([1, -1]))
-    if any(solution.verdicts.sound for solution in syn.guidance(task).solutions):
-        best = syn.synthesize(task, constraints=[syn.LeastTransmission(angle=0.0, over="task")]).best
-        assert best.verdicts.sound
-        assert best.evaluation.worst < 1e-6 * np.hypot(*np.ptp(points, axis=0))
-
-
 def test_what_a_linkage_violates_is_named() -> None:
     known = drawn(np.random.default_rng(3), least=0.75)
     task = syn.TimedPath(points=known.path(syn.turn(24)))

@@ -63,7 +63,7 @@ class TestControl:
 
 def test_cam() -> None:
     """Pressure angle and curvature of its pitch curve by finite differences."""
-    found = control.cam(FourierSeries(np.array([0.0, 0.02, -0.004]), np.array([0.0, 0.01, 0.003])))
+    found = control.cam(FourierSeries(np.array([0.0, 0.02, -0.008]), np.array([0.0, 0.01, 0.003])))
     z = found.curve[:-1]
     tangent = np.roll(z, -1) - np.roll(z, 1)
     # the follower moves along the radius, and the cam presses along the normal
@@ -71,6 +71,8 @@ def test_cam() -> None:
     assert np.degrees(angle.max()) == pytest.approx(30.0, abs=0.01)
     turned = np.angle(np.roll(tangent, -1) / np.roll(tangent, 1)) / (2.0 * np.abs(0.5 * tangent))
     assert found.curvature == pytest.approx(1.0 / turned.max(), rel=1e-3)
+    assert found.hollow_curvature == pytest.approx(-1.0 / turned.min(), rel=1e-3)
+    assert found.hollow_deg == pytest.approx(360.0 * np.mean(turned < 0.0), abs=0.2)
     assert found.base == pytest.approx(np.abs(z).min())
 
 
