@@ -97,7 +97,7 @@ def ratios(parameters: FiveBarParameters) -> Ratios:
 
 
 def printed(ratios: Ratios, datum: Datum = DATUM) -> Coefficients:
-    """Return the coefficients listed after (4.21); the sign of P1 is illegible in the scan and is taken from H1."""
+    """Return the coefficients listed after (4.21), the sign of P1, illegible, from H1, and the force from the listings."""
     s2, s3, p45, i4 = ratios
     alpha, a3, a4 = datum
     # all divided by their common factor sigma3^2
@@ -147,7 +147,12 @@ def _series(mean: float, cosine: float, sine: float) -> FourierSeries:
 
 
 def _force(ratios: Ratios, datum: Datum) -> FourierSeries:
-    """Return the force with harmonics -U and -V of the listings, which agree with the legible parts of R1 and S1."""
+    """Return the force with harmonics -U and -V of the listings (L8449-8450), which stand for R1 and S1 here.
+
+    The scan's lines of R1 and S1 (L2786-2794) are not whole: what can be read are terms in r4 and mr3, which vanish here, and
+    none in I4. At sigma3 = 1, U and V are the term in I4 of the line of Q1 (L2781) times cos and sin of alpha3. The listings
+    have no mean of the force, nor has the right equation to first order.
+    """
     size = ratios.p45 * ratios.inertia_ratio * ratios.sigma2 * cos(datum.coupler)
     return _series(0.0, -size * cos(datum.coupler), -size * sin(datum.coupler))
 

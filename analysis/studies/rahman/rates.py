@@ -255,7 +255,7 @@ def _roundoff(q: Joints) -> float:
 def _dead_centres() -> tuple[Statement, ...]:
     """Judge the cause that section 3.2 gives for the spikes, in the plane and where the printed iteration ends."""
     cases = [Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)]
-    worst, least, rough, near_zero, high = 0.0, np.inf, 0.0, [], []
+    worst, least, rough, near_zero, high, whole = 0.0, np.inf, 0.0, [], [], []
     for case, shifted in zip(cases, OFFSETS):
         p, centres = parameters(case.offset_in), dead_centres_deg(case)
         q = joints(planar(p, np.radians(ANGLES_DEG)) / [1.0, 1.0, 1.0, 1.0, INCH])
@@ -272,6 +272,7 @@ def _dead_centres() -> tuple[Statement, ...]:
         angles = ANGLES_DEG[:-1]
         unknowns = _ended(shifted, angles, np.repeat(followed(shifted).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0))
         rough = max(rough, _roundoff(joints(unknowns)))
+        whole.append(_near_dead_centres(shifted, joints(unknowns[::2]), angles[::2])["th2"])
         beside, closest = _beside_zeros(shifted, angles, unknowns)
         all_angles, q = np.append(angles, beside), joints(np.concatenate([unknowns, closest]))
         ratios = _near_dead_centres(shifted, q, all_angles)
@@ -317,9 +318,9 @@ def _dead_centres() -> tuple[Statement, ...]:
             place,
             "distance of theta2 from 0 at the dead centres; greatest accelerations, at half degrees, within "
             f"{ABOUT_DEG:g} deg of a dead centre relative to those elsewhere: in the plane, where 40a and 41a are zero, and "
-            f"where the printed iteration ends, there {BESIDE_DEG:g} deg before and after each zero of sin theta2 too; there, "
-            "at half degrees, also the greatest share of the greatest acceleration that is roundoff, by numbers with three "
-            "digits more and joints off by the last digit of a turn",
+            f"where the printed iteration ends, there {BESIDE_DEG:g} deg, our choice, before and after each zero of sin theta2 "
+            "too; there, at half degrees, also the greatest share of the greatest acceleration that is roundoff, by numbers "
+            "with three digits more and joints off by the last digit of a turn",
             f"{VERY_CLOSE_DEG:g} deg, the rule for *very close*; {ABNORMAL:g} times, the rule for *abnormally*; half of it, "
             "for *on account of*",
             (
@@ -330,8 +331,9 @@ def _dead_centres() -> tuple[Statement, ...]:
             ),
             "at the second spike theta2 is half a turn. Out of the plane 40a and 41a grow without bound there, and with them "
             "38a, but not by roundoff, here in double precision (the thesis does not say which it used): eq 41 divides by sin "
-            "theta2, and row 37f is left out (erratum 3). 39a and 42a stay finite, as all five are in the plane: the spikes of "
-            "the forces come from the torque, which has no lever on the slider there",
+            "theta2, and row 37f is left out (erratum 3); at whole degrees 38a is abnormal with a4 = 10 in alone "
+            f"({whole[0]:.1f}; {whole[1]:.2f} and {whole[2]:.2f} with 20 and 30 in). 39a and 42a stay finite, as all five are "
+            "in the plane: the spikes of the forces come from the torque, which has no lever on the slider there",
         ),
     )
 

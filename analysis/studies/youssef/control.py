@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from math import pi, radians, tan
+from math import inf, pi, radians, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -142,10 +142,16 @@ def searched() -> tuple[float, float, float]:
 
 
 class Cam(NamedTuple):
-    """Plate cam: base radius, least radius of curvature of the convex pitch curve (cm), and the pitch curve (cm)."""
+    """Plate cam.
+
+    Its base radius and the least radii of curvature where its pitch curve is convex and where it is hollow (cm), the angle
+    over which it is hollow (deg), and the pitch curve (cm).
+    """
 
     base: float
     curvature: float
+    hollow_curvature: float
+    hollow_deg: float
     curve: NDArray[np.complex128]
 
 
@@ -159,7 +165,14 @@ def cam(series: FourierSeries) -> Cam:
     base = float((np.abs(rate) / tan(PRESSURE) - lift).max())
     r = base + lift
     curvature = (r**2 + 2.0 * rate**2 - r * change) / (r**2 + rate**2) ** 1.5
-    return Cam(base, 1.0 / float(curvature.max()), r * np.exp(1j * angle))
+    hollow = curvature < 0.0
+    return Cam(
+        base=base,
+        curvature=1.0 / float(curvature.max()),
+        hollow_curvature=-1.0 / float(curvature.min()) if hollow.any() else inf,
+        hollow_deg=360.0 * float(hollow[:-1].mean()),
+        curve=r * np.exp(1j * angle),
+    )
 
 
 def rms(values: NDArray[np.float64]) -> float:
@@ -207,11 +220,16 @@ def compute() -> StudyResult:
         )
     }
     faster_error = changes.pop("twice the speed")
-    by_print = min(readings(ROCKER))
+    by_print = error_of(ROCKER, readings(ROCKER)[0])
     left = " and ".join(f"{error[-1] / error[0]:.2f} ({n} harmonics)" for n, error in errors.items())
+    hollow = " and ".join(
+        f"that of {n} is hollow over {c.hollow_deg:.0f} deg, with a least radius of {c.hollow_curvature:.0f} cm"
+        for n, c in cams.items()
+        if c.hollow_deg
+    )
     small = (
-        f"{ROLLER:g} cm, the radius of the roller, our choice: a convex pitch curve is nowhere sharper; the pressure angle is "
-        "within 30 deg, the usual limit of a sliding follower"
+        f"{ROLLER:g} cm, the radius of the roller, our choice: the pitch curve is nowhere sharper where it is convex "
+        f"({hollow}); the pressure angle is within 30 deg, the usual limit of a sliding follower"
     )
     differs = (
         "twice the friction in the guide, coupler and slider a tenth heavier, and a load of "

@@ -130,6 +130,12 @@ def constant_parts() -> dict[str, float]:
     return found
 
 
+def scanned_mean(inertia_ratio: float) -> float:
+    """Return Q1 over A1 by the term of Q1 in the scan that a massless coupler leaves: p45 sigma2 I4 cos(alpha3), sigma3 = 1."""
+    r = ratios(chapter_4(inertia_ratio))
+    return r.p45 * r.sigma2 * r.inertia_ratio * cos(DATUM.coupler) / printed(r).spring.mean
+
+
 def _over(part: FourierSeries, by: FourierSeries) -> tuple[float, float, float]:
     """Return mean, cosine and sine of a quotient to first order."""
     mean = part.mean / by.mean
@@ -259,7 +265,10 @@ def compute() -> StudyResult:
                     ),
                     near("zeta' without a damper", 1.0, 0.0, LIMIT, why="M' zeta' is missing"),
                 ),
-                "G1 and Q1 vanish under these conditions; the terms with the coupler's mass and with r4 are not judged",
+                "R1 and S1 are read from U and V of appendix 2 (L8449-8450): the scan's lines of them (L2786-2794) are not "
+                "whole and have terms in r4 and mr3 only, which vanish under these conditions. G1 vanishes too; Q1 in the "
+                "scan has a term in I4 (L2781), where the right equation has none of first order and the programs have no "
+                "mean of the force: it is not judged, nor are the terms with the coupler's mass and with r4",
             ),
             Statement(
                 "The coefficients B1, C1, H1, P1, [Q1], E1 and F1 are much smaller than those of A1 a[nd] D1 by at "
@@ -275,7 +284,9 @@ def compute() -> StudyResult:
                 "Q1 over A1; at I4 = 2, the greatest of Fig 4.3 to 5.4, and of rig 2, whose coupler has mass",
                 f"{SMALL:g}, the rule for *small*, as *<<* says",
                 tuple(at_most(name, SMALL, x) for name, x in constant_parts().items()),
-                "G1 and Q1 as printed vanish with a massless coupler; what is left is of second order in the crank's length",
+                "G1 as printed vanishes with a massless coupler; in the scan Q1 has a term in I4 (L2781), by which g0 would be "
+                f"{scanned_mean(2.0):.2g} of k0 at most; the programs have no mean of the force; what is left by the right "
+                "equation is of second order in the crank's length",
             ),
             Statement(
                 "[W]hich, if terms in the order of third and higher powers of [epsilon] are ignored, may be written "
