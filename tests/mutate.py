@@ -62,7 +62,9 @@ SWAPS = {
         "!": "",
     },
 }
-NO_CODE = re.compile(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\])*\"|^[ ]*#(?:\\\n|[^\n])*", re.DOTALL | re.MULTILINE)
+NO_CODE = re.compile(
+    r"/\*.*?\*/|//[^\n]*|'(?:\\.|[^'\\])+'|\"(?:\\.|[^\"\\])*\"|^[ ]*#(?:\\\n|[^\n])*", re.DOTALL | re.MULTILINE
+)
 
 
 @dataclass(frozen=True)

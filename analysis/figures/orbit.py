@@ -78,7 +78,8 @@ def _multipliers(orbit: PeriodicOrbit) -> Panel:
 
 def _title(orbit: PeriodicOrbit, period: float) -> str:
     speed = orbit.flow.period * orbit.turns / period
-    turns = "one turn" if orbit.turns == 1 else f"{orbit.turns} turns"
+    number = orbit.turns * orbit.flow.turns
+    turns = "one turn" if number == 1 else f"{number} turns"
     return f"Periodic motion of {turns} at {speed / RAD_S_PER_RPM:.5g} rpm, {orbit.verdict().stability.value}"
 
 

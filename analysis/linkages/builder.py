@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,20 +58,46 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
         raise InputError(f"a case has one mechanism: leave out linkage, or published = {rest['published']!r}")
     if isinstance(own, Mapping):
         return {"published": _package(tables).mechanism().name, **rest}
-    path = Path(folder / own)
-    named = files.read_tables(path)
-    if not described_in(named):
-        raise _no_linkage(path)
+    path, named = _chain(folder / own)[0]
     base = with_linkage(named, path.parent)
-    return _over({name: value for name, value in base.items() if name not in ("title", "tune")}, rest)
+    base = _found_from({name: value for name, value in base.items() if name not in ("title", "tune")}, path.parent)
+    return _over(base, rest, ("run", "drive", *(name for name in base if name.endswith("Drive"))))
 
 
-def _over(base: Mapping[str, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with those of another file beneath them: entry by entry, but runs and drives as a whole."""
+def _chain(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
+    """Return the file that tables name, and the files that it names in turn, each with its tables, to the described linkage."""
+    found: list[tuple[Path, Mapping[str, Any]]] = []
+    while True:
+        if any(path.resolve() == known.resolve() for known, _ in found):
+            raise InputError(
+                f"{path} names itself as the file of its linkage: one of these files must have a table [linkage]"
+            )
+        tables = files.read_tables(path)
+        if not described_in(tables):
+            raise _no_linkage(path)
+        found.append((path, tables))
+        if not isinstance(tables[LINKAGE], str):
+            return found
+        path = path.parent / tables[LINKAGE]
+
+
+def _found_from(table: Any, folder: Path) -> Any:
+    """Return tables whose files are found from anywhere."""
+    if not isinstance(table, Mapping):
+        return table
+    return {
+        name: str((folder / value).resolve())
+        if name == "file" and isinstance(value, str)
+        else _found_from(value, folder)
+        for name, value in table.items()
+    }
+
+
+def _over(base: Mapping[str, Any], tables: Mapping[str, Any], whole: Collection[str] = ()) -> dict[str, Any]:
+    """Return tables with those of another file beneath them: entry by entry, but some as a whole."""
     merged = {**base, **tables}
     for name, table in tables.items():
-        whole = name == "run" or name.lower().endswith("drive")
-        if not whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
+        if name not in whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
             merged[name] = _over(below, table)
     return merged
 
@@ -103,13 +129,7 @@ def load_package(path: str | Path) -> Package:
     ------
     InputError, LinkageError, ParameterError
     """
-    tables = files.read_tables(path)
-    while isinstance(tables.get(LINKAGE), str):
-        path = Path(path).parent / tables[LINKAGE]
-        tables = files.read_tables(path)
-    if not isinstance(tables.get(LINKAGE), Mapping) or not described_in(tables):
-        raise _no_linkage(path)
-    return _package(tables)
+    return _package(_chain(Path(path))[-1][1])
 
 
 #: A number in SI, or a text with a unit such as "50 mm".

@@ -126,7 +126,7 @@ def tuning_case_from(
     wanted = read(TuneTable, tables.pop("tune"), "tune")
     overrides, linked = {"run": {"stop_time": 1.0}}, with_linkage(tables, folder)
     if wanted.speeds is not None:
-        if isinstance(tables.get("drive"), Mapping) and "torque" in tables["drive"]:
+        if isinstance(linked.get("drive"), Mapping) and "torque" in linked["drive"]:
             raise InputError(
                 "drive.torque drives the crank, so that its speed follows: leave out tune.speeds and give what "
                 "is set, such as over = 'drive.torque' and between = ['0.1 N*m', '0.2 N*m']; or leave out drive.torque"

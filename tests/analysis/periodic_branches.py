@@ -25,6 +25,7 @@ def orbit(amplitude: float, largest: float, start: float | None = None) -> Any:
         largest=largest,
         start=np.array([amplitude if start is None else start, 0.0]),
         swing=("u", "m"),
+        flow=SimpleNamespace(turns=1),
     )
 
 

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from analysis.linear import find_equilibria, find_equilibrium
-from analysis.linkages import linkage
+from analysis.linkages import linkage, load_linkage
 from analysis.mechanisms import PUBLISHED
 from analysis.periodic import Drive, basins, find_orbit, find_orbits, frequency_response, orbit_of, sweep
 from analysis.run import load_case, load_parameters
@@ -154,6 +154,10 @@ def test_a_case_has_what_stands_in_the_file_of_its_linkage(tmp_path: Path) -> No
     case.write_text('linkage = "rod.toml"\npublished = "table-3.1"\n')
     with pytest.raises(InputError, match=r"one mechanism: leave out linkage, or published = 'table-3.1'"):
         load_case(case)
+    case.write_text('linkage = "case.toml"\n')
+    for load in (load_case, load_linkage):
+        with pytest.raises(InputError, match="names itself as the file of its linkage"):
+            load(case)
     case.write_text("linkage = 7\n")
     with pytest.raises(ParameterError, match="linkage is 7: it must be the name of a file"):
         load_case(case)

@@ -226,16 +226,23 @@ def operating_point(parameters: Parameters, drive: Drive) -> OperatingPoint:
 
 
 def _repeats(point: OperatingPoint) -> bool:
-    """Return whether a mechanism is the same after a period; so counts one that can be joined at none of the angles tried."""
+    """Return whether a mechanism is the same after a period, and after a whole turn of each link that swings.
+
+    So counts one that can be joined at none of the angles tried.
+    """
     mechanism, flow, rates = point.mechanism, point.flow, len(point.mechanism.freedoms)
     modes, u, p = tuple(map(float, flow.modes)), point.vector[: flow.inputs], point.parameters.constants()
     way = np.zeros(mechanism.size)
     way[flow.crank] = flow.period
     way[list(flow.others)] = flow.period * point.vector[flow.held + rates :]
+    turned = [
+        np.eye(mechanism.size)[n] * mechanism.freedoms[n].period for n in flow.free if mechanism.freedoms[n].period
+    ]
     x, found = np.array(mechanism.state(mechanism.first_set.initial)), []
     for share in (0.1234, 0.3719, 0.6283, 0.8871):
-        with suppress(ArithmeticError, ValueError):
-            found.append(repeats(mechanism, p, modes, x + share * way, u, way))
+        for own in (way, *turned):
+            with suppress(ArithmeticError, ValueError):
+                found.append(repeats(mechanism, p, modes, x + share * way, u, own))
     return all(found)
 
 

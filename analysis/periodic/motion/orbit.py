@@ -363,7 +363,7 @@ def orbit_of(
     ----------
     parameters, drive
     turns : int
-        Turns of the crank in one period.
+        Turns of the crank in one period; where gears or other cranks make their common period longer, these.
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0; without it the coordinates with which the mechanism starts, at rest.
     settle : bool
@@ -476,10 +476,14 @@ def resting(parameters: Parameters, drive: Drive, initial: Any, speed: float | N
     Raises InputError if a crank speed is needed.
     """
     mechanism = mechanism_of(parameters)
-    flow = drive.flow(mechanism)
+    flow, ratios, state = drive.flow(mechanism), drive.turning(mechanism), mechanism.state(initial)
     guess = first_guess(flow, drive, None if speed is None else [*flow.rest[:-1], speed])
-    state = mechanism.state(initial)
-    return [*(state[n] for n in flow.free), *guess[len(flow.free) :].tolist()]
+    for place, number in enumerate(flow.free):
+        # what another crank has beyond its ratio to the crank
+        guess[place] = state[number] - ratios.get(number, 0) * state[flow.crank]
+        if speed is not None and number in ratios:
+            guess[len(flow.free) + place] = ratios[number] * speed
+    return [float(value) for value in guess]
 
 
 def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatArray | None = None) -> None:
