@@ -97,7 +97,7 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     wanted = f"be a number in {unit}" if unit != "1" else "be a number"
     if unit != "1":
         wanted += f", or a text with a unit of that kind{f', such as {_USUAL[unit]}' if unit in _USUAL else ''}"
-    if isinstance(value, bool) or not isinstance(value, (int, float, str, Real)):  # the last for NumPy's numbers
+    if isinstance(value, bool) or not isinstance(value, (Real, str)):
         raise ParameterError(name, value, wanted)
     if isinstance(value, str):
         if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -66,21 +66,19 @@ class Chosen:
         """Return a guess of the orbit's start: rest at the coordinates of the case, with a crank speed under a torque."""
         from ..periodic import resting
 
-        guess = partial(resting, self.case.parameters, drive, self.case.initial)
+        mechanism, speed = mechanism_of(self.case.parameters), None
         if drive.speed_drive:
             if self.guess_speed is not None:
                 raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
-            return guess()
-        mechanism = mechanism_of(self.case.parameters)
-        flow = drive.flow(mechanism)
-        speed = float(getattr(self.case.initial, mechanism.freedoms[flow.crank].initial[1]))
-        if self.guess_speed is not None:
+        elif self.guess_speed is not None:
             speed = quantity(self.guess_speed, "rad/s", "--guess-speed")
-        elif speed <= 0.0:
-            if drive.motor is None:
+        else:
+            crank = mechanism.freedoms[drive.flow(mechanism).crank]
+            begins = float(getattr(self.case.initial, crank.initial[1]))
+            if begins <= 0.0 and drive.motor is None:
                 raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
-            return guess()
-        return guess(speed)
+            speed = begins if begins > 0.0 else None
+        return resting(self.case.parameters, drive, self.case.initial, speed)
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report the files and what could not be computed, and exit with what that means."""

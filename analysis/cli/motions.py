@@ -105,8 +105,8 @@ def _motions(title: str, found: Sequence[Orbits]) -> None:
         stays = word is not Stability.UNSTABLE
         number += stays
         size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}"
-        of = str(orbit.turns * orbit.flow.turns)
-        rows.append((str(number) if stays else "", of, size_of_it, word.value, f"{orbit.largest:.6g}"))
+        shown = str(number) if stays else ""
+        rows.append((shown, str(orbit.crank_turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
     show_table(title, headings, rows, words=("stability",))
     for turns, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"

@@ -203,8 +203,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
         events = [f"{s.kind.value} at {factor * s.parameter:.6g} ({_form(response.family, s)})" for s in branch.special]
         begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
         ends = "closed" if branch.closed else ends
-        turns = str(branch.turns * branch.orbits[0].flow.turns)
-        rows.append((str(number), turns, str(len(branch)), begins, ends, shares, "; ".join(events)))
+        rows.append((str(number), str(branch.crank_turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
     family = response.family
     over = "speed" if speed_names(mechanism_of(family.parameters)) == (family.name,) else family.name
     table = (

@@ -78,8 +78,7 @@ def _multipliers(orbit: PeriodicOrbit) -> Panel:
 
 def _title(orbit: PeriodicOrbit, period: float) -> str:
     speed = orbit.flow.period * orbit.turns / period
-    number = orbit.turns * orbit.flow.turns
-    turns = "one turn" if number == 1 else f"{number} turns"
+    turns = "one turn" if orbit.crank_turns == 1 else f"{orbit.crank_turns} turns"
     return f"Periodic motion of {turns} at {speed / RAD_S_PER_RPM:.5g} rpm, {orbit.verdict().stability.value}"
 
 

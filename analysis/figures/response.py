@@ -273,7 +273,7 @@ def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
     table, torque = branch.columns(), "greatest crank torque [N.m]"
     return {
         "branch": np.full(len(branch), number + 1),
-        "turns in a period": np.full(len(branch), branch.turns * branch.orbits[0].flow.turns),
+        "turns in a period": np.full(len(branch), branch.crank_turns),
         "stability": _words(branch),
         "largest multiplier": branch.largest_multiplier,
     } | ({torque: table[torque]} if torque in table else {})
@@ -298,7 +298,7 @@ def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump
         if those:
             hover: dict[str, ArrayLike] = {
                 "branch": [n for n, _, _ in those],
-                "turns in a period": [b.turns * b.orbits[0].flow.turns for _, b, _ in those],
+                "turns in a period": [b.crank_turns for _, b, _ in those],
                 "largest multiplier": [s.orbit.largest for _, _, s in those],
                 "here": [says.get(s.parameter, "") if kind is Crossing.FOLD else "" for _, _, s in those],
             }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,15 +53,20 @@ def with_linkage(tables: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
         raise ParameterError(LINKAGE, tables[LINKAGE], "be the name of a file, or a table that describes a linkage")
     if not described_in(tables):
         return tables
-    own, rest = tables[LINKAGE], {name: value for name, value in tables.items() if name != LINKAGE}
-    if "published" in rest:
-        raise InputError(f"a case has one mechanism: leave out linkage, or published = {rest['published']!r}")
-    if isinstance(own, Mapping):
-        return {"published": _package(tables).mechanism().name, **rest}
-    path, named = _chain(folder / own)[0]
-    base = with_linkage(named, path.parent)
-    base = _found_from({name: value for name, value in base.items() if name not in ("title", "tune")}, path.parent)
-    return _over(base, rest, ("run", "drive", *(name for name in base if name.endswith("Drive"))))
+    own = tables[LINKAGE]
+    named = _chain(folder / own) if isinstance(own, str) else []
+    made: dict[str, Any] = {}
+    for path, below in reversed(named):
+        made = _over(made, _found_from(_beside(below, "title", "tune"), path.parent))
+    rest = _beside(tables)
+    return {"published": _package(named[-1][1] if named else tables).mechanism().name, **_over(made, rest)}
+
+
+def _beside(tables: Mapping[str, Any], *others: str) -> dict[str, Any]:
+    """Return the tables beside a linkage, without others; raises InputError if they name a published set as well."""
+    if "published" in tables:
+        raise InputError(f"a case has one mechanism: leave out linkage, or published = {tables['published']!r}")
+    return {name: value for name, value in tables.items() if name not in (LINKAGE, *others)}
 
 
 def _chain(path: Path) -> list[tuple[Path, Mapping[str, Any]]]:
@@ -93,12 +98,13 @@ def _found_from(table: Any, folder: Path) -> Any:
     }
 
 
-def _over(base: Mapping[str, Any], tables: Mapping[str, Any], whole: Collection[str] = ()) -> dict[str, Any]:
-    """Return tables with those of another file beneath them: entry by entry, but some as a whole."""
+def _over(base: Mapping[str, Any], tables: Mapping[str, Any], *, top: bool = True) -> dict[str, Any]:
+    """Return tables with those of another file beneath them: entry by entry, but at the top runs and drives as a whole."""
     merged = {**base, **tables}
     for name, table in tables.items():
-        if name not in whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
-            merged[name] = _over(below, table)
+        whole = top and (name in ("run", "drive") or name.endswith("Drive"))
+        if not whole and isinstance(table, Mapping) and isinstance(below := base.get(name), Mapping):
+            merged[name] = _over(below, table, top=False)
     return merged
 
 

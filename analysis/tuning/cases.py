@@ -95,10 +95,8 @@ def _start(case: Case, drive: Drive) -> list[float]:
     """Return a guess of the motion: rest at the coordinates of the case, under a torque with its initial crank speed."""
     mechanism = mechanism_of(case.parameters)
     flow, state = drive.flow(mechanism), mechanism.state(case.initial)
-    if not (flow.torque and drive.motor is None):
-        return resting(case.parameters, drive, case.initial)
-    speed = state[flow.places[-1]]
-    if not speed > 0.0:
+    speed = state[flow.places[-1]] if flow.torque and drive.motor is None else None
+    if speed is not None and not speed > 0.0:
         name = mechanism.freedoms[flow.crank].initial[1]
         raise InputError(f"under a torque the speed of the crank must be guessed: give initial.{name}, above zero")
     return resting(case.parameters, drive, case.initial, speed)

@@ -25,7 +25,7 @@ def orbit(amplitude: float, largest: float, start: float | None = None) -> Any:
         largest=largest,
         start=np.array([amplitude if start is None else start, 0.0]),
         swing=("u", "m"),
-        flow=SimpleNamespace(turns=1),
+        crank_turns=1,
     )
 
 

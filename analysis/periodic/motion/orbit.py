@@ -219,7 +219,7 @@ class PeriodicOrbit(Shown):
             swing = f"; amplitude of {turn.swing} {turn.amplitude:.4g} {unit}"
         except LinkworkError as error:
             said, swing = f" that cannot be followed ({error})", ""
-        turns = format_count(self.turns * self.flow.turns, "turn")
+        turns = format_count(self.crank_turns, "turn")
         others = f"; {format_count(self.others, 'other motion')} there: find_orbits" if self.others else ""
         return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 
@@ -243,6 +243,11 @@ class PeriodicOrbit(Shown):
             self._kept["scale"] = self.point.scale(self.start)
         scale: FloatArray = self._kept["scale"]
         return scale
+
+    @property
+    def crank_turns(self) -> int:
+        """Turns of the crank in a period of the motion: of each common period several with gears or other cranks."""
+        return self.turns * self.flow.turns
 
     @property
     def swing(self) -> tuple[str, str]:
@@ -440,30 +445,32 @@ def approach(
     return start if status == Status.DONE else None
 
 
-def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None) -> FloatArray:
+def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float | None = None) -> FloatArray:
     """Return the guess for Newton's method: ``start``, or else rest at the coordinates with which the mechanism starts.
 
-    The crank then has a speed of the prescribed drive or motor.
+    The crank then has the speed of the prescribed drive, or under a torque ``speed`` (rad/s) or one of the motor.
 
     Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
     """
     if start is None:
         guess = flow.rest.copy()
         if flow.torque:
-            if drive.motor is None:
-                raise InputError(
-                    f"under a torque alone the {flow.labels[-1]} is needed: give start = ({', '.join(flow.labels)})"
-                )
-            guess[-1] = drive.motor.synchronous_speed * (1.0 - 0.5 * drive.motor.breakdown_slip)
-        speed, rates = drive.speed or guess[-1], len(flow.mechanism.freedoms)
+            if speed is None:
+                if drive.motor is None:
+                    raise InputError(
+                        f"under a torque alone the {flow.labels[-1]} is needed: give start = ({', '.join(flow.labels)})"
+                    )
+                speed = drive.motor.synchronous_speed * (1.0 - 0.5 * drive.motor.breakdown_slip)
+            guess[-1] = speed
+        turning, rates = drive.speed or guess[-1], len(flow.mechanism.freedoms)
         for number, ratio in drive.turning(flow.mechanism).items():
             if number in flow.free:
-                guess[flow.places.index(rates + number)] = ratio * speed
-        return guess
-    guess = np.array(start, dtype=float)
-    if guess.shape != (flow.size,) or not np.isfinite(guess).all():
-        names = ", ".join(f"{label} [{unit}]" for label, (_, unit) in zip(flow.labels, flow.components))
-        raise InputError(f"start is {start}: it must be {flow.size} finite numbers, {names}")
+                guess[flow.places.index(rates + number)] = ratio * turning
+    else:
+        guess = np.array(start, dtype=float)
+        if guess.shape != (flow.size,) or not np.isfinite(guess).all():
+            names = ", ".join(f"{label} [{unit}]" for label, (_, unit) in zip(flow.labels, flow.components))
+            raise InputError(f"start is {start}: it must be {flow.size} finite numbers, {names}")
     if flow.torque and not guess[-1] > 0.0:
         raise InputError(f"{flow.labels[-1]} at the start is {guess[-1]} rad/s: it must be above zero")
     return guess
@@ -477,12 +484,9 @@ def resting(parameters: Parameters, drive: Drive, initial: Any, speed: float | N
     """
     mechanism = mechanism_of(parameters)
     flow, ratios, state = drive.flow(mechanism), drive.turning(mechanism), mechanism.state(initial)
-    guess = first_guess(flow, drive, None if speed is None else [*flow.rest[:-1], speed])
-    for place, number in enumerate(flow.free):
-        # what another crank has beyond its ratio to the crank
-        guess[place] = state[number] - ratios.get(number, 0) * state[flow.crank]
-        if speed is not None and number in ratios:
-            guess[len(flow.free) + place] = ratios[number] * speed
+    guess = first_guess(flow, drive, None, speed)
+    # of another crank what it has beyond its ratio to the crank
+    guess[: len(flow.free)] = [state[n] - ratios.get(n, 0) * state[flow.crank] for n in flow.free]
     return [float(value) for value in guess]
 
 

@@ -79,6 +79,11 @@ class Branch(Shown):
         return len(self.orbits)
 
     @property
+    def crank_turns(self) -> int:
+        """Turns of the crank in a period: see `PeriodicOrbit.crank_turns`."""
+        return self.orbits[0].crank_turns
+
+    @property
     def amplitude(self) -> NDArray[np.float64]:
         """Half the range of the first free coordinate at each point, of a slider position (m); shape (m,)."""
         label, unit = self.orbits[0].swing
@@ -109,7 +114,7 @@ class Branch(Shown):
         signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
         first = {
             f"{self.family.name}{unit}": self.parameter,
-            "turns in a period [1]": np.full(len(self), float(self.turns * self.orbits[0].flow.turns)),
+            "turns in a period [1]": np.full(len(self), float(self.crank_turns)),
             "largest multiplier [1]": largest,
             "stable (1), marginal (0), unstable (-1)": signs,
         }

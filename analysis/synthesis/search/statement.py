@@ -85,7 +85,8 @@ class Statement:
         quicker.
     judged : bool
         Whether linkages are only judged. For a search the transmission angle is bounded at few rotations between two
-        stations, with a margin that guarantees the bound between them; judged it is at its extremes, without one.
+        stations, with a margin that guarantees the bound between them; judged it is at its extremes, without one, or under a
+        moving pivot at many rotations.
     """
 
     def __init__(
