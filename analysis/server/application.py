@@ -242,7 +242,10 @@ class Server:
 
     def stop(self) -> None:
         """End `run`."""
-        self._server.trigger.pull_trigger(self._close)
+        trigger = self._server.trigger
+        with trigger.lock:  # or the loop, woken by an answer just given, closes the trigger before it is pulled
+            trigger.thunks.append(self._close)
+            trigger.pull_trigger()
 
     def _close_silent(self, now: float) -> None:
         """Close connections that have said nothing for some time and wait for no answer; waitress calls this each second."""

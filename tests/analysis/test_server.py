@@ -222,6 +222,19 @@ def test_connections_that_say_nothing_make_room(monkeypatch: pytest.MonkeyPatch,
             assert time.monotonic() - begun < 10.0
 
 
+def test_a_loop_that_wakes_while_it_is_stopped_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    for server in _running(PAGE_TEXT):  # which stops it
+        trigger = server._server.trigger
+        pull = trigger._physical_pull
+
+        def late(pull: Callable[[], None] = pull) -> None:
+            pull()  # as an answer that was just given does
+            time.sleep(0.05)
+            pull()
+
+        monkeypatch.setattr(trigger, "_physical_pull", late)
+
+
 def test_kinds_of_jobs_are_known_without_their_modules() -> None:
     assert set(application.JOB_KINDS) == set(JOBS)
 
