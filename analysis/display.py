@@ -43,6 +43,11 @@ def format_range(values: Iterable[float], unit: str) -> str:
     return f"{numbers} {unit}".rstrip()
 
 
+def format_turns(turns: int) -> str:
+    """Format a number of turns: "one turn", "2 turns"."""
+    return "one turn" if turns == 1 else f"{turns} turns"
+
+
 def format_count(count: int, what: str) -> str:
     """Format a count with its noun: "1 branch", "2 branches", "no branches"."""
     several = (

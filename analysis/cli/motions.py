@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     default=4,
     show_default=True,
     type=click.IntRange(1, 16),
-    help="Motions of up to so many turns are sought.",
+    help="Motions of up to so many turns are sought, or common periods of gears or several cranks.",
 )
 @click.option("--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Starts along each axis.")
 @click.option(
@@ -55,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import format_turns, orbits_of, unsought
+    from ..periodic import orbits_of, turns_sought, unsought
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -66,10 +66,11 @@ def basins(
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
     ]
     found = [orbits_of(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
-    _motions(f"{chosen.case.title}: periodic motions of {format_turns(turns)}", found)
+    of = turns_sought(flow, turns)
+    _motions(f"{chosen.case.title}: periodic motions of {of}", found, flow.turns)
     if not any(part.stable for part in found):
         also = unsought(parameters, drive)
-        raise InputError(f"no stable motion of {format_turns(turns)} was found: no start ends in one{also}")
+        raise InputError(f"no stable motion of {of} was found: no start ends in one{also}")
     picture = find_basins(
         parameters,
         drive,
@@ -93,8 +94,8 @@ def basins(
     chosen.finish([picture.to_csv(f"{stem}.csv"), *save_picture(drawn, stem, html=html)], ())
 
 
-def _motions(title: str, found: Sequence[Orbits]) -> None:
-    """Print all motions at one speed by the turns of their periods, and whether others may exist."""
+def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
+    """Print all motions at one speed by the turns of their periods, multiples of ``common``, and whether others may exist."""
     from ..periodic import Stability
 
     headings = ("motion", "turns", "amplitude", "stability", "largest multiplier")
@@ -108,12 +109,12 @@ def _motions(title: str, found: Sequence[Orbits]) -> None:
         shown = str(number) if stays else ""
         rows.append((shown, str(orbit.crank_turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
     show_table(title, headings, rows, words=("stability",))
-    for turns, part in enumerate(found, start=1):
+    for periods, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"
         if part.index != 1:
             sure = (
                 "there may be another motion, or one at which the links lock: motions come and go in pairs, a stable and an "
                 f"unstable one, and these do not pair up (sum of indices {part.index}, which is 1 of all motions)"
             )
-        of = "" if len(found) == 1 else f"of {format_count(turns, 'turn')}: "
+        of = "" if len(found) == 1 else f"of {format_count(periods * common, 'turn')}: "
         say(of + sure)

@@ -308,7 +308,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
     names = [
-        f"ends in motion {n}{'' if orbit.turns == 1 else f' of {orbit.turns} turns'}, amplitude of {spoken(name)} "
+        f"ends in motion {n}{'' if orbit.turns == 1 else f' of {orbit.crank_turns} turns'}, amplitude of {spoken(name)} "
         f"{factor * orbit.amplitude:.3g} {shown}"
         for n, orbit in enumerate(found.motions, start=1)
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..display import format_turns
 from ..mechanisms import mechanism_of
 from ..periodic import Orbits, PeriodicOrbit
 from ..units import RAD_S_PER_RPM
@@ -78,7 +79,7 @@ def _multipliers(orbit: PeriodicOrbit) -> Panel:
 
 def _title(orbit: PeriodicOrbit, period: float) -> str:
     speed = orbit.flow.period * orbit.turns / period
-    turns = "one turn" if orbit.crank_turns == 1 else f"{orbit.crank_turns} turns"
+    turns = format_turns(orbit.crank_turns)
     return f"Periodic motion of {turns} at {speed / RAD_S_PER_RPM:.5g} rpm, {orbit.verdict().stability.value}"
 
 

@@ -13,6 +13,7 @@ from scipy.signal import find_peaks
 from shapely import LineString, distance
 from shapely import points as make_points
 
+from ..display import format_turns
 from ..mechanisms import mechanism_of
 from ..periodic import (
     FORCE,
@@ -164,7 +165,7 @@ def _amplitudes(
         if branch.turns > 1:
             colour = COLOURS[(branch.turns.bit_length() - 1) % len(COLOURS)]
             x, y = look.factor * branch.parameter, look.scale * branch.amplitude
-            curves.append(_letters(x, y, str(branch.turns), colour=colour))
+            curves.append(_letters(x, y, str(branch.crank_turns), colour=colour))
     curves += _visible(others, branches, look, top)
     curves += _specials(branches, look, found)
     labels = [label for branch in branches if branch.turns == 1 for label in _peaks(branch, look, top)]
@@ -320,7 +321,7 @@ def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump
 
 def _keys(branches: Sequence[Branch]) -> list[Curve]:
     """Return the entries of the legend: turns of the period if there are several, and stability."""
-    turns = sorted({branch.turns for branch in branches})
+    turns = sorted({(branch.turns, branch.crank_turns) for branch in branches})
     words = {str(word) for branch in branches for word in _words(branch)}
     keys = []
     if len(turns) > 1:
@@ -329,10 +330,10 @@ def _keys(branches: Sequence[Branch]) -> list[Curve]:
                 x=[],
                 y=[],
                 colour=COLOURS[(n.bit_length() - 1) % len(COLOURS)],
-                label="period of one turn" if n == 1 else f"period of {n} turns",
-                marker="" if n == 1 else f"${n}$",
+                label=f"period of {format_turns(shown)}",
+                marker="" if n == 1 else f"${shown}$",
             )
-            for n in turns
+            for n, shown in turns
         ]
     colour = "0.3" if len(turns) > 1 else COLOURS[0]
     keys += [
@@ -457,10 +458,10 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     if y_range:
         width = look.factor * float(np.ptp(np.concatenate([branch.parameter for _, branch in single])))
         curves += _apart(letters, width, y_range[1] / y_range[0])
-    one = f",\none turn [{look.shown}]" if len(single) < len(branches) else f"\n[{look.shown}]"
+    of = f",\n{format_turns(single[0][1].crank_turns)} " if len(single) < len(branches) else "\n"
     return Panel(
         x_label=look.axis,
-        y_label=f"harmonics of {look.what}{one}",
+        y_label=f"harmonics of {look.what}{of}[{look.shown}]",
         curves=curves,
         logarithmic="y",
         y_range=y_range,

@@ -18,14 +18,14 @@ FAMILY = Family(
 )
 
 
-def orbit(amplitude: float, largest: float, start: float | None = None) -> Any:
+def orbit(amplitude: float, largest: float, start: float | None = None, *, crank_turns: int = 1) -> Any:
     """What is read of an orbit."""
     return SimpleNamespace(
         amplitude=amplitude,
         largest=largest,
         start=np.array([amplitude if start is None else start, 0.0]),
         swing=("u", "m"),
-        crank_turns=1,
+        crank_turns=crank_turns,
     )
 
 
@@ -36,6 +36,7 @@ def branch(
     special: Sequence[tuple[Crossing, float, float, int]] = (),
     *,
     turns: int = 1,
+    common: int = 1,
 ) -> Branch:
     """A branch of amplitudes (m); special points by kind, parameter, amplitude and the point that they come after."""
     x, a = np.asarray(parameter, dtype=float), np.asarray(amplitude, dtype=float)
@@ -44,7 +45,7 @@ def branch(
         family=FAMILY,
         turns=turns,
         parameter=x,
-        orbits=tuple(orbit(*values) for values in zip(a.tolist(), rho.tolist())),
+        orbits=tuple(orbit(*values, crank_turns=common * turns) for values in zip(a.tolist(), rho.tolist())),
         special=tuple(
             SpecialPoint(kind=kind, parameter=value, orbit=orbit(size, 1.0), after=after)
             for kind, value, size, after in special

@@ -94,6 +94,15 @@ def test_stability_and_special_points_are_told_without_colours(folded: Response,
     assert next(line.get_label() for line in axes[0].lines if line.get_marker() == "$2$") == "period of 2 turns"
 
 
+def test_the_legend_counts_the_turns_of_the_crank() -> None:
+    """Of a gear that is back after three turns the plain period has three."""
+    x = np.linspace(99.0, 101.0, 40)
+    axes = figures.plot(response(*(branch(x, n + x, 0.5, turns=n, common=3) for n in (1, 2)))).axes
+    keys = [(line.get_label(), line.get_marker()) for line in axes[0].lines if "period" in str(line.get_label())]
+    assert keys == [("period of 3 turns", "None"), ("period of 6 turns", "$6$")]
+    assert "3 turns [mm]" in axes[1].get_ylabel()
+
+
 def test_harmonics_have_their_numbers(folded: Response, axes: list[Axes]) -> None:
     harmonics = axes[1]
     assert harmonics.get_ylabel() == "harmonics of u,\none turn [mm]"
@@ -325,6 +334,7 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
             swing=("q", "m"),
             flow=flow,
             turns=turns,
+            crank_turns=2 * turns,
             turn=lambda samples, turns=turns: SimpleNamespace(period=turns / 7.0),
         )
         for n, turns in ((1, 1), (2, 1), (3, 4))
@@ -341,7 +351,7 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
     (part,) = picture.parts
     said = part.hover["it"]
     assert said[0][0] == said[1][1] == "ends in motion 1, amplitude of q 10 mm"
-    assert said[0][1] == "ends in motion 2 of 4 turns, amplitude of q 30 mm"
+    assert said[0][1] == "ends in motion 2 of 8 turns, amplitude of q 30 mm"
     assert said[1][0] == "comes to the limit of assembly"
     assert list(part.classes) == [said[0][0], said[0][1], said[1][0]]
     assert part.values.tolist() == [[0, 1], [2, 0]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,18 @@ from scipy.optimize import brentq
 from analysis.linear import find_equilibria, find_equilibrium
 from analysis.linkages import linkage, load_linkage
 from analysis.mechanisms import PUBLISHED
-from analysis.periodic import Drive, basins, find_orbit, find_orbits, frequency_response, orbit_of, sweep
+from analysis.periodic import (
+    Drive,
+    basins,
+    ending,
+    find_orbit,
+    find_orbits,
+    frequency_response,
+    orbit_of,
+    sweep,
+    turns_sought,
+    with_isolas,
+)
 from analysis.run import load_case, load_parameters
 from analysis.tuning import Wish, load_tuning_case, tune
 from analysis.units import RAD_S_PER_RPM
@@ -85,6 +97,14 @@ def test_what_hangs_and_what_stands_are_two_motions_however_often_the_pin_has_tu
     angles = [found.coordinates[1] for found in find_equilibria(parameters)]
     assert sorted(abs(angle) for angle in angles) == pytest.approx([0.0, pi], abs=1e-9)
     assert abs(find_equilibrium(parameters).coordinates[1]) == pytest.approx(pi)
+
+
+def test_a_branch_is_the_same_after_whole_turns() -> None:
+    hanging = yoke("yoke-of-a-response").parameters
+    response = frequency_response(hanging, "100 rpm", "101 rpm", start=[2.0 * pi, 0.0], greatest_step=0.2, doublings=0)
+    (branch,) = response.branches
+    assert branch.orbits[0].start[0] == pytest.approx(2.0 * pi)
+    assert len(with_isolas(response, places=1, greatest_step=0.2).branches) == 2  # and that on which it stands
 
 
 def test_a_slider_that_is_measured_from_elsewhere_has_the_same_motion() -> None:
@@ -206,3 +226,17 @@ def test_turns_in_a_period_are_those_of_the_crank() -> None:
     assert "2 turns at" in repr(orbit)
     response = frequency_response("two-wheels", "300 rpm", "302 rpm", doublings=0)
     assert (response.branches[0].columns()["turns in a period [1]"] == 2.0).all()
+    (speeds,) = (
+        v for name, v in response.branches[0].columns().items() if name.startswith("mean ") and "[rad/s]" in name
+    )
+    assert speeds == pytest.approx(response.branches[0].parameter)
+    assert (sweep("two-wheels", "300 rpm").turns == 2).all()
+    # order 1 is once in each turn of the crank, as the second of the common period
+    turn = orbit.turn()
+    twice = 2.0 * abs(np.fft.rfft(turn["bob.angle"])[1:3]) / len(turn.angle)
+    assert [turn.harmonic("bob.angle", order) for order in (0.5, 1)] == pytest.approx(twice)
+    part = replace(response.branches[0], reason="it ends")
+    assert ending(replace(part, turns=2, orbits=tuple(replace(o, turns=2) for o in part.orbits))).startswith(
+        "the branch with a period of 4 turns"
+    )
+    assert turns_sought(orbit.flow, 1) == "2 turns"

@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from ...display import Shown, format_count
+from ...display import Shown, format_count, format_turns
 from ...files import Whole, write_csv
-from ...mechanisms import Parameters
+from ...mechanisms import Parameters, mechanism_of
 from ...run import takes_published
 from ...units import Amount, pair
 from ..motion.discretisation import OperatingPoint, operating_point
 from ..motion.drive import Drive, coordinate_ranges
 from ..motion.floquet import TOLERANCE, multipliers
-from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL
+from ..motion.flow import GAP, IN_LANES, PLAIN, VARIATIONAL, Flow
 from ..motion.orbit import PeriodicOrbit, require_turns
 from ..motion.search import Orbits, orbits_of, unsought
 from ..motion.variables import Plane
@@ -310,8 +310,8 @@ def basins(
     found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        also = unsought(parameters, drive)
-        raise InputError(f"there is no stable motion of {format_turns(turns)} here: no start ends in one{also}")
+        of, also = turns_sought(drive.flow(mechanism_of(parameters)), turns), unsought(parameters, drive)
+        raise InputError(f"there is no stable motion of {of} here: no start ends in one{also}")
     first = motions[0].start
     low, high = (side[0] for side in coordinate_ranges(parameters, drive, first))
     rest, scale, half = float(motions[0].flow.rest[0]), motions[0].scale, len(first) // 2
@@ -340,9 +340,9 @@ def basins(
     return Basins(position=across, rate=up, ends=met, found=found, computed=computed)
 
 
-def format_turns(turns: int) -> str:
-    """Return "one turn" or "up to ... turns"."""
-    return "one turn" if turns == 1 else f"up to {turns} turns"
+def turns_sought(flow: Flow, turns: int) -> str:
+    """Return the crank's turns in up to so many common periods in words: "one turn", "up to 4 turns"."""
+    return ("" if turns == 1 else "up to ") + format_turns(turns * flow.turns)
 
 
 def _ends(point: OperatingPoint, known: FloatArray, across: FloatArray, rate: float) -> FloatArray:

@@ -176,7 +176,7 @@ class PeriodicOrbit(Shown):
     parameters : parameters of a mechanism
     drive : Drive
     turns : int
-        Turns of the crank in one period.
+        Common periods of the cranks and gears in one period, of each of which `crank_turns` counts the turns of the crank.
     start : ndarray, shape (n,)
         y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and u'
         (m/s), and under a torque the crank speed (rad/s).
@@ -303,7 +303,7 @@ class PeriodicOrbit(Shown):
             states=states,
             inputs=channels,
             values=values[:, keep],
-            turns=self.turns,
+            turns=self.crank_turns,
             modes=flow.modes,
             names=tuple(mechanism.output_names[n] for n in keep),
             swing=flow.components[0][0],
@@ -513,7 +513,7 @@ def require_turns(turns: int, point: OperatingPoint | None = None, start: FloatA
     ]
     if not np.allclose(rates[:2], rates[2:], rtol=1e-6, atol=0.0):
         raise InputError(
-            f"the {mechanism.name} is not in the same configuration after {turns} turn(s): give another number"
+            f"the {mechanism.name} is not in the same configuration after {turns * flow.turns} turn(s): give another number"
         )
 
 

@@ -77,7 +77,7 @@ class Sweep:
     speed : ndarray, shape (m,)
         rad/s, in the order of the sweep.
     orbits : tuple of (PeriodicOrbit or None)
-        None if no steady motion with a period of 1 to 4 turns was met.
+        None if no steady motion with a period of 1 to 4 turns, or common periods, was met.
     flags : tuple of str
         Reason if there is none; otherwise empty.
     jumps : tuple of Jump
@@ -97,7 +97,7 @@ class Sweep:
     @property
     def turns(self) -> NDArray[np.int64]:
         """Turns in a period, 0 without a steady motion; shape (m,)."""
-        return np.array([0 if orbit is None else orbit.turns for orbit in self.orbits])
+        return np.array([0 if orbit is None else orbit.crank_turns for orbit in self.orbits])
 
 
 @takes_published()
@@ -160,8 +160,8 @@ def sweep(
                         speed=speed,
                         amplitude_before=last.amplitude,
                         amplitude_after=orbit.amplitude,
-                        turns_before=last.turns,
-                        turns_after=orbit.turns,
+                        turns_before=last.crank_turns,
+                        turns_after=orbit.crank_turns,
                     )
                 )
         orbits.append(orbit)
@@ -224,7 +224,8 @@ def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
         far = np.abs((orbit.start - start) / point.scale(state)).max()
         if orbit.verdict(0.0).stability is Stability.STABLE and far < 1e-3:
             return orbit
-    reason = f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns"
+    most, after = (n * point.flow.turns for n in (PERIODS[-1], JUMP_TURNS))
+    reason = f"no steady motion with a period of up to {most} turns after {after} turns"
     raise OrbitError(reason, point.flow, start, np.inf, 0)
 
 
@@ -308,7 +309,8 @@ def find_orbit(
     initial : state at the start, optional
         Positions of the freedoms that are held: see `Drive`.
     turns : int
-        Turns of the crank in one period; if there is no such motion, one of fewer turns is returned.
+        Turns of the crank in one period, or common periods of gears or several cranks; if there is no such motion, one of
+        fewer turns is returned.
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0: coordinates and rates of the free freedoms other than the crank, of a five-bar u (m) and
         u' (m/s), and under a torque the crank speed (rad/s), which is needed unless it follows from a motor's synchronous
@@ -377,8 +379,8 @@ def find_orbits(
     parameters, inputs, speed, torque, initial
         See `find_orbit`.
     turns : int or sequence of int
-        Turns of the crank in one period, or several numbers, such as (1, 2, 3, 4). A motion that repeats itself after fewer
-        turns does not count.
+        Turns of the crank in one period, or common periods of gears or several cranks; or several numbers, such as
+        (1, 2, 3, 4). A motion that repeats itself after fewer turns does not count.
     start : array_like, shape (n,), optional
         A further start; under a torque it is needed for the crank speed, unless that follows from a motor.
 

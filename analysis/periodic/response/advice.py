@@ -87,7 +87,7 @@ class Arc:
     Attributes
     ----------
     turns : int
-        Turns of the crank in a period.
+        See `Branch`.
     stable : bool
         Whether no deviation grows.
     parameter, amplitude : ndarray, shape (m,)

@@ -48,7 +48,7 @@ class Branch(Shown):
     ----------
     family : Family
     turns : int
-        Turns of the crank in a period.
+        Common periods in a period: see `PeriodicOrbit`.
     parameter : ndarray, shape (m,)
     orbits : tuple of PeriodicOrbit
     special : tuple of SpecialPoint
@@ -135,7 +135,7 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
     rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
     swing, what = first.swing, "{} [{}]".format(*orbit.swing)
     columns: dict[str, Callable[[Turn], float]] = {
-        f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * turn.turns / turn.period,
+        f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * orbit.turns / turn.period,
         f"amplitude of {what}": lambda turn: turn.amplitude,
         f"mean of {what}": lambda turn: float(turn[swing].mean()),
     }
@@ -471,8 +471,10 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 
 
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
-    """Return whether a branch passes through a motion, given by its start."""
+    """Return whether a branch passes through a motion, given by its start, or through one that is whole turns from it."""
     ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
     scale = np.append(np.max([o.scale for o in ends], axis=0), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
-    return distance(points / scale, np.append(motion, value) / scale) < _ON
+    away = ends[0].flow.within(points[:, :-1] - motion)
+    near = np.abs(away / scale[:-1]).max(axis=1).argmin()
+    return distance(points / scale, np.append(points[near, :-1] - away[near], value) / scale) < _ON

@@ -461,16 +461,15 @@ class _Search:
 def ending(branch: Branch) -> str:
     """Return a sentence on a branch that was not followed to its end."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
-    period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
+    period = "" if branch.turns == 1 else f"with a period of {branch.crank_turns} turns "
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     """Return whether a branch has an orbit at one of its ends."""
-    scale = orbit.scale
     return any(
         abs(branch.parameter[i] - value) <= 1e-9 * abs(value)
-        and float(np.abs((branch.orbits[i].start - orbit.start) / scale).max()) < SAME
+        and float(np.abs(orbit.flow.within(branch.orbits[i].start - orbit.start) / orbit.scale).max()) < SAME
         for i in (0, -1)
     )
 
@@ -497,7 +496,7 @@ def with_isolas(
     places : int
         Values of the parameter, evenly spaced inside the range, at which all motions are sought.
     turns : int
-        Greatest number of turns in the period of the motions that are sought.
+        Greatest number of turns, or of common periods, in the period of the motions that are sought.
     greatest_step, progress
         See `frequency_response`.
 
