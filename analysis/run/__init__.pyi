@@ -18,6 +18,7 @@ from .case_files import parameters_from as parameters_from
 from .case_files import parameters_to as parameters_to
 from .case_files import save_parameters as save_parameters
 from .case_files import signal_kinds as signal_kinds
+from .case_files import with_names_of_files as with_names_of_files
 from .checks import CASES as CASES
 from .checks import CHECKED as CHECKED
 from .checks import check as check

@@ -209,6 +209,7 @@ def case_from(
     data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
     mechanism = mechanism_in(named)
+    data = with_names_of_files(data, mechanism)
     overrides = {_in_files(name, mechanism): value for name, value in (overrides or {}).items()}
     published = PUBLISHED[named["published"]] if "published" in named else None
     if named.get("mechanism", mechanism.name) != mechanism.name:
@@ -242,6 +243,20 @@ def case_from(
         tolerance=run.tolerance,
         masses=mass_origins(parameters, files.flattened(own), published, str(named.get("published", ""))),
     )
+
+
+def with_names_of_files(data: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Any]:
+    """Return the tables of a case in which inputs that have their FMI names have those of case files."""
+    result = dict(data)
+    for channel in mechanism.channels:
+        table, _, leaf = channel.name.rpartition(".")
+        name, inner = name_in_files(mechanism, channel), result.get(table)
+        if name == channel.name or not isinstance(inner, Mapping) or leaf not in inner:
+            continue
+        if name in result:
+            raise InputError(f"{channel.name} is {name} in case files, and that is given, too: leave out one of them")
+        result |= {name: inner[leaf], table: {key: value for key, value in inner.items() if key != leaf}}
+    return result
 
 
 def _in_files(name: str, mechanism: Mechanism) -> str:

@@ -14,7 +14,7 @@ from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overrid
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import Drive, default_variable, drive_of, resting, unit_of
-from ..run import Case, case_from, mechanism_in
+from ..run import Case, case_from, mechanism_in, with_names_of_files
 from ..units import with_unit
 from .result import Tuned
 from .wishes import Limit, Wish
@@ -88,7 +88,7 @@ class TuningCase:
         changes = {inputs.get(name, name): with_unit(value, unit_of(mechanism, name)) for name, value in values}
         if isinstance(own := self.tables.get("linkage"), str):
             changes["linkage"] = Path(os.path.relpath(self.folder / own, folder)).as_posix()
-        return overridden(self.tables, changes)
+        return overridden(with_names_of_files(self.tables, mechanism), changes)
 
 
 def _start(case: Case, drive: Drive) -> list[float]:

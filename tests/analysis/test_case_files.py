@@ -299,3 +299,9 @@ def test_an_input_that_is_given_for_itself_may_have_its_fmi_name():
     for name in ("force", "slider.force"):
         case = case_from(data, folder=Path(), overrides={name: "3 N"})
         assert case.inputs.parts("force") == (3.0,)
+    data = {"published": "table-3.1", "slider": {"force": "3 N", "damping": "5 N*s/m"}}
+    case = case_from(data, folder=Path())
+    assert (case.inputs.parts("force"), case.parameters.slider_damping) == ((3.0,), 5.0)
+    assert case_from(data, folder=Path(), overrides={"force": "4 N"}).inputs.parts("force") == (4.0,)
+    with pytest.raises(InputError, match=r"slider\.force is force in case files, and that is given, too"):
+        case_from(data | {"force": "4 N"}, folder=Path())

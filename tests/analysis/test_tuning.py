@@ -404,11 +404,12 @@ def test_what_may_be_changed_is_measured_in_its_tolerance():
     assert (made.slider_stiffness, made.slider_damping) == (4200.0, pytest.approx(4.95))
 
 
-def test_numbers_of_the_drive_are_changed_in_the_case_too():
+@pytest.mark.parametrize("force", [{"force": "1 N"}, {"slider": {"force": "1 N"}}])
+def test_numbers_of_the_drive_are_changed_in_the_case_too(force):
     tables = {
         "published": "rig-2-spring-c",
         "drive": {"torque": {"kind": "induction-motor", "breakdown_torque": 2.0, "breakdown_slip": 0.3}},
-        "force": "1 N",
+        **force,
     }
     tables["drive"]["torque"]["synchronous_speed"] = "600 rpm"
     change = {"drive": {"torque": {"breakdown_torque": "10 %"}}, "slider.force": {"tolerance": "2 N"}}
