@@ -75,7 +75,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     default=1,
     show_default=True,
     type=click.IntRange(1, 16),
-    help="Motions of up to so many turns are sought there; for more than one take some 24 places.",
+    help="Motions of up to so many turns, or common periods, are sought there; for more than one take some 24 places.",
 )
 @plot_option
 @html_option
@@ -230,7 +230,9 @@ def _friction(parameters: Any) -> bool:
 def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     if not entries:
-        console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
+        console.print(
+            "no maximum or minimum of the amplitude inside the range stands out by a thousandth", highlight=False
+        )
         return
     what, size, length = swing_of(response.branches[0].orbits[0])
     names = () if table is None else tuple(table.amplitudes)
@@ -258,12 +260,20 @@ def _avoid(response: Any, factor: float, unit: str) -> None:
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if response.caution:
         say(f"{response.caution}: --places seeks them")
+    what, size, length = swing_of(response.branches[0].orbits[0])
     if not ranges:
-        say(f"no {words} to avoid: no resonance inside the range, one stable motion throughout")
+        largest = max(response.branches, key=lambda branch: float(branch.amplitude.max()))
+        place = int(largest.amplitude.argmax())
+        peak = (
+            "at no maximum does the amplitude fall to 0.71 of it on both sides"
+            if response.maxima()
+            else f"the amplitude has no peak; it is greatest, {size * largest.amplitude[place]:.4g} {length}, at "
+            f"{factor * largest.parameter[place]:.6g} {unit}"
+        )
+        say(f"no {words} to avoid: one stable motion throughout, and {peak}")
     else:
         rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.risk.value) for a in ranges]
         show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
-    what, size, length = swing_of(response.branches[0].orbits[0])
     for jump in response.jumps:
         side, way = ("below", "rises") if jump.direction > 0 else ("above", "falls")
         after = " or ".join(f"{size * amplitude:.4g}" for amplitude in jump.after)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.periodic import Branch, Crossing, FoldJump, Risk, arcs, fold_jumps, ranges_to_avoid
+from analysis.cli.vibration import _avoid
+from analysis.periodic import Branch, Crossing, FoldJump, Response, Risk, arcs, fold_jumps, ranges_to_avoid
 
 from .periodic_branches import branch, hysteresis, response
 
@@ -119,3 +120,15 @@ def test_what_is_outside_of_the_branches_has_no_stable_motion() -> None:
         (80.0, 90.0, Risk.UNSTABLE),
         (110.0, 111.0, Risk.UNSTABLE),
     ]
+
+
+def test_a_maximum_that_is_no_resonance_is_not_denied(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("analysis.cli.vibration.say", said.append)
+    flat = response(branch(X, 1.0 - 4e-4 * ((X - 103.0) / 10.0) ** 2, 0.9))
+    assert not flat.maxima()
+    _avoid(flat, 1.0, "kg")
+    assert said[-1].endswith("the amplitude has no peak; it is greatest, 1000 mm, at 103 kg")
+    monkeypatch.setattr(Response, "maxima", lambda self: ("one, above which the amplitude rises",))
+    _avoid(flat, 1.0, "kg")
+    assert said[-1].endswith("at no maximum does the amplitude fall to 0.71 of it on both sides")
