@@ -6,6 +6,7 @@ import hashlib
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import chain
 from math import prod
 from pathlib import Path
@@ -167,6 +168,7 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
     status, messages, size = [k.FINISHED] * len(ends), [""] * len(ends), task.mechanism.size
     for i in np.flatnonzero((ends[:, 0] != k.FINISHED) | (ends[:, 4] >= MANY_STEPS)).tolist():
         (code, samples, lost), t, x = ends[i, [0, 1, 3]].astype(int).tolist(), float(ends[i, 2]), ends[i, 5 : 5 + size]
+        run = cache(partial(task.run, i))
         if i in prepared.failures:
             error = prepared.failures[i]
             status[i] = next(code for kind, code in _STATUS.items() if isinstance(error, kind))
@@ -174,17 +176,17 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
         elif code == _PAUSED:
             status[i], messages[i] = NOT_RUN, f"interrupted at t = {t:.6g} s" if samples else "not run: interrupted"
         elif code == k.BAD_INPUT:
-            status[i], messages[i] = code, str(task.run(i).lost(lost, t, x))
+            status[i], messages[i] = code, str(run().lost(lost, t, x))
         else:
             switched = task.mechanism.switched(prepared.batch.p[i])
-            limit = task.run(i).limit if switched else None
+            limit = run().limit if switched else None
             steps, passed, needed = float(ends[i, 4]), t - float(task.settings.times[0]), 0.0
             if code == _GIVEN_UP:
                 code, needed = k.RUNNING, steps * float(np.ptp(task.settings.times)) / passed
             status[i], message = verdict(task.mechanism, task.settings, code, t, x, limit, needed)
             if code == k.NO_STEP:
-                message += task.run(i).undefined(x)
-            stiff = task.run(i).stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
+                message += run().undefined(x)
+            stiff = run().stiff(x, ends[i, 5 + size :], steps, passed) if steps >= MANY_STEPS else ""
             messages[i] = "; ".join(filter(None, (message, stiff)))
     return status, messages
 

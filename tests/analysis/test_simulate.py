@@ -33,8 +33,9 @@ from analysis import (
     table,
 )
 from analysis.mechanisms import FIVE_BAR
-from analysis.run import Event, cautions, compiled, prepared
+from analysis.run import Event, batches, cautions, compiled, prepared
 from analysis.run.inputs import encode
+from analysis.run.records import NO_STEP
 from analysis.run.sampling import sample
 from analysis.run.simulation import SCIPY_METHODS
 from analysis.units import CM_PER_METRE
@@ -525,6 +526,26 @@ def test_a_stiff_run_says_so_and_ends_where_it_would_take_too_long(monkeypatch: 
     assert other.message == ""
     assert other.statistics["evaluations"] < 1_000
     assert other["slider.position"][-1] == pytest.approx(whole["slider.position"][-1], rel=1e-5)
+
+
+def test_a_run_of_an_ensemble_is_prepared_once_for_its_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of many steps that ends since none is accurate is asked for stiffness and for springs without a value."""
+    made: list[int] = []
+    run, verdicts = batches.Task.run, batches._verdicts
+
+    def counted(task: batches.Task, i: int) -> Any:
+        made.append(i)
+        return run(task, i)
+
+    def given_up(task: batches.Task, ready: batches.Prepared, ends: Any) -> Any:
+        made.clear()
+        ends[:, [0, 4]] = NO_STEP, cautions.MANY_STEPS
+        return verdicts(task, ready, ends)
+
+    monkeypatch.setattr(batches.Task, "run", counted)
+    monkeypatch.setattr(batches, "_verdicts", given_up)
+    simulate_many([TABLE_3_1], Inputs(speed=SPEED), stop_time=0.01, step=1e-3)
+    assert made == [0]
 
 
 @pytest.mark.parametrize(
