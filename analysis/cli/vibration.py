@@ -260,6 +260,8 @@ def _avoid(response: Any, factor: float, unit: str) -> None:
     words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
     if response.caution:
         say(f"{response.caution}: --places seeks them")
+    else:
+        say(f"all motions were sought at {response.sought_at} only: more --places may find more")
     what, size, length = swing_of(response.branches[0].orbits[0])
     if not ranges:
         largest = max(response.branches, key=lambda branch: float(branch.amplitude.max()))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -127,7 +129,8 @@ def test_a_maximum_that_is_no_resonance_is_not_denied(monkeypatch: pytest.Monkey
     monkeypatch.setattr("analysis.cli.vibration.say", said.append)
     flat = response(branch(X, 1.0 - 4e-4 * ((X - 103.0) / 10.0) ** 2, 0.9))
     assert not flat.maxima()
-    _avoid(flat, 1.0, "kg")
+    _avoid(replace(flat, sought=3), 1.0, "kg")
+    assert said[0] == "all motions were sought at 3 values of p only: more --places may find more"
     assert said[-1].endswith("the amplitude has no peak; it is greatest, 1000 mm, at 103 kg")
     monkeypatch.setattr(Response, "maxima", lambda self: ("one, above which the amplitude rises",))
     _avoid(flat, 1.0, "kg")

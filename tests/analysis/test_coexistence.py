@@ -195,6 +195,7 @@ def test_speeds_to_avoid_know_a_motion_that_no_branch_leads_to_or_say_that_none_
     for found, known in ((response, False), (whole, True)):
         assert known == any(a.low < 950.0 * rpm < a.high for a in found.speeds_to_avoid)
         assert known != ("not sought" in repr(found))
+        assert known == ("all motions sought at 2 values of drive.speed only" in repr(found))
     assert "not sought" in plot(response).axes[0].get_legend().get_title().get_text()
 
 

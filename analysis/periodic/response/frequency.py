@@ -174,13 +174,18 @@ class Response(Shown):
 
     def __repr__(self) -> str:
         parts = f"{format_count(len(self.branches), 'branch')}, {format_count(len(self.problems), 'problem')}"
-        caution = f"; {self.caution}: with_isolas" if self.caution else ""
-        return f"<Response: {describe(self.branches)}; {parts}{caution}>"
+        sought = f"{self.caution}: with_isolas" if self.caution else f"all motions sought at {self.sought_at} only"
+        return f"<Response: {describe(self.branches)}; {parts}; {sought}>"
 
     @property
     def caution(self) -> str:
         """Warning that `speeds_to_avoid` may miss motions off the branches; empty if these were sought."""
         return "" if self.sought else UNSOUGHT
+
+    @property
+    def sought_at(self) -> str:
+        """At how many values of the parameter all motions were sought, in words: more of them may find more motions."""
+        return f"{format_count(self.sought, 'value')} of {self.family.name}"
 
     @property
     def family(self) -> Family:
@@ -483,8 +488,9 @@ def with_isolas(
 ) -> Response:
     """Add motions to a response that are not connected to any of its branches.
 
-    All motions are sought at some values of the parameter. From one that lies on no branch, a new branch is followed to both
-    sides until it closes or ends. Motions whose deviations grow more than a thousandfold per turn are left out.
+    All motions are sought at some values of the parameter; motions that exist only between these are not found. From one that
+    lies on no branch, a new branch is followed to both sides until it closes or ends. Motions whose deviations grow more than a
+    thousandfold per turn are left out.
 
     Motions of several turns are stable only in narrow ranges between a fold and a period doubling. Beyond the doubling they
     exist on, ever more unstable, over a range some ten times as wide, where the search can find them. They are followed as long
