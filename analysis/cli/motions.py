@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from linkwork.errors import InputError
-
 from ..display import format_count
 from ..mechanisms import mechanism_of
 from .common import console, folder_of, html_option, quantity, save_picture, say, show_table, workers_options
@@ -55,7 +53,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import orbits_of, turns_sought, unsought
+    from ..periodic import joined, orbits_of, turns_sought
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -66,11 +64,7 @@ def basins(
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
     ]
     found = [orbits_of(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
-    of = turns_sought(flow, turns)
-    _motions(f"{chosen.case.title}: periodic motions of {of}", found, flow.turns)
-    if not any(part.stable for part in found):
-        also = unsought(parameters, drive)
-        raise InputError(f"no stable motion of {of} was found: no start ends in one{also}")
+    _motions(f"{chosen.case.title}: periodic motions of {turns_sought(flow, turns)}", found, flow.turns)
     picture = find_basins(
         parameters,
         drive,
@@ -78,7 +72,7 @@ def basins(
         points=points,
         position=spans[0],
         rate=spans[1],
-        start=start,
+        found=joined(found),
         n_jobs=jobs,
         progress=console.is_terminal,
     )

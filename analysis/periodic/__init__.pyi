@@ -59,6 +59,7 @@ from .motion.search import Orbits as Orbits
 from .motion.search import Sweep as Sweep
 from .motion.search import find_orbit as find_orbit
 from .motion.search import find_orbits as find_orbits
+from .motion.search import joined as joined
 from .motion.search import orbits_of as orbits_of
 from .motion.search import sweep as sweep
 from .motion.search import unsought as unsought

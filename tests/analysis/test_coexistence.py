@@ -304,10 +304,15 @@ def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
 
 
 @pytest.mark.slow
-def test_the_command(tmp_path: Path) -> None:
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    search = import_module("analysis.periodic.motion.search")
+    sought: list[int] = []
+    ready = search.require_turns
+    monkeypatch.setattr(search, "require_turns", lambda turns, *at: (sought.append(turns), ready(turns, *at)))
     arguments = ["basins", "--published", "rig-1-spring-b", "--speed", "1000 rpm", "--points", "4", "--html"]
     done = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
+    assert sought == [1, 2, 3, 4]
     assert "two methods found the same motions" in done.output
     assert "of 16 starts end" in done.output
     assert sorted(p.name for p in tmp_path.glob("rig*")) == [

@@ -263,6 +263,7 @@ def basins(
     position: tuple[Amount, Amount] | None = None,
     rate: tuple[Amount, Amount] | None = None,
     start: ArrayLike | None = None,
+    found: Orbits | None = None,
     folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
@@ -282,6 +283,8 @@ def basins(
         far as the mechanism can be assembled.
     start : array_like, shape (n,), optional
         Under a torque a guess of y with the crank speed; see `find_orbits`.
+    found : Orbits, optional
+        Motions that `find_orbits` has found here; they are not sought again.
     folder, n_jobs, progress
         See `grid`.
 
@@ -307,7 +310,8 @@ def basins(
         position = pair(position, flow.components[0][1], "position")
     if rate is not None:
         rate = pair(rate, flow.components[flow.size // 2][1], "rate")
-    found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
+    if found is None:
+        found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
         of, also = turns_sought(drive.flow(mechanism_of(parameters)), turns), unsought(parameters, drive)

@@ -419,12 +419,7 @@ def orbits_of(
 ) -> Orbits:
     """Find all periodic motions under a `Drive`, ``known`` ones included: see `find_orbits`."""
     if not isinstance(turns, int):
-        parts = [orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
-        return Orbits(
-            orbits=tuple(sorted((o for part in parts for o in part.orbits), key=lambda orbit: orbit.amplitude)),
-            agreed=all(part.agreed for part in parts),
-            index=next((part.index for part in parts if part.index != 1), 1),
-        )
+        return joined([orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
     point = operating_point(parameters, drive)
     guess = first_guess(point.flow, drive, start)
     require_turns(turns, point, guess)
@@ -451,6 +446,15 @@ def orbits_of(
         places = [*many.places(MANY, number + 1), *many.between()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
     return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == 1, index=many.index)
+
+
+def joined(parts: Sequence[Orbits]) -> Orbits:
+    """Return the motions of several searches, by amplitude."""
+    return Orbits(
+        orbits=tuple(sorted((o for part in parts for o in part.orbits), key=lambda orbit: orbit.amplitude)),
+        agreed=all(part.agreed for part in parts),
+        index=next((part.index for part in parts if part.index != 1), 1),
+    )
 
 
 class _Found:
