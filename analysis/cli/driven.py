@@ -66,19 +66,11 @@ class Chosen:
         """Return a guess of the orbit's start: rest at the coordinates of the case, with a crank speed under a torque."""
         from ..periodic import resting
 
-        mechanism, speed = mechanism_of(self.case.parameters), None
-        if drive.speed_drive:
-            if self.guess_speed is not None:
-                raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
-        elif self.guess_speed is not None:
-            speed = quantity(self.guess_speed, "rad/s", "--guess-speed")
-        else:
-            crank = mechanism.freedoms[drive.flow(mechanism).crank]
-            begins = float(getattr(self.case.initial, crank.initial[1]))
-            if begins <= 0.0 and drive.motor is None:
-                raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
-            speed = begins if begins > 0.0 else None
-        return resting(self.case.parameters, drive, self.case.initial, speed)
+        speed = None if self.guess_speed is None else quantity(self.guess_speed, "rad/s", "--guess-speed")
+        if drive.speed_drive and speed is not None:
+            raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
+        other = ", or --guess-speed '300 rpm'"
+        return resting(self.case.parameters, drive, self.case.initial, speed, other=other)
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report the files and what could not be computed, and exit with what that means."""

@@ -13,8 +13,8 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError
 from ..files import Many, Quantity, Table, Whole, as_table, entry, flag, overridden, read, read_tables, text, unchanged
 from ..linkages import with_linkage
 from ..mechanisms import mechanism_of, name_in_files
-from ..periodic import Drive, default_variable, drive_of, resting, unit_of
-from ..run import Case, case_from, mechanism_in, with_names_of_files
+from ..periodic import default_variable, drive_of, resting, unit_of
+from ..run import case_from, mechanism_in, with_names_of_files
 from ..units import with_unit
 from .result import Tuned
 from .wishes import Limit, Wish
@@ -91,17 +91,6 @@ class TuningCase:
         return overridden(with_names_of_files(self.tables, mechanism), changes)
 
 
-def _start(case: Case, drive: Drive) -> list[float]:
-    """Return a guess of the motion: rest at the coordinates of the case, under a torque with its initial crank speed."""
-    mechanism = mechanism_of(case.parameters)
-    flow, state = drive.flow(mechanism), mechanism.state(case.initial)
-    speed = state[flow.places[-1]] if flow.torque and drive.motor is None else None
-    if speed is not None and not speed > 0.0:
-        name = mechanism.freedoms[flow.crank].initial[1]
-        raise InputError(f"under a torque the speed of the crank must be guessed: give initial.{name}, above zero")
-    return resting(case.parameters, drive, case.initial, speed)
-
-
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
     """Read a case from a TOML or JSON file; see `docs/tuning.md`.
 
@@ -135,7 +124,7 @@ def tuning_case_from(
     wish = Wish(
         parameters=case.parameters,
         drive=drive,
-        start=_start(case, drive),
+        start=resting(case.parameters, drive, case.initial),
         speeds=wanted.speeds,
         over=wanted.over,
         between=wanted.between,

@@ -509,6 +509,13 @@ def test_resonance_over_the_torque(linkwork):
     assert "fold at 0.04949" in result.output, result.output
 
 
+def test_under_a_torque_it_is_said_where_the_crank_gets_its_speed_from(linkwork):
+    given = ["--set", "drive.torque=0.01 N*m", "--set", "run.stop_time=1 s"]
+    result = linkwork("stability", "--published", "rig-2-spring-c", *given, "--no-chart")
+    assert result.exit_code == 1
+    assert "give initial.crank_speed, above zero, or --guess-speed '300 rpm'" in " ".join(result.output.split())
+
+
 @pytest.mark.parametrize("words", [["resonance", "--from", "20 rpm", "--to", "60 rpm"], ["stability"]])
 def test_periodic_motion_of_a_mechanism_of_which_nothing_is_free_is_refused(linkwork, words: list[str]) -> None:
     result = linkwork(*words, "--published", "rahman-ideal")

@@ -33,6 +33,7 @@ from analysis.tuning.cases import tuning_case_from
 from analysis.tuning.optimisation import _conditions, _unwanted, _ways
 from analysis.tuning.result import STABLE, readings, wished
 from analysis.tuning.survey import other_motions, survey
+from analysis.units import RAD_S_PER_RPM
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS
 from linkwork.slider_crank import published as rahman
@@ -429,6 +430,15 @@ def test_numbers_of_the_drive_are_changed_in_the_case_too(force):
     again = drive_of(written.parameters, written.inputs, written.initial)
     assert again.motor.breakdown_torque == pytest.approx(1.9)
     assert again.forces["slider.force"] == pytest.approx(2.5)
+
+
+def test_under_a_motor_the_crank_begins_as_it_does_in_the_case():
+    motor = {"kind": "induction-motor", "breakdown_torque": 2.0, "breakdown_slip": 0.2, "synchronous_speed": "600 rpm"}
+    asked = {"over": FIELD, "between": ["500 rpm", "600 rpm"], "no_jump": True, "change": {"slider.mass": "5 %"}}
+    tables = {"published": "rig-2-spring-c", "drive": {"torque": motor}, "tune": asked}
+    for initial, speed in (({}, 540.0), ({"crank_speed": "300 rpm"}, 300.0)):
+        case = tuning_case_from(tables | {"initial": initial}, folder=Path())
+        assert case.wish.start[-1] == pytest.approx(speed * RAD_S_PER_RPM)
 
 
 # The command

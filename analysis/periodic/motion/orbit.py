@@ -477,13 +477,23 @@ def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float 
 
 
 @takes_published()
-def resting(parameters: Parameters, drive: Drive, initial: Any, speed: float | None = None) -> list[float]:
-    """Return a guess of a periodic motion: rest at the coordinates of a start, with a crank speed (rad/s) if one is given.
+def resting(
+    parameters: Parameters, drive: Drive, initial: Any, speed: float | None = None, *, other: str = ""
+) -> list[float]:
+    """Return a guess of a periodic motion: rest at the coordinates of a start.
 
-    Raises InputError if a crank speed is needed.
+    Under a torque the crank has ``speed`` (rad/s), or else that of the start if it is above zero, or else one of the motor.
+
+    Raises InputError if it has none; ``other`` is where else one can be given.
     """
     mechanism = mechanism_of(parameters)
     flow, ratios, state = drive.flow(mechanism), drive.turning(mechanism), mechanism.state(initial)
+    if flow.torque and speed is None:
+        begins = state[flow.places[-1]]
+        speed = begins if begins > 0.0 else None
+        if speed is None and drive.motor is None:
+            name = mechanism.freedoms[flow.crank].initial[1]
+            raise InputError(f"under a torque the crank's speed is guessed: give initial.{name}, above zero{other}")
     guess = first_guess(flow, drive, None, speed)
     # of another crank what it has beyond its ratio to the crank
     guess[: len(flow.free)] = [state[n] - ratios.get(n, 0) * state[flow.crank] for n in flow.free]
