@@ -104,6 +104,7 @@ from .task.target import TargetPath as TargetPath
 from .task.target import area_between as area_between
 from .task.target import distance_to as distance_to
 from .task.target import hausdorff as hausdorff
+from .task.target import parts_of as parts_of
 from .task.target import straightest_part as straightest_part
 from .task.target import straightness as straightness
 from .task.task import Motion as Motion

@@ -9,13 +9,12 @@ the flatness that the thesis requires.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from math import degrees, pi
 
 import numpy as np
 
 from ...figures import Curve, Figure, Panel, plot_curves
-from ...synthesis import Straightness, area_between, hausdorff, straightness, turn
+from ...synthesis import Straightness, area_between, hausdorff, parts_of, turn
 from ...units import CM_PER_METRE
 from ..rules import ALIKE
 from ..statements import Statement, at_most, text
@@ -73,11 +72,8 @@ def straightest(curve: FloatArray) -> tuple[Straightness, int]:
 
     Of all parts within 120 degrees of rotation that are at least as long as AB, along the line.
     """
-    laid, greatest = np.vstack([curve, curve]), round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
-    parts = (
-        (replace(straightness(laid[start : start + count], direction=0.0), start=start), count)
-        for start, count in product(range(N), range(2, greatest + 1))
-    )
+    greatest = round(N * PACKAGING_ROTATION / (2.0 * pi)) + 1
+    parts = ((part, count) for count in range(2, greatest + 1) for part in parts_of(curve, count, direction=0.0))
     long_enough = (found for found in parts if CM_PER_METRE * found[0].travel >= TRAVEL_CM)
     return min(long_enough, key=lambda found: found[0].flatness / found[0].travel)
 

@@ -572,21 +572,25 @@ def straightest_part(
     InputError
         If there are fewer points, or no part has the least travel.
     """
+    parts = parts_of(curve, count, direction=direction, closed=closed)
+    longest = max(part.travel for part in parts)
+    if not longest >= least_travel:
+        raise InputError(
+            f"no part of {count} points has a travel of {least_travel!r} m: the longest is {longest:.6g} m"
+        )
+    return min((part for part in parts if part.travel >= least_travel), key=lambda part: part.flatness)
+
+
+def parts_of(
+    curve: ArrayLike, count: int, *, direction: float | None = None, closed: bool = True
+) -> list[Straightness]:
+    """Return travel and flatness of every part of a curve with ``count`` successive points: see `straightest_part`."""
     points = plane_points(curve, "the curve", 2)
     if not 2 <= count <= len(points):
         raise InputError(f"a part of {count} points of {len(points)}: it must be from 2 to all of them")
     starts = len(points) if closed else len(points) - count + 1
     # over the seam: the curve's beginning once more
     laid = np.vstack([points, points[: count - 1]]) if closed else points
-    best: Straightness | None = None
-    longest = 0.0
-    for start in range(starts):
-        part = straightness(laid[start : start + count], direction=direction)
-        longest = max(longest, part.travel)
-        if part.travel >= least_travel and (best is None or part.flatness < best.flatness):
-            best = replace(part, start=start)
-    if best is None:
-        raise InputError(
-            f"no part of {count} points has a travel of {least_travel!r} m: the longest is {longest:.6g} m"
-        )
-    return best
+    return [
+        replace(straightness(laid[start : start + count], direction=direction), start=start) for start in range(starts)
+    ]
