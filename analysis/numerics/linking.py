@@ -4,21 +4,30 @@ By default Numba optimises each function with all that it calls, makes machine c
 caller. Where Python calls only the kernel, nobody uses the code of the inner functions, and it takes a third of the time. Numba
 has no public option for this: the classes below override private ones, hence the upper bound of its version. Nor does it
 notice that a bit of machine code on disk has changed: here every file ends with a hash of its bytes.
+
+An installation may carry kernels *for any processor* of its kind: what Numba, whose type inference takes most of the time,
+makes of them before LLVM optimises it. The code that follows from it on a processor is the same as if it were compiled there.
 """
 
 from __future__ import annotations
 
 import ctypes
 import io
+import pickle
+import warnings
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from llvmlite import binding
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
+from numba.core.registry import cpu_target
+from numba.core.serialize import dumps
 
 _HASH = hash(Flags())
 _DIGEST = sha256().digest_size
@@ -67,14 +76,63 @@ class PartCompiler(KernelCompiler):
         super().__init__(typing_context, context, library or _Part(context.codegen(), "part"), *rest)
 
 
+class _Noted(JITCodeLibrary):
+    """Code of a kernel that notes what it is before it is optimised."""
+
+    def _optimize_final_module(self) -> None:
+        self.noted = self._final_module.as_bitcode()
+        super()._optimize_final_module()
+
+
+class NotingCompiler(KernelCompiler):
+    """Compiler of kernels whose code for any processor is wanted."""
+
+    def __init__(self, typing_context: Any, context: Any, library: Any, *rest: Any) -> None:
+        library = _Noted(context.codegen(), "kernel")
+        library.enable_object_caching()
+        super().__init__(typing_context, context, library, *rest)
+
+
+def for_any_processor(dispatcher: Any) -> bytes:
+    """Return the code for any processor of a kernel that `NotingCompiler` has compiled."""
+    (result,) = dispatcher.overloads.values()
+    (name, *_), *rest = result._reduce()
+    return _with_hash(zlib.compress(dumps((name, result.library.noted, *rest))))
+
+
+def _for_this_processor(content: bytes) -> tuple[Any, ...]:
+    """Return what Numba keeps of a kernel, from its code for any processor."""
+    name, noted, *rest = pickle.loads(zlib.decompress(content[:-_DIGEST]))
+    library = cpu_target.target_context.codegen().create_library(name)
+    library.enable_object_caching()
+    library._final_module = binding.parse_bitcode(noted)
+    library._optimize_final_module()
+    library._finalize_final_module()
+    return library.serialize_using_object_code(), *rest
+
+
 class _Files(IndexDataCacheFile):
     """Files of a kernel's machine code, each with a hash of its bytes at its end, which is checked before Numba reads it."""
+
+    #: The kernel's code for any processor, from which the first files are made; there may be none.
+    source: Path
+
+    def load(self, key: Any) -> Any:
+        found = super().load(key)
+        if found is None and self.source.is_file():
+            content = self.source.read_bytes()
+            if not _is_whole(content):
+                warnings.warn(f"{self.source} is damaged: the kernel is compiled", RuntimeWarning, stacklevel=2)
+                return None
+            found = _for_this_processor(content)
+            self.save(key, found)
+        return found
 
     @contextmanager
     def _open_for_write(self, path: str) -> Iterator[io.BytesIO]:
         with super()._open_for_write(path) as file:
             yield (content := io.BytesIO())
-            file.write(content.getvalue() + sha256(content.getvalue()).digest())
+            file.write(_with_hash(content.getvalue()))
 
     def _load_index(self) -> Any:
         if Path(self._index_path).exists():
@@ -88,13 +146,21 @@ class _Files(IndexDataCacheFile):
 
 def _check(path: Path) -> None:
     """Raise ValueError if the hash at the end of a file is not that of its bytes; Numba ignores the hash."""
-    content = path.read_bytes()
-    if sha256(content[:-_DIGEST]).digest() != content[-_DIGEST:]:
+    if not _is_whole(path.read_bytes()):
         raise ValueError(f"the bytes of {path.name} do not have their hash")
 
 
-def keep(dispatcher: Any) -> None:
-    """Keep the machine code of a dispatcher in files of Numba's cache folder, with hashes."""
+def _with_hash(content: bytes) -> bytes:
+    return content + sha256(content).digest()
+
+
+def _is_whole(content: bytes) -> bool:
+    return sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]
+
+
+def keep(dispatcher: Any, source: Path) -> None:
+    """Keep the machine code of a dispatcher in files of Numba's cache folder, with hashes; ``source`` is of `_Files`."""
     dispatcher.enable_caching()
     file = dispatcher._cache._cache_file
     file.__class__ = _Files
+    file.source = source

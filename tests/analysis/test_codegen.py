@@ -30,7 +30,7 @@ from analysis.numerics.codegen import (
     kernel,
 )
 from analysis.numerics.symbolic import ELEMENTARY
-from analysis.run import compiled, machine
+from analysis.run import compiled, machine, simulate, sources
 from analysis.run.equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
 from analysis.run.prepared import outputs_of
 from linkwork.errors import LinkworkError
@@ -39,6 +39,8 @@ from tests import slider_cranks, strategies
 from tests.fmu.runner import run_in_process
 
 casadi = pytest.importorskip("casadi")
+
+ROOT = Path(__file__).parents[2]
 
 
 def call(mechanism: Mechanism, which: int, size: int, x: Any, modes: Any, u: Any, p: Any) -> np.ndarray:
@@ -181,10 +183,14 @@ def _compile_and_run() -> dict[str, Any]:
     from time import perf_counter
 
     begun = perf_counter()
+    from pathlib import Path
+
     from analysis import Inputs, simulate, simulate_many
+    from analysis.numerics import codegen
     from analysis.run import compiled, lanes, sources
     from linkwork.five_bar.published import TABLE_3_1
 
+    codegen.CARRIED = Path("nothing is carried")
     run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)
     simulate_many([TABLE_3_1], Inputs(speed=44.0), stop_time=0.1)
     used = (compiled.run, lanes.run_in_lanes, compiled.channels_of_many, compiled.rows, sources.channels)
@@ -264,6 +270,77 @@ def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(
     assert folder.is_relative_to(tmp_path / "temporary")
     # the same again for the next process
     assert code_folder("a") == folder
+
+
+@inner
+def _helper(x: Any) -> Any:
+    return x + 1.0
+
+
+def _example(x: Any) -> Any:
+    a = np.empty(3)
+    a[:] = _helper(x)
+    return a.sum() + np.sin(x)
+
+
+def _made(function: Any = _example) -> Kernel:
+    return Kernel(function, (float64(float64),), "an example")
+
+
+@pytest.fixture
+def carried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The code for any processor of a kernel; the cache is empty, and compilations are announced."""
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(codegen, "CARRIED", tmp_path / "carried")
+    monkeypatch.setattr(codegen._Announcer, "said", set())
+    path = _made().carry()
+    assert path == _made().carried
+    return path
+
+
+def test_code_for_any_processor_is_used_without_compiling(
+    carried: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _made()(0.7) == 3.0 * 1.7 + math.sin(0.7)
+    assert any((carried.parents[1] / "cache").rglob("*.nbc"))
+    carried.unlink()
+    assert _made()(0.7) == 3.0 * 1.7 + math.sin(0.7)  # from the cache
+    assert capsys.readouterr().err == ""
+    assert _made(_doubled)(0.7) == 1.4
+    assert "compiling an example" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9999])
+def test_damaged_code_for_any_processor_is_not_used(
+    carried: Path, share: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    carried.write_bytes(flipped(carried.read_bytes(), share))
+    with pytest.warns(RuntimeWarning, match=f"{carried} is damaged"):
+        assert _made()(0.7) == 3.0 * 1.7 + math.sin(0.7)
+    assert "compiling an example" in capsys.readouterr().err
+
+
+def test_an_installation_carries_every_kernel() -> None:
+    script = (ROOT / "packaging" / "kernels.py").read_text(encoding="utf-8")
+    for path in (ROOT / "analysis").rglob("*.py"):
+        if "\n@kernel(" in path.read_text(encoding="utf-8"):
+            assert f'"{".".join(path.relative_to(ROOT).with_suffix("").parts)}",\n' in script
+
+
+@pytest.mark.slow
+def test_code_for_any_processor_gives_the_same_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run() -> str:
+        return str(float(simulate("table-3.1", stop_time=0.5)["slider.position"][-1]).hex())
+
+    here = run()
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(codegen, "CARRIED", tmp_path / "carried")
+    kernels = (compiled.run, compiled.rows, sources.channels)
+    for one in kernels:
+        one.carry()
+        monkeypatch.setattr(one, "_compiled", None)
+    assert run() == here
+    assert all(one.compiled.stats.cache_hits for one in kernels)
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
