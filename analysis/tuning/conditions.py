@@ -7,7 +7,7 @@ its last place, and so keeps to its branch.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 from itertools import combinations
@@ -79,29 +79,31 @@ class Expansion(NamedTuple):
     constants: FloatArray
 
 
-def family(wish: Wish, x: FloatArray) -> Family:
-    """Return the periodic motions over the level for changes in their tolerances."""
+def family(wish: Wish, x: FloatArray, spot: Spot | None = None) -> Family:
+    """Return the periodic motions over the level for changes in their tolerances, those like the one at a spot."""
     parameters, drive = wish.operation(x, wish.span[0])
-    return Family(parameters=parameters, drive=drive, vary=wish.over)
+    found = Family(parameters=parameters, drive=drive, vary=wish.over)
+    return found if spot is None else found.with_ratios(spot.ratios)
 
 
 class Spot(NamedTuple):
-    """A motion on the response: the changes, y, the level, and the turns of the period."""
+    """A motion on the response: the changes, y, the level, the turns of the period, and the ratios of its drive."""
 
     x: FloatArray
     y: FloatArray
     level: float
-    turns: int = 1
+    turns: int
+    ratios: Mapping[str, Any]
 
 
 def known_spot(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
     """Return the changes, start and level of a motion."""
-    return Spot(x, orbit.start, wish.level(orbit), orbit.turns)
+    return Spot(x, orbit.start, wish.level(orbit), orbit.turns, orbit.drive.ratios)
 
 
 def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
     """Return the motion that begins at a spot, as far as it closes."""
-    orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x), spot.turns, *wish.span)(spot.y, spot.level).data
+    orbit: PeriodicOrbit = OrbitEquations(family(wish, spot.x, spot), spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
@@ -293,7 +295,7 @@ class Place:
         z = np.append(begin.y, begin.level)
         first = z = z if slope is None else z + ahead * slope
         n = len(begin.y)
-        evaluate = OrbitEquations(family(self.wish, x), begin.turns, *self.wish.span)
+        evaluate = OrbitEquations(family(self.wish, x, begin), begin.turns, *self.wish.span)
         size = np.inf
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
@@ -330,7 +332,7 @@ def series(turn: Turn, samples: NDArray[np.float64]) -> Callable[[Any], Any]:
 def curve(turn: Turn, limit: Limit) -> Callable[[Any], Any]:
     """Return the limited quantity as a function of the crank angle: of a joint the magnitude of the force."""
     # of its components, which are smooth where the magnitude is not
-    parts = [series(turn, turn[part]) for part in limit.parts]
+    parts = [series(turn, turn.around(part)) for part in limit.parts]
     return lambda angle: reduce(np.hypot, (part(angle) for part in parts))
 
 
@@ -342,7 +344,7 @@ def reading(turn: Turn, limit: Limit, angles: Sequence[float]) -> float:
 
 def greatest(turn: Turn, limit: Limit) -> tuple[float, tuple[float, ...]]:
     """Return the limited quantity over a turn and its crank angles: one, or those of greatest and least value."""
-    samples = reduce(np.hypot, (turn[part] for part in limit.parts))
+    samples = reduce(np.hypot, (turn.around(part) for part in limit.parts))
     places = [np.abs(samples).argmax()]
     if limit.output.startswith(AMPLITUDE):
         places = [samples.argmax(), samples.argmin()]
@@ -512,7 +514,7 @@ class Below:
         (found, turn), names = self._at(x), self._wish.mechanism.output_names
         total, parts = np.zeros(len(x)), self.limit.parts
         for angle, sign in zip(self.angles, (1.0, -1.0)):
-            values = [float(series(turn, turn[part])(angle)) for part in parts]
+            values = [float(series(turn, turn.around(part))(angle)) for part in parts]
             slopes = [found.output_slopes(names.index(part), angle) for part in parts]
             if len(self.angles) > 1:
                 total += 0.5 * sign * slopes[0]

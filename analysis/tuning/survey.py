@@ -264,7 +264,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
         return response
     level, (low, high) = wish.level(orbit), _ends(wish, FAR)
     try:
-        branch = follow_both(response.family, orbit, level, low=low, high=high, greatest=STEP)
+        branch = follow_both(response.family.with_ratios(orbit.drive.ratios), orbit, level, low=low, high=high, greatest=STEP)
     except ContinuationError:
         return response
     branches = (*response.branches, branch)

@@ -27,6 +27,7 @@ from analysis.periodic import (
     orbit_of,
     sweep,
     turns_sought,
+    unsought,
     with_isolas,
 )
 from analysis.run import load_case, load_parameters
@@ -199,16 +200,34 @@ def test_the_file_of_a_linkage_is_found_from_where_the_tuned_case_is_written(tmp
     assert (tmp_path / "out" / tables["linkage"]).resolve() == file.resolve()
 
 
-def test_motions_in_which_a_link_goes_round_are_said_not_to_be_sought() -> None:
-    """On a turning crank an arm hangs, so that its pin turns back once a period."""
+def test_an_arm_that_hangs_on_a_crank_turns_back_in_its_pin() -> None:
     built = linkage("hanging-arm", ground={"O": (0, 0)}, gravity=GRAVITY)
     built.body("crank", bar=("O", "B"), length=0.03, mass=0.2, inertia=1e-4)
     built.body("arm", bar=("B", "T"), length=0.15, mass=0.2, inertia=4e-4)
     built.spring("hinge", at="B", damping=4e-4)
     built.freedom("crank", "O", speed="100 rpm").freedom("swing", "B", start=-0.5 * pi)
     built.mechanism()
-    with pytest.raises(InputError, match=r"motions in which swing\.angle goes round in a period were not sought"):
-        basins("hanging-arm", Drive(speed=100.0 * RAD_S_PER_RPM), points=4)
+    speed, inertia, arm = 100.0 * RAD_S_PER_RPM, 4e-4 + 0.2 * 0.075**2, 0.2 * 0.075
+
+    def rates(t: float, x: Any) -> Any:
+        """Of the arm's angle to the horizontal, whose pin goes round."""
+        pull = -GRAVITY * np.cos(x[0]) + 0.03 * speed**2 * np.sin(speed * t - x[0])
+        return [x[1], (arm * pull - 4e-4 * (x[1] - speed)) / inertia]
+
+    # till it has settled
+    period = 2.0 * pi / speed
+    hangs = solve_ivp(rates, (0.0, 300.0 * period), [-0.5 * pi, 0.0], rtol=1e-10, atol=1e-12, method="DOP853").y[:, -1]
+    orbit = find_orbit("hanging-arm", speed=speed)
+    assert orbit.rounds == {"swing.angle": -1}
+    np.testing.assert_allclose(orbit.start, hangs - [0.0, speed], atol=1e-8)
+    assert basins("hanging-arm", Drive(speed=speed), points=4).share(0) > 0.0
+
+
+def test_motions_in_which_a_link_goes_round_more_than_once_are_said_not_to_be_sought() -> None:
+    parameters = yoke("yoke-unsought").parameters
+    assert unsought(parameters, Drive(speed=10.0)) == (
+        "; motions in which swing.angle goes round more than once in a turn were not sought"
+    )
 
 
 def test_turns_in_a_period_are_those_of_the_crank() -> None:
@@ -240,3 +259,89 @@ def test_turns_in_a_period_are_those_of_the_crank() -> None:
         "the branch with a period of 4 turns"
     )
     assert turns_sought(orbit.flow, 1) == "2 turns"
+
+
+def going_round(speed: float, start: Any, damping: float = DAMPING) -> Any:
+    """Return the start and Floquet multipliers of the pendulum that goes round with the crank, by shooting with SciPy."""
+    inertia = INERTIA + MASS * ARM**2
+
+    def rates(t: float, x: Any) -> Any:
+        pull = MASS * ARM * (GRAVITY - STROKE * speed**2 * np.sin(speed * t))
+        bent = np.append(-damping * x[1] - pull * np.sin(x[0]), -damping * x[4:] - pull * np.cos(x[0]) * x[2:4])
+        return np.concatenate([[x[1], bent[0] / inertia], x[4:], bent[1:] / inertia])
+
+    found, rounds = np.array(start), np.sign(start[1])
+    for _ in range(8):
+        over = solve_ivp(
+            rates, (0.0, 2.0 * pi / speed), [*found, 1.0, 0.0, 0.0, 1.0], rtol=1e-12, atol=1e-13, method="DOP853"
+        )
+        end = over.y[:, -1]
+        matrix = end[2:].reshape(2, 2)
+        found = found + np.linalg.solve(np.eye(2) - matrix, end[:2] - [2.0 * pi * rounds, 0.0] - found)
+    return found, np.sort_complex(np.linalg.eigvals(matrix))
+
+
+def test_a_pendulum_that_goes_round_with_the_crank_is_found() -> None:
+    parameters, speed = yoke("yoke-round").parameters, 300.0 * RAD_S_PER_RPM
+    found = find_orbits(parameters, speed=speed)
+    assert (found.agreed, found.index, found.index_of_all) == (True, 0, 0)
+    round_it = [orbit for orbit in found.orbits if orbit.rounds]
+    # to both sides a stable and an unstable one, mirror images
+    assert sorted(orbit.rounds["swing.angle"] for orbit in round_it) == [-1, -1, 1, 1]
+    assert [sum(orbit.start[1] * sign > 1.0 for orbit in found.stable) for sign in (1.0, -1.0)] == [1, 1]
+    for orbit in round_it:
+        start, multipliers = going_round(speed, orbit.start + [0.01, 0.1])
+        np.testing.assert_allclose(orbit.start, start, rtol=1e-8)
+        np.testing.assert_allclose(np.sort_complex(orbit.multipliers), multipliers, rtol=1e-7)
+        turn = orbit.turn()
+        away = turn["swing.angle"] - orbit.rounds["swing.angle"] * turn.angle
+        assert orbit.amplitude == pytest.approx(0.5 * np.ptp(away), rel=1e-3)
+
+
+def test_damping_ends_what_goes_round_where_the_mean_torque_says() -> None:
+    parameters, speed = yoke("yoke-damped").parameters, 2000.0 * RAD_S_PER_RPM
+    # to first order m l r w^2 / 2 sin(phase) drives it, and c w holds it back
+    most = 0.5 * MASS * ARM * STROKE * speed
+    for share, count in ((0.97, 4), (1.03, 0)):
+        damped = replace(parameters, hinge_damping=share * most)
+        assert len([orbit for orbit in find_orbits(damped, speed=speed).orbits if orbit.rounds]) == count
+
+
+def test_a_machine_that_starts_to_go_round_goes_on() -> None:
+    parameters, speed = yoke("yoke-started").parameters, 300.0 * RAD_S_PER_RPM
+    round_it = max(find_orbits(parameters, speed=speed).stable, key=lambda orbit: orbit.start[1])
+    near = round_it.start + [0.05, 0.5]
+    assert orbit_of(parameters, Drive(speed=speed), start=near).rounds == {"swing.angle": 1}
+    swept = sweep(parameters, np.linspace(300.0, 400.0, 5) * RAD_S_PER_RPM, start=near)
+    assert [orbit and orbit.rounds for orbit in swept.orbits] == [{"swing.angle": 1}] * 5
+    assert find_orbit(parameters, speed=speed).rounds == {}  # run up from rest it hangs
+    settled = basins(parameters, Drive(speed=speed), points=12, rate=(-40.0, 40.0), position=(-3.0, 3.0))
+    shares = {orbit.rounds.get("swing.angle", 0): settled.share(n) for n, orbit in enumerate(settled.motions)}
+    assert set(shares) == {-1, 0, 1}
+    assert min(shares.values()) > 0.02
+    assert sum(shares.values()) == pytest.approx(1.0)
+
+
+def test_a_response_has_the_branch_that_goes_round() -> None:
+    parameters = yoke("yoke-response").parameters
+    response = with_isolas(frequency_response(parameters, "280 rpm", "320 rpm"), places=1)
+    rounds = sorted(branch.orbits[0].rounds.get("swing.angle", 0) for branch in response.branches)
+    assert {-1, 0, 1} <= set(rounds)
+    for branch in response.branches:
+        assert all(orbit.rounds == branch.orbits[0].rounds for orbit in branch.orbits)
+
+
+def test_a_sweep_leaves_what_hangs_still_where_that_is_unstable() -> None:
+    parameters, speed = yoke("yoke-swept").parameters, 134.0 * RAD_S_PER_RPM
+    *_, last = sweep(parameters, np.linspace(110.0, 134.0, 9) * RAD_S_PER_RPM).orbits
+    inertia, period = INERTIA + MASS * ARM**2, 2.0 * pi / speed
+
+    def rates(t: float, x: Any) -> Any:
+        pull = MASS * ARM * (GRAVITY - STROKE * speed**2 * np.sin(speed * t)) * np.sin(x[0])
+        return [x[1], -(DAMPING * x[1] + pull) / inertia]
+
+    times = np.linspace(400.0, 402.0, 1001) * period
+    swings = solve_ivp(rates, (0.0, times[-1]), [1e-3, 0.0], t_eval=times, rtol=1e-9, atol=1e-12, method="DOP853").y[0]
+    assert last is not None
+    assert last.crank_turns == 2
+    assert last.amplitude == pytest.approx(0.5 * np.ptp(swings), rel=1e-4)

@@ -328,10 +328,10 @@ def basins(
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
     across, up = (np.linspace(low, high, points) for low, high in spans)
-    # a motion of several turns is met at the beginning of any of them
+    # a motion of several turns is met at the beginning of any of them, one in which a link goes round at its own
     passed = [orbit.passages() for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
-    point, code = motions[0].point, row_code(kernels.settle_starts)
+    point, code = operating_point(parameters, drive), row_code(kernels.settle_starts)
     row = row_of([point], known[0])
     ends, computed = Keeping(folder, n_jobs, progress, "starts", kernels.settle_starts).rows(
         partial(_ends, point, known, across),

@@ -284,15 +284,15 @@ def collocation_serves(drives: Iterable[Drive], mechanisms: Iterable[Parameters]
     """Return whether collocation can be used under these drives: it needs prescribed speeds and smooth rates.
 
     It assumes that the slope of a coordinate over the crank angle is its rate divided by the crank speed, which does not hold
-    for a second crank that turns freely.
+    for a second crank that turns freely, or a link that goes round.
     """
     mechanisms = list(dict.fromkeys(mechanisms))
 
     def follows(drive: Drive) -> bool:
         if not (drive.speed_drive and drive.ratios):
             return drive.speed_drive
-        flow = drive.flow(mechanism_of(mechanisms[0]))
-        return not {*flow.free} & {*flow.others}
+        mechanism = mechanism_of(mechanisms[0])
+        return not {*drive.flow(mechanism).free} & {*drive.turning(mechanism)}
 
     return all(map(follows, drives)) and all(map(is_smooth, mechanisms))
 

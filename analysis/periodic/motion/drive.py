@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from math import inf, isfinite, lcm, pi
@@ -20,7 +20,7 @@ from ...files import unknown_name
 from ...mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ...run import InductionMotor, Inputs, driven, given, speed_ratio, started, takes_published
 from ...units import Amount, in_si
-from .flow import Crank, Flow, crank_of, flow
+from .flow import Crank, Flow, crank_of, flow, turning_of
 
 #: What to do about a negative speed.
 _MIRROR = (
@@ -81,7 +81,8 @@ class Drive:
         ``speeds``, and may be left out where there is one crank.
     ratios : mapping of str to Fraction
         Turns of other cranks for each turn of the crank, by their FMI names; follow from ``speeds``. A crank that is
-        neither free nor among them is held.
+        neither free nor among them is held. A link that nothing drives may go round, too: its coordinate with the ratio, such
+        as ``{"swing.angle": 1}``; without one its motions are those in which it swings.
     motors : mapping of str to InductionMotor
         Motors on other cranks by the FMI names of the torques.
     speeds : mapping of str to float, optional
@@ -153,8 +154,8 @@ class Drive:
         return crank_of(mechanism, self.crank)
 
     def turning(self, mechanism: Mechanism) -> dict[int, Fraction]:
-        """Return the ratios of the other cranks by the numbers of their freedoms."""
-        return {crank_of(mechanism, name).freedom: ratio for name, ratio in self.ratios.items()}
+        """Return the ratios of the other cranks, and of links that go round, by the numbers of their freedoms."""
+        return {turning_of(mechanism, name): ratio for name, ratio in self.ratios.items()}
 
     def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
         """Return the way in which each freedom with a mode is driven: the mode's name, and one of its `Mode.arguments`.
@@ -187,10 +188,15 @@ class Drive:
             raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
         chosen = self.arguments(mechanism)
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
-        made = flow(mechanism, modes, crank.freedom, lcm(*(ratio.denominator for ratio in ratios.values())))
+        own, freedoms = mechanism.freedoms[crank.freedom].period, mechanism.freedoms
+        bases = (
+            (ratio * round(own / (2.0 * pi)) / round(freedoms[n].period / (2.0 * pi)) if freedoms[n].swings else ratio)
+            for n, ratio in ratios.items()
+        )
+        made = flow(mechanism, modes, crank.freedom, lcm(*(base.denominator for base in bases)))
         for number in made.others:
             name = mechanism.freedoms[number].coordinate
-            if number in made.free and number not in ratios:
+            if number in made.free and number not in ratios and not mechanism.freedoms[number].swings:
                 raise InputError(
                     f"{name} is free: say how often it turns for each turn of the crank, ratios = {{{name!r}: 1}}"
                 )
@@ -201,6 +207,27 @@ class Drive:
             others = (c.name for c in acting if c.freedom >= 0 and c.freedom != crank.freedom)
             raise NothingFreeError(mechanism.name, next(others, ""))
         return made
+
+    def with_rounds(self, mechanism: Mechanism, rounds: Mapping[str, int], turns: int) -> tuple[Drive, int]:
+        """Return the drive of motions in which links go round so many times in ``turns`` common periods.
+
+        Parameters
+        ----------
+        mechanism : Mechanism
+        rounds : mapping of str to int
+            By the coordinates of links that swing.
+        turns : int
+
+        Returns
+        -------
+        drive : Drive
+        turns : int
+            Its own common periods in the same time: fewer if the links need several to come round.
+        """
+        made, way = self.flow(mechanism), {f.coordinate: round(f.period / (2.0 * pi)) for f in mechanism.freedoms}
+        ratios = {name: Fraction(times * way[name], turns * made.turns) for name, times in rounds.items()}
+        drive = replace(self, ratios={**self.ratios, **ratios})
+        return drive, round(turns * made.period / drive.flow(mechanism).period)
 
     def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
         """Return the numbers of the drive: channels, motors, held coordinates, ratios; see `Flow`.
@@ -525,6 +552,9 @@ def starts_of(
     low, high = coordinate_ranges(parameters, drive, guess)
     sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
+    # what goes round has this rate on average
+    turning, pace = drive.turning(flow.mechanism), drive.speed or guess[-1]
+    around = np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
     # the centre and the half axes of each ellipse
     rest = flow.rest[:half]
     ellipses = [(rest, np.minimum(rest - low, high - rest))]
@@ -534,7 +564,7 @@ def starts_of(
     for centre, extent in ellipses:
         found = np.tile(guess, (count, 1))
         found[:, :half] = centre + extent * amplitude * np.cos(phase)
-        found[:, half : 2 * half] = extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
+        found[:, half : 2 * half] = around + extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
         if flow.torque:
             slow, fast = _SPEEDS
             found[:, -1] *= slow + (fast - slow) * sequence[:, -1]

@@ -39,6 +39,13 @@ def cranks_of(mechanism: Mechanism) -> tuple[Crank, ...]:
 
 
 @cache
+def turning_of(mechanism: Mechanism, name: str) -> int:
+    """Return the number of a freedom that turns, by one of its FMI names: a crank, or a link that swings and may go round."""
+    swinging = {freedom.coordinate: n for n, freedom in enumerate(mechanism.freedoms) if freedom.swings}
+    return swinging[name] if name in swinging else crank_of(mechanism, name).freedom
+
+
+@cache
 def crank_of(mechanism: Mechanism, name: str = "") -> Crank:
     """Return the crank of a mechanism, by name if there are several.
 
@@ -80,8 +87,9 @@ def _names(mechanism: Mechanism, crank: Crank) -> list[str]:
 class Flow:
     """A mechanism as a flow over its crank's angle, driven in one way.
 
-    Other cranks turn at a ratio to it: a commanded one exactly, one under a torque on average. For a crank under a torque, y
-    contains its angle minus the ratio times the crank angle, which is periodic.
+    Other cranks turn at a ratio to it: a commanded one exactly, one under a torque, or a link that nothing drives, on average.
+    Of these y contains the angle minus the ratio times the crank angle, which is periodic. The ratio of a link that only swings
+    is 0.
 
     Parameters
     ----------
@@ -96,7 +104,7 @@ class Flow:
     Attributes
     ----------
     others : tuple of int
-        Numbers of the other freedoms that turn.
+        Numbers of the other freedoms that turn, or swing and may go round.
     free : tuple of int
         Numbers of the other freedoms that are part of y; a freedom commanded without a ratio is held in place.
     torque : bool
@@ -124,7 +132,7 @@ class Flow:
         self.modes = modes
         self.crank = crank
         self.base = base
-        self.others = tuple(n for n in mechanism.cyclic if n != crank)
+        self.others = tuple(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0 and n != crank)
         by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
         commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
         forced = {c.argument for c in mechanism.channels if c.kind == "force"}
@@ -210,8 +218,20 @@ class Flow:
 
     def within(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return differences of y, shape (..., n), without whole turns."""
-        near: NDArray[np.float64] = away - self.ways * np.round(away / np.where(self.ways > 0.0, self.ways, 1.0))
-        return near
+        return away - self._whole(away)
+
+    def nearest(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return of the y that are whole turns apart the one that is nearest to rest."""
+        return y - self._whole(y - self.rest)
+
+    def _whole(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
+        whole: NDArray[np.float64] = self.ways * np.round(away / np.where(self.ways > 0.0, self.ways, 1.0))
+        return whole
+
+    def paces(self, drive: NDArray[np.float64]) -> dict[str, float]:
+        """Return the ratios by FMI names of those coordinates of y that go round, from the numbers of the drive."""
+        freedoms = self.mechanism.freedoms
+        return {freedoms[n].coordinate: float(r) for n, r in self._ratios(drive).items() if n in self.free and r}
 
     def unknowns(self, states: NDArray[np.float64], drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return y from states of a run, shape (..., states), and the numbers of the drive; shape (..., n)."""

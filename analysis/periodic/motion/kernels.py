@@ -475,7 +475,8 @@ def search(section, end, most, reach, start, known, z):
 
 @kernel(int64(SECTION, float64, float64, int64, VECTOR), purpose="the settling of motions")
 def settle(section, turn, change, most, start):
-    """Follow the motion from ``start``, which is overwritten, until a turn changes y by less than ``change``."""
+    """Follow the motion from ``start``, which is overwritten, until a turn changes y, whole turns of links aside, by less
+    than ``change``."""
     room = make_room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
@@ -483,7 +484,7 @@ def settle(section, turn, change, most, start):
         status = advance(section, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
-        difference(z, start, start)
+        difference_within(z, start, section.ways, start)
         size = magnitude(start, section.scale)
         copy(z, start)
         if size < change:

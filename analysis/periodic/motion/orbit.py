@@ -8,6 +8,7 @@ easily as a stable one.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import reduce
 from math import pi
@@ -90,6 +91,8 @@ class Turn:
         crank's speed if nothing else is free.
     rounding : float
         Amplitude of ``swing`` that is no more than rounding.
+    paces : dict of str to float
+        Of each coordinate that goes round its mean increase for each radian of the crank angle.
 
     Notes
     -----
@@ -107,6 +110,7 @@ class Turn:
     names: tuple[str, ...]
     swing: str
     rounding: float
+    paces: dict[str, float]
 
     def __getitem__(self, name: str) -> FloatArray:
         if name not in self.names:
@@ -117,12 +121,13 @@ class Turn:
     def amplitude(self) -> float:
         """Half the distance between the least and the greatest value of ``swing``, such as a slider position (m).
 
-        It is zero where it is no more than rounding, as of a pendulum that hangs still.
+        Of a coordinate that goes round it is that of the deviation from an even turning. It is zero where it is no more than
+        rounding, as of a pendulum that hangs still.
 
         The Fourier series of the turn is evaluated on a grid eight times as fine, and parabolas are laid through its greatest
         and its least values: good to a millionth of the amplitude if the samples are enough for the series.
         """
-        u = self[self.swing]
+        u = self.around(self.swing)
         n = 8 * len(u)
         fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))
         top = np.array([fine.argmax(), fine.argmin()])
@@ -132,8 +137,14 @@ class Turn:
         size = 0.5 * float(np.ptp(at + beyond))
         return size if size > self.rounding else 0.0
 
+    def around(self, name: str) -> FloatArray:
+        """Return an output about its mean increase, which a coordinate that goes round has."""
+        return self[name] - self.paces.get(name, 0.0) * self.angle
+
     def harmonic(self, name: str, order: float) -> float:
         """Return the amplitude of a harmonic of an output; its order counts per turn of the crank: 1/2 has two turns.
+
+        Of a coordinate that goes round it is that of the deviation from an even turning.
 
         Raises
         ------
@@ -146,7 +157,7 @@ class Turn:
                 f"order {order} of an orbit of {self.turns} turn(s) with {len(self.angle)} samples: its orders are "
                 f"multiples of 1/{self.turns} up to {(len(self.angle) - 1) // 2 / self.turns:g}"
             )
-        return 2.0 * float(np.abs(np.fft.rfft(self[name])[int(number)])) / len(self.angle)
+        return 2.0 * float(np.abs(np.fft.rfft(self.around(name))[int(number)])) / len(self.angle)
 
 
 def _time(speed: FloatArray, way: float) -> tuple[FloatArray, float]:
@@ -250,6 +261,13 @@ class PeriodicOrbit(Shown):
         return self.turns * self.flow.turns
 
     @property
+    def rounds(self) -> dict[str, int]:
+        """Whole turns in a period of the motion, by coordinates, of links that nothing drives and that go round."""
+        paces, way = self.flow.paces(self.point.vector), self.flow.period * self.turns
+        swinging = {f.coordinate: f.period for f in self.flow.mechanism.freedoms if f.swings}
+        return {name: round(paces[name] * way / swinging[name]) for name in paces if name in swinging}
+
+    @property
     def swing(self) -> tuple[str, str]:
         """Short name and unit of the coordinate whose amplitude is returned: ``("u", "m")`` for a five-bar."""
         return self.flow.labels[0], self.flow.components[0][1]
@@ -308,6 +326,7 @@ class PeriodicOrbit(Shown):
             names=tuple(mechanism.output_names[n] for n in keep),
             swing=flow.components[0][0],
             rounding=_ROUNDING * float(self.scale[0]),
+            paces=flow.paces(self.point.vector),
         )
 
     @property
@@ -370,7 +389,8 @@ def orbit_of(
     turns : int
         Turns of the crank in one period; where gears or other cranks make their common period longer, these.
     start : array_like, shape (n,), optional
-        Guess of y at crank angle 0; without it the coordinates with which the mechanism starts, at rest.
+        Guess of y at crank angle 0; without it the coordinates with which the mechanism starts, at rest. If a link that nothing
+        drives goes round from there, a motion is sought first in which it does so in each period.
     settle : bool
         Whether other starts are tried if Newton's method fails from the guess: the state to which the motion settles by
         itself, and those of `starts_of`.
@@ -387,7 +407,7 @@ def orbit_of(
     require_turns(turns, point, guess)
     _check_assembly(point, guess)
     try:
-        return solve_orbit(point, turns, guess)
+        return _solve_as_it_goes(point, turns, guess)
     except OrbitError as error:
         if not settle:
             raise
@@ -395,7 +415,7 @@ def orbit_of(
     status, settled = settle_motion(point, guess, tolerance=1e-8, change=SETTLED, turns=SETTLING_TURNS)
     if status is Status.DONE:
         try:
-            return solve_orbit(point, turns, settled)
+            return _solve_as_it_goes(point, turns, settled)
         except OrbitError:
             pass
     for number in range(SETS):
@@ -413,11 +433,40 @@ def orbit_of(
 def settle_motion(
     point: OperatingPoint, start: FloatArray, *, tolerance: float, change: float, turns: int
 ) -> tuple[Status, FloatArray]:
-    """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most."""
-    settled = start.copy()
+    """Integrate from ``start`` until a turn changes y by less than ``change``, or for ``turns`` turns at most.
+
+    Whole turns of links do not count; the result is the one that is nearest to rest.
+    """
+    settled, flow = start.copy(), point.flow
     section = point.section(start, PLAIN, tolerance=tolerance)
-    status = kernels.settle(section, point.flow.period, change, turns, settled)
-    return Status(status), settled
+    status = kernels.settle(section, flow.period, change, turns, settled)
+    return Status(status), flow.nearest(settled)
+
+
+def _solve_as_it_goes(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
+    """Find a motion by Newton's method, in which links go round as they do after the start; or else as the drive says."""
+    rounds = rounds_from(point, start, turns)
+    if rounds:
+        drive, own = point.drive.with_rounds(point.mechanism, rounds, turns)
+        with suppress(OrbitError):
+            return solve_orbit(operating_point(point.parameters, drive), own, start)
+    return solve_orbit(point, turns, start)
+
+
+def rounds_from(point: OperatingPoint, start: FloatArray, turns: int = 1) -> dict[str, int]:
+    """Return how often links that nothing drives go round in the period after a start, unless the drive says it.
+
+    Returns
+    -------
+    dict of str to int
+        By coordinates, without those that only swing.
+    """
+    flow, freedoms = point.flow, point.mechanism.freedoms
+    swinging = [i for i, n in enumerate(flow.free) if freedoms[n].swings and freedoms[n].coordinate not in point.drive.ratios]
+    if not swinging:
+        return {}
+    shift = point.period(start, turns).shift
+    return {freedoms[flow.free[i]].coordinate: times for i in swinging if (times := round(shift[i] / flow.ways[i]))}
 
 
 def approach(

@@ -26,6 +26,7 @@ from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
 from .drive import SAME, Drive, Torque, drive_of, starts_of
 from .floquet import Stability
+from .flow import Flow
 from .kernels import Status
 from .orbit import (
     SEARCH_TOLERANCE,
@@ -34,6 +35,7 @@ from .orbit import (
     first_guess,
     orbit_of,
     require_turns,
+    rounds_from,
     settle_motion,
     solve_orbit,
 )
@@ -45,6 +47,8 @@ JUMP_TURNS, SETTLED = 5000, 1e-9
 FAR, HALVINGS = 0.25, 6
 #: Periods, in turns, that a steady motion may have.
 PERIODS = (1, 2, 3, 4)
+#: Disturbance of an unstable motion, relative to the scale, from which the steady one is sought.
+_DISTURBANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -212,21 +216,35 @@ def _continued(
 
 
 def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
-    """Return the steady motion on which the mechanism settles from a state at crank angle 0."""
-    status, start = settle_motion(point, state, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
-    if status is not Status.DONE:
-        raise orbit_error(status, point.flow, start)
-    for turns in PERIODS:
-        try:
-            orbit = orbit_of(point.parameters, point.drive, turns=turns, start=start, settle=False)
-        except OrbitError:
-            continue
-        far = np.abs((orbit.start - start) / point.scale(state)).max()
-        if orbit.verdict(0.0).stability is Stability.STABLE and far < 1e-3:
-            return orbit
+    """Return the steady motion on which the mechanism settles from a state at crank angle 0.
+
+    From an unstable motion, as of a pendulum that hangs still, a small disturbance leads on.
+    """
+    scale, start = point.scale(state), state
+    for _ in range(2):
+        status, start = settle_motion(point, start, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
+        if status is not Status.DONE:
+            raise orbit_error(status, point.flow, start)
+        away = None
+        for turns in PERIODS:
+            try:
+                orbit = orbit_of(point.parameters, point.drive, turns=turns, start=start, settle=False)
+            except OrbitError:
+                continue
+            if np.abs(point.flow.within(orbit.start - start) / scale).max() >= 1e-3:
+                continue
+            if orbit.verdict(0.0).stability is Stability.STABLE:
+                return orbit
+            if away is None:
+                values, vectors = np.linalg.eig(orbit.monodromy)
+                away = vectors[:, np.abs(values).argmax()].real / scale
+        if away is None or not away.any():
+            break
+        start = start + _DISTURBANCE * scale * away / np.abs(away).max()
     most, after = (n * point.flow.turns for n in (PERIODS[-1], JUMP_TURNS))
     reason = f"no steady motion with a period of up to {most} turns after {after} turns"
-    raise OrbitError(reason, point.flow, start, np.inf, 0)
+    residual = float(np.abs(point.flow.within(point.period(start, 1).shift) / scale).max())
+    raise OrbitError(reason, point.flow, start, residual, 0)
 
 
 #: Starts of the two methods in a round, and rounds at most.
@@ -246,17 +264,21 @@ class Orbits(Shown):
     orbits : tuple of PeriodicOrbit
         By amplitude, the smallest first.
     agreed : bool
-        Whether the two methods found the same motions and ``index`` is 1; if not, there may be more.
+        Whether the two methods found the same motions and ``index`` is ``index_of_all``; if not, there may be more.
     index : int
         Sum of the signs of det(I - monodromy matrix) over these motions and those whose period divides theirs, each counted
-        once per turn. It is 1 if every motion stays clear of the limit of assembly, since motions come and go in pairs of
-        opposite signs: another sum means that one was missed, or lost at that limit. For several numbers of turns it is the
-        first sum other than 1.
+        once per turn. Motions come and go in pairs of opposite signs: if every motion stays clear of the limit of assembly,
+        another sum than ``index_of_all`` means that one was missed, or lost at that limit. For several numbers of turns it is
+        the first such sum.
+    index_of_all : int
+        The index of all motions: 1, or 0 if a link may go round, for which there is another motion to each, as a pendulum
+        hangs and stands.
     """
 
     orbits: tuple[PeriodicOrbit, ...]
     agreed: bool
     index: int
+    index_of_all: int
 
     def __len__(self) -> int:
         return len(self.orbits)
@@ -275,10 +297,19 @@ class Orbits(Shown):
 
 @takes_published()
 def unsought(parameters: Parameters, drive: Drive) -> str:
-    """Return what an error adds on motions that no search finds, in which a swinging link goes round; empty without one."""
+    """Return what an error adds on motions that no search finds, in which swinging links go round; empty without such links."""
     flow = drive.flow(mechanism_of(parameters))
-    names = [flow.mechanism.freedoms[n].coordinate for n in flow.free if flow.mechanism.freedoms[n].swings]
-    return f"; motions in which {' or '.join(names)} goes round in a period were not sought" if names else ""
+    names = _swinging(flow)
+    if not names:
+        return ""
+    also = " or in which several of them go round" if len(names) > 1 else ""
+    return f"; motions in which {' or '.join(names)} goes round more than once in a turn{also} were not sought"
+
+
+def _swinging(flow: Flow) -> list[str]:
+    """Return the coordinates of the links that nothing drives and that may go round."""
+    freedoms = (flow.mechanism.freedoms[n] for n in flow.free)
+    return [freedom.coordinate for freedom in freedoms if freedom.swings]
 
 
 @takes_published(inputs=driven, initial=started)
@@ -354,7 +385,7 @@ def find_orbit(
             raise failure
         # it repeats itself after fewer turns, and so after these
         return replace(first, others=0)
-    return replace(_met(found, first, start), others=len(found) - 1)
+    return replace(_met(found, drive, first, start), others=len(found) - 1)
 
 
 @takes_published(inputs=driven, initial=started)
@@ -417,13 +448,39 @@ def orbits_of(
     start: ArrayLike | None = None,
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
-    """Find all periodic motions under a `Drive`, ``known`` ones included: see `find_orbits`."""
+    """Find all periodic motions under a `Drive`, ``known`` ones included: see `find_orbits`.
+
+    Of links that nothing drives those that go round are sought, too, one link at a time and in a turn once at most, unless the
+    drive says how often they go round.
+    """
     if not isinstance(turns, int):
         return joined([orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
-    point = operating_point(parameters, drive)
-    guess = first_guess(point.flow, drive, start)
+    mechanism, known = mechanism_of(parameters), list(known)
+    flow = drive.flow(mechanism)
+    drives = [(drive, turns)]
+    drives += [
+        drive.with_rounds(mechanism, {name: sign * times}, turns)
+        for name in _swinging(flow)
+        if name not in drive.ratios
+        for times in range(1, turns * flow.turns + 1)
+        for sign in (1, -1)
+    ]
+    return joined(
+        [
+            _orbits_of(operating_point(parameters, own), of, start, [o for o in known if o.drive.ratios == own.ratios])
+            for own, of in drives
+        ]
+    )
+
+
+def _orbits_of(
+    point: OperatingPoint, turns: int, start: ArrayLike | None, known: Iterable[PeriodicOrbit] = ()
+) -> Orbits:
+    """Find the periodic motions in which links go round as often as the drive says."""
+    guess = first_guess(point.flow, point.drive, start)
     require_turns(turns, point, guess)
     many, deflated = (_Found(point, turns, guess) for _ in range(2))
+    whole = 0 if point.flow.ways.any() else 1
     for orbit in known:
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
@@ -438,22 +495,26 @@ def orbits_of(
             while deflated.seek(place, divide=True):
                 pass
         agreed = many.same_as(deflated)
-        if agreed and many.index == 1:
+        if agreed and many.index == whole:
             break
         for orbit in (*deflated.orbits, *many.orbits):
             many.add(orbit)
             deflated.add(orbit)
         places = [*many.places(MANY, number + 1), *many.between()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
-    return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == 1, index=many.index)
+    return Orbits(
+        orbits=tuple(orbits), agreed=agreed and many.index == whole, index=many.index, index_of_all=whole
+    )
 
 
 def joined(parts: Sequence[Orbits]) -> Orbits:
     """Return the motions of several searches, by amplitude."""
+    whole = parts[0].index_of_all
     return Orbits(
         orbits=tuple(sorted((o for part in parts for o in part.orbits), key=lambda orbit: orbit.amplitude)),
         agreed=all(part.agreed for part in parts),
-        index=next((part.index for part in parts if part.index != 1), 1),
+        index=next((part.index for part in parts if part.index != whole), whole),
+        index_of_all=whole,
     )
 
 
@@ -482,10 +543,8 @@ class _Found:
         start = approach(self.point, self.turns, place, self.known if divide else None)
         if start is None or (not divide and self.knows(start, _NEAR)):
             return False
-        flow = self.point.flow
         try:
-            # of the motions that are whole turns apart the one that is nearest to rest
-            return self.add(solve_orbit(self.point, self.turns, flow.rest + flow.within(start - flow.rest)))
+            return self.add(solve_orbit(self.point, self.turns, self.point.flow.nearest(start)))
         except OrbitError:
             return False
 
@@ -518,25 +577,31 @@ class _Found:
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 
-def _met(found: Orbits, first: PeriodicOrbit | None, start: ArrayLike | None) -> PeriodicOrbit:
-    """Return the motion that a machine reaches; if none is stable, ``first``; without that, the smallest."""
-    stable = found.stable
-    if len(stable) == 1:
+def _met(
+    found: Orbits, drive: Drive, first: PeriodicOrbit | None, start: ArrayLike | None
+) -> PeriodicOrbit:
+    """Return the motion that a machine reaches; if none of its kind is stable, ``first``; without that, the smallest."""
+    stable, rounds = found.stable, {}
+    if len(stable) == 1 and (first is None or stable[0].rounds == first.rounds):
         return stable[0]
     if not stable:
         return first if first is not None else found.orbits[0]
-    point, drive = stable[0].point, stable[0].drive
+    point = operating_point(stable[0].parameters, drive)
     guess = first_guess(point.flow, drive, start)
     arrived, pace = None, None if drive.speed is None and start is not None else _pace(drive)
     if pace is not None and pace > 0.0 and found.orbits[0].turns == 1:
         speeds = np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS)
         last = sweep(point.parameters, speeds, drive=drive).orbits[-1]
         if last is not None and last.turns == 1:
-            arrived = last.start
+            arrived, rounds = last.start, last.rounds
     if arrived is None:
         status, settled = settle_motion(point, guess, tolerance=1e-8, change=1e-6, turns=2000)
-        arrived = settled if status is Status.DONE else None
+        if status is Status.DONE:
+            arrived, rounds = settled, rounds_from(point, settled)
     if arrived is None:
         return stable[0]
+    stable = tuple(orbit for orbit in stable if orbit.rounds == rounds)
+    if not stable:
+        return first if first is not None else found.orbits[0]
     scale = point.scale(guess)
-    return min(stable, key=lambda orbit: float(np.abs((orbit.start - arrived) / scale).max()))
+    return min(stable, key=lambda orbit: float(np.abs(point.flow.within(orbit.start - arrived) / scale).max()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -306,6 +306,13 @@ class Family:
             return self.vary(value)
         return with_values(self.parameters, self.drive, {self.vary: value})
 
+    def with_ratios(self, ratios: Mapping[str, Any]) -> Family:
+        """Return the motions in which other cranks and links go round so often for each turn of the crank: see `Drive`."""
+        if ratios == self.drive.ratios:
+            return self
+        drive = replace(self.drive, ratios=ratios)
+        return replace(self, drive=drive, vary=partial(_turning, self.vary, ratios) if callable(self.vary) else self.vary)
+
     def format_value(self, value: float) -> str:
         """Format a value of the parameter with its name and unit, speeds also in rpm."""
         return format_value(self.name, value, self.unit)
@@ -317,6 +324,12 @@ class Family:
         mechanism = mechanism_of(self.parameters)
         vectors, numbers = zip(*((d.vector(mechanism), np.array(p.constants())) for p, d in (self.at(a), self.at(b))))
         return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
+
+
+def _turning(vary: Callable[[float], Operation], ratios: Mapping[str, Any], value: float) -> Operation:
+    """Return the mechanism and drive at a value of a parameter, with other ratios."""
+    parameters, drive = vary(value)
+    return parameters, replace(drive, ratios=ratios)
 
 
 FloatArray = NDArray[np.float64]

@@ -137,7 +137,7 @@ def _turn_columns(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn
     columns: dict[str, Callable[[Turn], float]] = {
         f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * orbit.turns / turn.period,
         f"amplitude of {what}": lambda turn: turn.amplitude,
-        f"mean of {what}": lambda turn: float(turn[swing].mean()),
+        f"mean of {what}": lambda turn: float(turn.around(swing).mean()),
     }
     for order in (1, 2, 3):
         columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]

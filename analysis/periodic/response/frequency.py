@@ -367,7 +367,7 @@ class _Search:
                 continue
             self._keep(
                 follow(
-                    self.family,
+                    self.family.with_ratios(orbit.drive.ratios),
                     orbit,
                     value,
                     low=self.low,
@@ -398,14 +398,14 @@ class _Search:
 
         doubled = self.branches
         for largest in (GREATEST_MULTIPLIER, *[STRAYED] * (times - 1))[:times]:
-            points = [s for branch in doubled for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
+            points = [(b.family, s) for b in doubled for s in b.special if s.kind is Crossing.PERIOD_DOUBLING]
             doubled = []
-            for special in points:
+            for family, special in points:
                 if is_end(special):
                     continue
                 try:
                     branch = switch(
-                        self.family,
+                        family,
                         special,
                         low=self.low,
                         high=self.high,
@@ -437,7 +437,7 @@ class _Search:
             if self.stop() or orbit.largest > limit or self._knows(orbit, value):
                 continue
             branch = follow_both(
-                self.family,
+                self.family.with_ratios(orbit.drive.ratios),
                 orbit,
                 value,
                 low=self.low,
