@@ -99,16 +99,18 @@ def _motions(title: str, found: Sequence[Orbits], common: int) -> None:
         word = orbit.verdict().stability
         stays = word is not Stability.UNSTABLE
         number += stays
-        size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}"
+        round_it = "".join(f", {name} goes round {times:+d}" for name, times in orbit.rounds.items())
+        size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}{round_it}"
         shown = str(number) if stays else ""
         rows.append((shown, str(orbit.crank_turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
     show_table(title, headings, rows, words=("stability",))
     for periods, part in enumerate(found, start=1):
         sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"
-        if part.index != 1:
+        if part.index != part.index_of_all:
             sure = (
                 "there may be another motion, or one at which the links lock: motions come and go in pairs, a stable and an "
-                f"unstable one, and these do not pair up (sum of indices {part.index}, which is 1 of all motions)"
+                f"unstable one, and these do not pair up (sum of indices {part.index}, which is {part.index_of_all} of all "
+                "motions)"
             )
         of = "" if len(found) == 1 else f"of {format_count(periods * common, 'turn')}: "
         say(of + sure)

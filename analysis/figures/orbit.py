@@ -6,7 +6,7 @@ import numpy as np
 
 from ..display import format_turns
 from ..mechanisms import mechanism_of
-from ..periodic import Orbits, PeriodicOrbit
+from ..periodic import Orbits, PeriodicOrbit, Turn
 from ..units import RAD_S_PER_RPM
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
@@ -43,7 +43,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     def closed(name: str) -> tuple[np.ndarray, str]:
         """Return an output over the period in drawn units, with its first value repeated at the end, and its label."""
         unit, factor = display_unit(variables[name])
-        return factor * np.append(turn[name], turn[name][0]), f"{spoken(name)} [{unit}]"
+        return factor * _closed(orbit, turn, name), f"{spoken(name)} [{unit}]"
 
     angle = np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns))
     ticks = np.linspace(0.0, angle[-1], 5).tolist()
@@ -60,6 +60,11 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
         panels.append(Panel(x_label=x_label, y_label=y_label, curves=[Curve(x=x, y=y), begin], title=caption))
     panels.append(_multipliers(orbit))
     return plot_curves(panels, title=title or _title(orbit, turn.period), columns=2, size=(4.4, 2.9))
+
+
+def _closed(orbit: PeriodicOrbit, turn: Turn, name: str) -> np.ndarray:
+    """Return an output over the period with its value at the end, which of what goes round is not the first."""
+    return np.append(turn[name], turn[name][0] + turn.paces.get(name, 0.0) * orbit.flow.period * orbit.turns)
 
 
 def _multipliers(orbit: PeriodicOrbit) -> Panel:
@@ -96,7 +101,7 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
         curves.append(
             Curve(
                 x=np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns)),
-                y=factor * np.append(turn[turn.swing], turn[turn.swing][0]),
+                y=factor * _closed(orbit, turn, turn.swing),
                 line="-" if stable else "--",
                 label=f"{orbit.verdict().stability.value}, largest multiplier {orbit.largest:.3g}",
             )

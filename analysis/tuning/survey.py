@@ -27,7 +27,6 @@ from ..periodic import (
     largest_multipliers,
     orbits_of,
     passes,
-    period_from,
     scale_of,
     speed_names,
 )
@@ -264,7 +263,9 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
         return response
     level, (low, high) = wish.level(orbit), _ends(wish, FAR)
     try:
-        branch = follow_both(response.family.with_ratios(orbit.drive.ratios), orbit, level, low=low, high=high, greatest=STEP)
+        branch = follow_both(
+            response.family.with_ratios(orbit.drive.ratios), orbit, level, low=low, high=high, greatest=STEP
+        )
     except ContinuationError:
         return response
     branches = (*response.branches, branch)
@@ -274,9 +275,7 @@ def _add_branch(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Respons
 def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
     """Return whether a motion is on one of the branches; one of several turns may begin at any of them."""
     level, width = wish.level(orbit), response.high - response.low
-    starts = [orbit.start]
-    for _ in range(orbit.turns - 1):
-        starts.append(starts[-1] + period_from(orbit.parameters, orbit.drive, starts[-1], 1).shift)
+    starts = orbit.passages()
     own = [branch for branch in response.branches if branch.turns == orbit.turns]
     return any(passes(branch, level, start, width) for branch in own for start in starts)
 

@@ -221,6 +221,19 @@ def test_an_arm_that_hangs_on_a_crank_turns_back_in_its_pin() -> None:
     assert orbit.rounds == {"swing.angle": -1}
     np.testing.assert_allclose(orbit.start, hangs - [0.0, speed], atol=1e-8)
     assert basins("hanging-arm", Drive(speed=speed), points=4).share(0) > 0.0
+    found = find_orbits("hanging-arm", speed=speed)
+    assert (found.agreed, found.index) == (True, 0)  # the arm that stands on the pin is among them
+    # a motion of three turns in which the arm goes round once is one motion, whichever turn comes first
+    thirds = [
+        orbit
+        for orbit in find_orbits("hanging-arm", speed=speed, turns=3).orbits
+        if abs(orbit.rounds["swing.angle"]) == 1
+    ]
+    starts = [orbit.passages() for orbit in thirds]
+    assert [len(passed) for passed in starts] == [3] * len(thirds)
+    flow, everything = orbit.flow, np.vstack(starts)
+    apart = np.abs(flow.within(everything[:, None] - everything)).max(axis=2)
+    assert apart[~np.eye(len(apart), dtype=bool)].min() > 1e-3
 
 
 def test_motions_in_which_a_link_goes_round_more_than_once_are_said_not_to_be_sought() -> None:
@@ -290,7 +303,7 @@ def test_a_pendulum_that_goes_round_with_the_crank_is_found() -> None:
     assert sorted(orbit.rounds["swing.angle"] for orbit in round_it) == [-1, -1, 1, 1]
     assert [sum(orbit.start[1] * sign > 1.0 for orbit in found.stable) for sign in (1.0, -1.0)] == [1, 1]
     for orbit in round_it:
-        start, multipliers = going_round(speed, orbit.start + [0.01, 0.1])
+        start, multipliers = going_round(speed, orbit.start + np.array([0.01, 0.1]))
         np.testing.assert_allclose(orbit.start, start, rtol=1e-8)
         np.testing.assert_allclose(np.sort_complex(orbit.multipliers), multipliers, rtol=1e-7)
         turn = orbit.turn()
@@ -310,7 +323,7 @@ def test_damping_ends_what_goes_round_where_the_mean_torque_says() -> None:
 def test_a_machine_that_starts_to_go_round_goes_on() -> None:
     parameters, speed = yoke("yoke-started").parameters, 300.0 * RAD_S_PER_RPM
     round_it = max(find_orbits(parameters, speed=speed).stable, key=lambda orbit: orbit.start[1])
-    near = round_it.start + [0.05, 0.5]
+    near = round_it.start + np.array([0.05, 0.5])
     assert orbit_of(parameters, Drive(speed=speed), start=near).rounds == {"swing.angle": 1}
     swept = sweep(parameters, np.linspace(300.0, 400.0, 5) * RAD_S_PER_RPM, start=near)
     assert [orbit and orbit.rounds for orbit in swept.orbits] == [{"swing.angle": 1}] * 5

@@ -188,12 +188,12 @@ class Drive:
             raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
         chosen = self.arguments(mechanism)
         modes = tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes)
-        own, freedoms = mechanism.freedoms[crank.freedom].period, mechanism.freedoms
-        bases = (
-            (ratio * round(own / (2.0 * pi)) / round(freedoms[n].period / (2.0 * pi)) if freedoms[n].swings else ratio)
-            for n, ratio in ratios.items()
-        )
-        made = flow(mechanism, modes, crank.freedom, lcm(*(base.denominator for base in bases)))
+        freedoms, way = mechanism.freedoms, {n: round(f.period / (2.0 * pi)) for n, f in enumerate(mechanism.freedoms)}
+        common = lcm(*(ratio.denominator for n, ratio in ratios.items() if not freedoms[n].swings))
+        # of a link that goes round, in its own whole turns
+        rounds = (ratio * way[crank.freedom] / way[n] for n, ratio in ratios.items() if freedoms[n].swings)
+        base = lcm(common, *(of.denominator for of in rounds))
+        made = flow(mechanism, modes, crank.freedom, base, base // common)
         for number in made.others:
             name = mechanism.freedoms[number].coordinate
             if number in made.free and number not in ratios and not mechanism.freedoms[number].swings:
@@ -527,6 +527,12 @@ def coordinate_ranges(
     return sides[0], sides[1]
 
 
+def even_rates(drive: Drive, flow: Flow, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean rate of each free coordinate, of those that go round that of an even turning; shape (free,)."""
+    turning, pace = drive.turning(flow.mechanism), drive.speed or guess[-1]
+    return np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
+
+
 def starts_of(
     parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
 ) -> NDArray[np.float64]:
@@ -552,9 +558,7 @@ def starts_of(
     low, high = coordinate_ranges(parameters, drive, guess)
     sequence = qmc.Sobol(flow.size, rng=number).random(count)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
-    # what goes round has this rate on average
-    turning, pace = drive.turning(flow.mechanism), drive.speed or guess[-1]
-    around = np.array([pace * turning.get(n, 0) for n in flow.free], dtype=float)
+    around = even_rates(drive, flow, guess)
     # the centre and the half axes of each ellipse
     rest = flow.rest[:half]
     ellipses = [(rest, np.minimum(rest - low, high - rest))]

@@ -99,7 +99,9 @@ class Flow:
     crank : int
         Number of the cyclic freedom whose angle is the independent variable.
     base : int
-        Turns of the crank after which all cranks have made whole turns.
+        Turns of the crank after which all cranks have made whole turns, and all links that go round.
+    commons : int
+        Common periods of the cranks alone in that time.
 
     Attributes
     ----------
@@ -127,11 +129,12 @@ class Flow:
         Increase of each component after which the motion is the same: a whole turn of an angle; 0 where there is none.
     """
 
-    def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int) -> None:
+    def __init__(self, mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int, commons: int) -> None:
         self.mechanism = mechanism
         self.modes = modes
         self.crank = crank
         self.base = base
+        self.commons = commons
         self.others = tuple(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0 and n != crank)
         by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
         commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
@@ -172,7 +175,7 @@ class Flow:
 
     @property
     def period(self) -> float:
-        """Return the crank angle (rad) of the common period of all cranks: one turn if there is one crank."""
+        """Return the crank angle (rad) of the common period of all that goes round: one turn if that is the crank alone."""
         return self.mechanism.freedoms[self.crank].period * self.base
 
     @property
@@ -357,6 +360,6 @@ def label(variable: Variable) -> str:
 
 
 @cache
-def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1) -> Flow:
+def flow(mechanism: Mechanism, modes: tuple[int, ...], crank: int, base: int = 1, commons: int = 1) -> Flow:
     """Return the flow of a mechanism driven in one way; it is built at the first call and then kept."""
-    return Flow(mechanism, modes, crank, base)
+    return Flow(mechanism, modes, crank, base, commons)

@@ -50,6 +50,8 @@ ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: Search for motions far from a guess: tolerance, iterations at most, and the greatest correction in the scale of y. What it
 #: finds is solved again.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
+#: Pieces of a common period in which motions near an even turning are sought.
+EVEN_PIECES = 12
 #: Sets of starts if Newton's method fails from the guess, and starts of each, a power of two: near a resonance of small
 #: damping one in some forty leads to the motion.
 SETS, STARTS = 4, 64
@@ -231,6 +233,7 @@ class PeriodicOrbit(Shown):
         except LinkworkError as error:
             said, swing = f" that cannot be followed ({error})", ""
         turns = format_count(self.crank_turns, "turn")
+        swing += "".join(f"; {name} goes round {times:+d}" for name, times in self.rounds.items())
         others = f"; {format_count(self.others, 'other motion')} there: find_orbits" if self.others else ""
         return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 
@@ -358,10 +361,13 @@ class PeriodicOrbit(Shown):
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
 
     def passages(self) -> FloatArray:
-        """Return y at the beginning of each turn of the period, any of which may be its start; shape (turns, n)."""
-        passed = [self.start]
-        for _ in range(self.turns - 1):
-            passed.append(passed[-1] + self.point.period(passed[-1], 1).shift)
+        """Return y at the beginning of each turn, or common period, any of which may be the start; shape (turns, n)."""
+        passed, flow, paces = [self.start], self.flow, self.flow.paces(self.point.vector)
+        angles = np.array([0.0, flow.period / flow.commons])
+        # y counts from an even turning that is a part of a turn on there
+        ahead = angles[1] * np.array([paces.get(name, 0.0) for name, _ in flow.components])
+        for _ in range(self.turns * flow.commons - 1):
+            passed.append(self.point.shoot(angles, passed[-1][None, :]).y[0] + ahead)
         return np.array(passed)
 
 
@@ -462,7 +468,9 @@ def rounds_from(point: OperatingPoint, start: FloatArray, turns: int = 1) -> dic
         By coordinates, without those that only swing.
     """
     flow, freedoms = point.flow, point.mechanism.freedoms
-    swinging = [i for i, n in enumerate(flow.free) if freedoms[n].swings and freedoms[n].coordinate not in point.drive.ratios]
+    swinging = [
+        i for i, n in enumerate(flow.free) if freedoms[n].swings and freedoms[n].coordinate not in point.drive.ratios
+    ]
     if not swinging:
         return {}
     shift = point.period(start, turns).shift
@@ -492,6 +500,37 @@ def approach(
         np.empty(n * (1 + n)),
     )
     return start if status == Status.DONE else None
+
+
+def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> FloatArray | None:
+    """Search a motion near an even turning, however unstable, by multiple shooting; return its start, None if there is none.
+
+    Parameters
+    ----------
+    place : ndarray, shape (n,)
+        y of the even turning, which stays the same.
+    """
+    k, n = EVEN_PIECES * turns, point.flow.size
+    angles, starts, scale = (
+        np.linspace(0.0, point.flow.period * turns, k + 1),
+        np.tile(place, (k, 1)),
+        point.scale(place),
+    )
+    jacobian, pieces = np.zeros((k, n, k, n)), np.arange(k)
+    jacobian[pieces, :, (pieces + 1) % k] = -np.eye(n)
+    for _ in range(SEARCH_ITERATIONS):
+        try:
+            ends = point.shoot(angles, starts)
+            jacobian[pieces, :, pieces] = ends.matrices
+            gaps = ends.y - starts[(pieces + 1) % k]
+            change = np.linalg.solve(jacobian.reshape(k * n, k * n), gaps.ravel()).reshape(k, n)
+        except (OrbitError, np.linalg.LinAlgError):
+            return None
+        size = float(np.abs(change / scale).max())
+        starts = starts - change * min(1.0, REACH / size) if size > 0.0 else starts
+        if size < SEARCH_TOLERANCE:
+            return np.array(starts[0])
+    return None
 
 
 def first_guess(flow: Flow, drive: Drive, start: ArrayLike | None, speed: float | None = None) -> FloatArray:

@@ -24,7 +24,7 @@ from ...mechanisms import InitialState, Parameters, mechanism_of
 from ...run import Inputs, driven, started, takes_published
 from ...units import Amount, in_si
 from .discretisation import OperatingPoint, OrbitError, operating_point, orbit_error
-from .drive import SAME, Drive, Torque, drive_of, starts_of
+from .drive import SAME, Drive, Torque, drive_of, even_rates, starts_of
 from .floquet import Stability
 from .flow import Flow
 from .kernels import Status
@@ -32,6 +32,7 @@ from .orbit import (
     SEARCH_TOLERANCE,
     PeriodicOrbit,
     approach,
+    approach_even,
     first_guess,
     orbit_of,
     require_turns,
@@ -484,6 +485,12 @@ def _orbits_of(
     for orbit in known:
         many.add(orbit)
     places = [guess, *many.places(MANY, 0)]
+    if whole == 0:
+        # what goes round evenly may stand where it hangs
+        even, free = guess.copy(), len(point.flow.free)
+        even[free : 2 * free] = even_rates(point.drive, point.flow, guess)
+        near = (approach_even(point, turns, even + share * point.flow.ways) for share in (0.0, 0.25, 0.5, 0.75))
+        places += [place for place in near if place is not None]
     settled = settle_motion(point, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
     if settled[0] is Status.DONE:
         places.append(settled[1])
@@ -502,9 +509,7 @@ def _orbits_of(
             deflated.add(orbit)
         places = [*many.places(MANY, number + 1), *many.between()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
-    return Orbits(
-        orbits=tuple(orbits), agreed=agreed and many.index == whole, index=many.index, index_of_all=whole
-    )
+    return Orbits(orbits=tuple(orbits), agreed=agreed and many.index == whole, index=many.index, index_of_all=whole)
 
 
 def joined(parts: Sequence[Orbits]) -> Orbits:
@@ -555,10 +560,10 @@ class _Found:
         passed = orbit.passages()
         # a motion that is back at its start before the last turn has a shorter period
         away = np.abs(self.point.flow.within(passed - orbit.start)) / self.scale
-        period = next((n for n in range(1, orbit.turns) if away[n].max() < SAME), orbit.turns)
+        period = next((n for n in range(1, len(passed)) if away[n].max() < SAME), len(passed))
         self.known = np.vstack([self.known, passed[:period]])
         self.index += period * int(np.sign(np.linalg.det(np.eye(len(orbit.start)) - orbit.monodromy)))
-        if period == orbit.turns:
+        if period == len(passed):
             self.orbits.append(orbit)
         return True
 
@@ -577,9 +582,7 @@ class _Found:
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 
-def _met(
-    found: Orbits, drive: Drive, first: PeriodicOrbit | None, start: ArrayLike | None
-) -> PeriodicOrbit:
+def _met(found: Orbits, drive: Drive, first: PeriodicOrbit | None, start: ArrayLike | None) -> PeriodicOrbit:
     """Return the motion that a machine reaches; if none of its kind is stable, ``first``; without that, the smallest."""
     stable, rounds = found.stable, {}
     if len(stable) == 1 and (first is None or stable[0].rounds == first.rounds):

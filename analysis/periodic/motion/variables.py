@@ -311,7 +311,9 @@ class Family:
         if ratios == self.drive.ratios:
             return self
         drive = replace(self.drive, ratios=ratios)
-        return replace(self, drive=drive, vary=partial(_turning, self.vary, ratios) if callable(self.vary) else self.vary)
+        return replace(
+            self, drive=drive, vary=partial(_turning, self.vary, ratios) if callable(self.vary) else self.vary
+        )
 
     def format_value(self, value: float) -> str:
         """Format a value of the parameter with its name and unit, speeds also in rpm."""
