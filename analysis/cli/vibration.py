@@ -200,7 +200,8 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
     for number, branch in enumerate(response.branches, start=1):
         words = [s.value for s in branch.stability()]
         shares = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
-        events = [f"{s.kind.value} at {factor * s.parameter:.6g} ({_form(response.family, s)})" for s in branch.special]
+        shares += "".join(f", {name} goes round {times:+d}" for name, times in branch.orbits[0].rounds.items())
+        events = [f"{s.kind.value} at {factor * s.parameter:.6g} ({_form(branch.family, s)})" for s in branch.special]
         begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
         ends = "closed" if branch.closed else ends
         rows.append((str(number), str(branch.crank_turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
