@@ -5,7 +5,8 @@
     python -m benchmarks.first linkages klann watt-1
 
 The second and third are of the library's linkages: from the file to a run and to a native FMU, on an empty cache, on one
-that another linkage has filled, and once more.
+that another linkage has filled, and once more. An empty cache is measured twice: without the kernels that an installation
+carries, and with them.
 
 Each is a process of its own; times are by the clock, and of the processor, which other programs change less.
 """
@@ -23,24 +24,23 @@ from time import perf_counter
 from rich.console import Console
 from rich.table import Table
 
-#: Arguments of Python; what is written goes to the folder in which they run.
+#: Code for Python and its arguments; what is written goes to the folder in which they run.
+COMMAND = "from analysis.cli import main; main()"
 WAITS = {
-    "import analysis": ("-c", "import analysis"),
-    "linkwork --version": ("-m", "analysis.cli", "--version"),
-    "simulate, Table 3.1": ("-c", "import analysis; analysis.simulate('table-3.1', stop_time=0.5)"),
-    "linkwork resonance --published rig-2-spring-c": (
-        "-m",
-        "analysis.cli",
-        "resonance",
-        "--published",
-        "rig-2-spring-c",
-    ),
+    "import analysis": ("import analysis",),
+    "linkwork --version": (COMMAND, "--version"),
+    "simulate, Table 3.1": ("import analysis; analysis.simulate('table-3.1', stop_time=0.5)",),
+    "linkwork resonance --published rig-2-spring-c": (COMMAND, "resonance", "--published", "rig-2-spring-c"),
 }
+#: Of these, what uses no compiled code.
+IDLE = ("import analysis", "linkwork --version")
+#: Comes before, where nothing is carried.
+WITHOUT = "from pathlib import Path; from analysis.numerics import codegen; codegen.CARRIED = Path('none'); "
 
 #: What is done with the file of a linkage, whose path follows.
 FROM_A_FILE = {
-    "run": ("-m", "analysis.cli", "run"),
-    "native FMU": ("-m", "analysis.cli", "build", "--kinds", "native", "--dest", "."),
+    "run": (COMMAND, "run"),
+    "native FMU": (COMMAND, "build", "--kinds", "native", "--dest", "."),
 }
 LIBRARY = Path(__file__).parents[1] / "examples" / "linkages"
 #: The linkage that fills the cache for the others.
@@ -54,11 +54,18 @@ def waited(arguments: tuple[str, ...], folder: str) -> tuple[str, str, str]:
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     environment = os.environ | {"LINKWORK_CACHE_DIR": folder}
     done = subprocess.run(
-        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=True
     )
     seconds, after = perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
     processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return f"{seconds:.2f}", f"{processor:.2f}", str(done.stderr.count("linkwork: compiling"))
+
+
+def first(arguments: tuple[str, ...], *, carried: bool) -> tuple[str, str, str]:
+    """Measure on an empty cache, with the kernels that the installation carries or without."""
+    code, *others = arguments
+    with tempfile.TemporaryDirectory() as folder:
+        return waited((code if carried else WITHOUT + code, *others), folder)
 
 
 def linkages(names: list[str]) -> Table:
@@ -66,6 +73,7 @@ def linkages(names: list[str]) -> Table:
     table = Table(title="from file; seconds by the clock, of the processor; compilations")
     for heading in (
         "",
+        *("nothing carried", "s", "compiled"),
         *("empty cache", "s", "compiled"),
         *("another before", "s", "compiled"),
         *("again", "s", "compiled"),
@@ -74,26 +82,32 @@ def linkages(names: list[str]) -> Table:
     for name in names:
         for what, command in FROM_A_FILE.items():
             measured, other = ((*command, str(LIBRARY / f"{own}.toml")) for own in (name, BEFORE))
-            with tempfile.TemporaryDirectory() as folder:
-                alone = waited(measured, folder)
+            bare = first(measured, carried=False)
+            alone = first(measured, carried=True)
             with tempfile.TemporaryDirectory() as folder:
                 waited(other, folder)
-                table.add_row(f"{name}: {what}", *alone, *waited(measured, folder), *waited(measured, folder))
+                table.add_row(f"{name}: {what}", *bare, *alone, *waited(measured, folder), *waited(measured, folder))
     return table
 
 
 def main() -> None:
     """Measure and print."""
     if sys.argv[1:2] == ["linkages"]:
-        Console(width=140).print(linkages(sys.argv[2:] or list(MEASURED)))
+        Console(width=180).print(linkages(sys.argv[2:] or list(MEASURED)))
         return
     table = Table(title="seconds by the clock, of the processor; compilations")
-    for heading in ("", *("first", "s", "compiled"), *("again", "s", "compiled")):
+    for heading in (
+        "",
+        *("nothing carried", "s", "compiled"),
+        *("first", "s", "compiled"),
+        *("again", "s", "compiled"),
+    ):
         table.add_column(heading, justify="right" if heading else "left")
     for what, arguments in WAITS.items():
         with tempfile.TemporaryDirectory() as folder:
-            table.add_row(what, *waited(arguments, folder), *waited(arguments, folder))
-    Console(width=120).print(table)
+            bare = first(arguments, carried=False) if what not in IDLE else ("", "", "")
+            table.add_row(what, *bare, *waited(arguments, folder), *waited(arguments, folder))
+    Console(width=150).print(table)
 
 
 if __name__ == "__main__":
