@@ -254,7 +254,7 @@ class TestSeries1:
         least = series_1.variational().error
         assert (least <= series_1.direct().evaluation.errors + 1e-9).all()
         for k in (0, 20, 41):
-            found = series_1.nearest(float(series_1.ROTATION[k]), complex(series_1.desired()[k]))
+            found, _ = series_1.nearest(float(series_1.ROTATION[k]), complex(series_1.desired()[k]))
             assert least[k] == pytest.approx(found, abs=1e-3)
 
     @pytest.mark.slow

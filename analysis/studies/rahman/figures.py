@@ -161,14 +161,16 @@ def greatest(case: Case, quantity: FloatArray) -> float:
 def spikes_deg(case: Case, component: Component) -> FloatArray:
     """Find the crank angles (deg) of the poles of a component, as zeros of its reciprocal."""
     value = values(case, component)
+    # a dead centre at one of the angles has no value
+    angle, value = ANGLES_DEG[np.isfinite(value)], value[np.isfinite(value)]
     (changes,) = np.nonzero(value[:-1] * value[1:] < 0.0)
     # a zero of the component changes its sign too, but between small values
     size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
     found = []
-    for at in changes[size > SPIKE * greatest(case, value)].tolist():
+    for at in changes[size > SPIKE * greatest(case, values(case, component))].tolist():
         near_it = slice(at - 1, at + 3)
         reciprocal = value[at] / value[near_it]
-        found.append(np.polyfit(reciprocal, ANGLES_DEG[near_it], 3)[-1])
+        found.append(np.polyfit(reciprocal, angle[near_it], 3)[-1])
     return np.array(found)
 
 
@@ -257,7 +259,14 @@ def _forces() -> tuple[Statement, ...]:
         counts = [spikes_deg(case, c).size for case in ALL if greatest(case, values(case, c)) > NOTHING]
         count = counts[int(np.argmax(np.abs(np.array(counts) - _COUNTS[stated])))]
         spikes.append(replace(near(f"spikes of {c.symbol}", float(_COUNTS[stated]), count, 0.0), stated=stated))
-    for case in ALL:
+    finite = [
+        c.symbol
+        for c in components
+        if greatest(IDEAL, values(IDEAL, c)) > NOTHING
+        and SPIKES.get(c.symbol) != "no"
+        and not spikes_deg(IDEAL, c).size
+    ]
+    for case in (IDEAL, *ALL):
         away = float(np.abs(dead_centres_deg(case) - SPIKES_DEG).max())
         spikes.append(at_most(f"{full_name(case)}: distance from 100 and 300 deg", ABOUT_DEG, away, "deg"))
     return (
@@ -281,13 +290,15 @@ def _forces() -> tuple[Statement, ...]:
             "In most of the joint force and torque graphs (except for [3F3j] with no spike, [3F3k] with one spike and [4F4k] "
             "with one spike) two spikes are seen, one near 100 degrees and other near 300 degrees.",
             text("section 3.3, L1125"),
-            "poles of each component in a turn, the count that differs most from the stated one of the nine cases, "
-            "but those in which the component vanishes; greatest distance of the poles, which are the dead centres, "
-            "from 100 and 300 deg",
+            "poles of each component in a turn, the count that differs most from the stated one of the nine cases beside the "
+            "ideal one, but those in which the component vanishes; greatest distance of the dead centres, where the poles "
+            "lie, from 100 and 300 deg, of the ideal case too, which stands in each graph (L1113)",
             f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*",
             tuple(spikes),
             "3F3k is finite at the dead centres, where 4F4k has a pole as the others have, twice in a turn; by the printed 69c "
-            "3F3k takes eta3'' of 41a, which is unbounded out of the plane. The offset and the twist move the dead centres",
+            "3F3k takes eta3'' of 41a, which is unbounded out of the plane. The offset and the twist move the dead centres; "
+            f"in the ideal case, where they lie at {' and '.join(f'{at:.0f}' for at in dead_centres_deg(IDEAL))} deg, "
+            f"{' and '.join(finite)} have no pole",
         ),
         Statement(
             "Hence [from the spikes] it is very obvious that with the increase of offset the chance of fatigue failure of "

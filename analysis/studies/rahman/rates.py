@@ -15,6 +15,7 @@ from ..statements import Statement, at_least, at_most, near, text
 from ..study import Study, StudyResult, padded
 from ..variation import unvaried
 from .figures import (
+    ALL,
     ANGLE,
     ANGLES_DEG,
     NOTHING,
@@ -54,7 +55,7 @@ from .printed import (
     mended_row,
     separated_rates,
 )
-from .table import IDEAL, Case
+from .table import FAMILIES, IDEAL, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
@@ -228,8 +229,14 @@ def _ended(case: Case, angles_deg: FloatArray, start: FloatArray) -> FloatArray:
     return np.asarray(ended.unknowns / unit)
 
 
-def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
+def _ended_on_turn(case: Case) -> FloatArray:
+    """Return the unknowns at which the printed iteration ends at half degrees, from the loops at every fifth degree."""
+    starts = np.repeat(followed(case).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0)
+    return _ended(case, ANGLES_DEG[:-1], starts)
+
+
+def _zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles (deg) of the zeros of sin theta2 where the printed iteration ends, and the unknowns there."""
     sine, step = np.sin(unknowns[:, 0]), np.diff(angles_deg).max()
     small = np.abs(sine) < CLEAR_SINE
     (at,) = np.nonzero((sine[:-1] * sine[1:] < 0.0) & small[:-1] & small[1:])
@@ -238,6 +245,12 @@ def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> t
         step *= 0.5
         before = np.sin(_ended(case, zeros + step, start)[:, 0]) * sine[at] > 0.0
         zeros = np.where(before, zeros + step, zeros)
+    return zeros, start
+
+
+def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles (deg) `BESIDE_DEG` before and after each zero of sin theta2, and the unknowns there."""
+    zeros, start = _zeros(case, angles_deg, unknowns)
     beside = np.concatenate([zeros - BESIDE_DEG, zeros + BESIDE_DEG])
     return beside, _ended(case, beside, np.tile(start, (2, 1)))
 
@@ -255,6 +268,7 @@ def _roundoff(q: Joints) -> float:
 def _dead_centres() -> tuple[Statement, ...]:
     """Judge the cause that section 3.2 gives for the spikes, in the plane and where the printed iteration ends."""
     cases = [Case(f"a4 = {a4:g} in, S1 = 0", a4, 0.0, 270.0) for a4 in (10.0, 20.0, 30.0)]
+    twisted = [case for case in FAMILIES["twist"].cases if case.twist_deg != IDEAL.twist_deg]
     worst, least, rough, near_zero, high, whole = 0.0, np.inf, 0.0, [], [], []
     for case, shifted in zip(cases, OFFSETS):
         p, centres = parameters(case.offset_in), dead_centres_deg(case)
@@ -268,9 +282,7 @@ def _dead_centres() -> tuple[Statement, ...]:
             )
             for which, angle in zip(("first", "second"), th2)
         ]
-        # half degrees from the loops at every fifth
-        angles = ANGLES_DEG[:-1]
-        unknowns = _ended(shifted, angles, np.repeat(followed(shifted).unknowns[:, 0], round(2.0 * STEP_DEG), axis=0))
+        angles, unknowns = ANGLES_DEG[:-1], _ended_on_turn(shifted)
         rough = max(rough, _roundoff(joints(unknowns)))
         whole.append(_near_dead_centres(shifted, joints(unknowns[::2]), angles[::2])["th2"])
         beside, closest = _beside_zeros(shifted, angles, unknowns)
@@ -281,8 +293,14 @@ def _dead_centres() -> tuple[Statement, ...]:
         ]
     zeros = [
         near(f"sin theta2 = 0, {case.name}, {which}", stated, at, ABOUT_DEG, "deg")
-        for case in (IDEAL, *cases)
+        for case in (IDEAL, *cases, *twisted)
         for which, stated, at in zip(("first", "second"), ("100", "300"), dead_centres_deg(case))
+    ]
+    by_shift = max(np.abs(dead_centres_deg(case) - dead_centres_deg(case._replace(shift_in=0.0))).max() for case in ALL)
+    by_iteration = [
+        f"{first:.1f} and {second:.1f} deg with {case.name}"
+        for case in twisted
+        for first, second in [_zeros(case, ANGLES_DEG[:-1], _ended_on_turn(case))[0]]
     ]
     place = text("section 3.2, L1115")
     return (
@@ -293,8 +311,8 @@ def _dead_centres() -> tuple[Statement, ...]:
             "crank, i.e. near 100 degrees and 300 degrees.",
             place,
             "sines and cosines in the denominators of what is printed as 69a to 69g and 69i to 69q, counted; crank angles at "
-            "which sin theta2 vanishes, which stands in the denominators of 40a and 41a; least distance of theta3 from 0 or "
-            "half a turn, since its sine stands in all five",
+            "which sin theta2 vanishes, which stands in the denominators of 40a and 41a, on the right mechanism, with a twist "
+            "at a4 = 20 in, S1 = 0; least distance of theta3 from 0 or half a turn, since its sine stands in all five",
             f"none of a count; {ABOUT_DEG:g} deg, the rule for *near*; {VERY_CLOSE_DEG:g} deg, the rule for *very close*",
             (
                 near("sines and cosines in denominators", 0.0, 0, 0.0),
@@ -306,9 +324,11 @@ def _dead_centres() -> tuple[Statement, ...]:
                     "deg",
                 ),
             ),
-            "theta2 is 0 or half a turn at the dead centres, which the offset moves; sin theta3 does not vanish, so "
-            "that 39a and 42a stay finite. Out of the plane 40a and 41a are unbounded, and with them 38a, because eq 41 "
-            "divides by sin theta2 and row 37f is left out (erratum 3); in the plane 40a and 41a are zero",
+            "theta2 is 0 or half a turn at the dead centres, which the offset and the twist move, and the shifts of the graphs "
+            f"by at most {by_shift:.1f} deg; where the printed iteration ends with a twist, sin theta2 vanishes at "
+            f"{' and at '.join(by_iteration)}. Sin theta3 does not vanish, so that 39a and 42a stay finite. Out of the plane "
+            "40a and 41a are unbounded, and with them 38a, because eq 41 divides by sin theta2 and row 37f is left out "
+            "(erratum 3); in the plane 40a and 41a are zero",
         ),
         Statement(
             "Using the computer program it has been observed that near those particular values for input crank "

@@ -48,16 +48,17 @@ torque reverses near 0 deg and hardly depends on the spring; the rise of the spe
 by the damper, the phase planes, and the resonance of the second harmonic at half the natural frequency are as described.
 
 **What does not.** Without a spring the slider does not drift along a line: the mean of the inertia forces pushes it
-towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look
-straight; with these the transient is over in the first, and with the others the motion never gets steady. Gravity
-holds the drift back: without it, M is greater by a quarter in size, and so not slightly reduced. With the softer
-springs the transient outlasts the first cycle. With the stiffest the least position comes at 5 deg, not at 0, u rises
-1.6 times as steeply as with the softest, and the spring's force is not dominant; a spring stiffer still does not make
-the slope constant. The torque varies with the spring at its least value, but not because the slider's accelerations
-differ: they make 3 % of the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant.
-After the weakest launch the slider swings to both sides of its start. The second harmonic near 27 rad/s goes on
-growing down to 22 rad/s, and is no non-linear effect: the equation linear in u has it too. And Milne's method, which the
-thesis takes for as stable as Hamming's, is weakly unstable."""
+towards the crank, the harder the nearer it comes, so that only with the two strongest dampers ten turns look straight;
+with these the transient is over in the first, and with the others the motion never gets steady. Gravity holds the
+drift back: without it, M is greater by a quarter in size, and so not slightly reduced. With the softer springs the
+transient outlasts the first cycle. With the stiffest the least position comes at 5 deg, not at 0, u rises 1.6 times as
+steeply as with the softest, and the inertia force, by its higher harmonics, is greater than the spring's, though of
+the first harmonics alone the spring's is the greatest; a spring stiffer still does not make the slope constant. The
+torque varies with the spring at its least value, but not because the slider's accelerations differ: they make 3 % of
+the difference. T0 is not hyperbolic in the time of a launch; T0 t^2 is nearly constant. After the weakest launch the
+slider swings to both sides of its start. The second harmonic near 27 rad/s goes on growing down to 22 rad/s, and is no
+non-linear effect: the equation linear in u has it too. And Milne's method, which the thesis takes for as stable as
+Hamming's, is weakly unstable."""
 
 #: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
 DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
@@ -396,6 +397,9 @@ def _shape_statements() -> list[Statement]:
     widths, ranges = np.diff(ends, axis=1)[:, 0] % 360.0, np.array([np.ptp(t.slider_cm) for t in turns])
     rise, fall = (each.max() / each.min() for each in (ranges / widths, ranges / (360.0 - widths)))
     shares = np.array([spring_share(k) for k in STIFFNESSES])
+    spring, damper, inertia = (np.abs(np.fft.rfft(force)[1]) for force in slider_forces(STIFFNESSES[-1]))
+    assert spring > max(damper, inertia), (spring, damper, inertia)
+    of_first = spring / inertia
     varies, least_at = {}, []
     for k in (1e7, 1e8):
         u = _steady(k).slider_cm
@@ -421,14 +425,20 @@ def _shape_statements() -> list[Statement]:
             text("3.2.1, L1972-1976"),
             "width, read as the crank angle from the least to the greatest u, relative to that with the next softer "
             f"spring; the height grows, by {100 * (ranges[-1] / ranges[0] - 1):.0f} % from the softest to the "
-            "stiffest; amplitude of the spring's force over the greater of the damper's and that of the mean effective "
-            "mass times the acceleration",
+            "stiffest; amplitude, taken as half the range over the turn, our choice, of the spring's force over the greater "
+            "of the damper's and that of the mean effective mass times the acceleration",
             f"{SIGN}; at least 1, as *dominant* says",
             (
                 at_most("width, greatest", 1.0, greatest_ratio(widths)),
                 at_least("growth of the spring's share, least", 0.0, np.diff(shares).min()),
-                at_least(f"spring's share; {_k(2e6)}", 1.0, shares[-1], why="the inertia force is greater"),
+                at_least(
+                    f"spring's share; {_k(2e6)}",
+                    1.0,
+                    shares[-1],
+                    why="the inertia force is greater, by its higher harmonics",
+                ),
             ),
+            f"of the first harmonics alone the spring's force is the greatest, {of_first:.2f} times that of the inertia",
         ),
         Statement(
             "Eventually, although not shown on this figure, as k increases further the slope of the response curve "
@@ -494,11 +504,16 @@ def slider_motion(stiffness: float) -> list[NDArray[np.float64]]:
     return [np.fft.irfft(order**n * waves, len(u)) for n in range(3)]
 
 
-def spring_share(stiffness: float) -> float:
-    """Return the range of the spring's force over a steady turn, over the greater of the damper's and the mean inertia's."""
+def slider_forces(stiffness: float) -> list[NDArray[np.float64]]:
+    """Return the forces of spring and damper and the mean effective mass times the acceleration over the steady turn (N)."""
     p = table_3_1(stiffness)
     factors = (p.slider_stiffness, p.slider_damping, mean_effective_mass(p))
-    spring, *others = (factor * np.ptp(x) for factor, x in zip(factors, slider_motion(stiffness)))
+    return [factor * x for factor, x in zip(factors, slider_motion(stiffness))]
+
+
+def spring_share(stiffness: float) -> float:
+    """Return the range of the spring's force over a steady turn, over the greater of the damper's and the mean inertia's."""
+    spring, *others = (np.ptp(force) for force in slider_forces(stiffness))
     return float(spring / max(others))
 
 
