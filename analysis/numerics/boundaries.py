@@ -1,7 +1,7 @@
-"""Boundaries in a chart: the curves on which a smooth function of two parameters is zero.
+"""Find the boundaries in a chart: the curves in the plane of two parameters on which a smooth test function is zero.
 
-It knows no mechanics. `scan` finds the roots along a line, close pairs too; `trace` follows a boundary from a point near it;
-`chart` finds and follows all boundaries that cross its lines.
+The module knows no mechanics. `scan` finds the roots along a line, also two that lie close together; `trace` follows a
+boundary from a point near it; `chart` finds and traces all boundaries that cross one of its lines.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from .continuation import ContinuationError, End, Evaluation, Follower, Reason, Settings
 
-#: A smooth function of a point of a chart, negative in a region of instability.
+#: Test function of the coordinates of a point of a chart: smooth, and negative in a region of instability.
 Test = Callable[[float, float], float]
 
 
@@ -39,11 +39,11 @@ class Line:
     Attributes
     ----------
     roots : ndarray, shape (n,)
-        Its zeros, increasing.
+        Zeros of the test function, increasing.
     intervals : tuple of (float, float)
-        The intervals on which it is negative; they may end at an end of the line or at a gap.
+        Intervals on which the test function is negative; they may end at an end of the line or at a gap.
     gaps : tuple of (float, str)
-        Samples at which it has no value, and the reason.
+        Samples at which the test function has no value, each with the reason.
     """
 
     roots: NDArray[np.float64]
@@ -54,27 +54,28 @@ class Line:
 def scan(
     function: Callable[[float], float], low: float, high: float, *, samples: int = 200, tolerance: float = 1e-12
 ) -> Line:
-    """Find the roots of a function on an interval, including close pairs on both sides of a narrow region.
+    """Find the roots of a function on an interval, also two roots between neighbouring samples.
 
-    If the samples pass an extremum towards zero, the extremum itself is sought: two boundaries closer together than the samples
-    are not missed, as long as the function is monotonic on the way to them.
+    Where the samples have an extremum towards zero, the extremum itself is computed: if the function has the other sign there,
+    the roots on both sides of it are found. A pair of roots can be missed only if the function has several extrema between
+    samples.
 
     Parameters
     ----------
     function : callable
-        Of one float; a `LinkworkError` makes a gap.
+        Function of one float; where it raises a `LinkworkError` the line has a gap.
     low, high : float
     samples : int
-        At least 3.
+        Number of samples, at least 3.
     tolerance : float
-        Of the roots, relative to the length of the interval.
+        Tolerance of the roots, relative to the length of the interval.
 
     Raises
     ------
     InputError
         If the interval or the number of samples is not usable.
     """
-    points, values, gaps = _sampled(function, _samples(low, high, samples))
+    points, values, gaps = _sample_function(function, _samples(low, high, samples))
     roots: list[float] = []
     intervals: list[tuple[float, float]] = []
     begun = points[0] if values[0] < 0.0 else None
@@ -109,10 +110,10 @@ def scan(
     return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
 
 
-def _sampled(
+def _sample_function(
     function: Callable[[float], float], samples: NDArray[np.float64]
 ) -> tuple[list[float], list[float], list[tuple[float, str]]]:
-    """Return places, values, NaN at gaps, and gaps of a function at samples and at extrema of another sign between them."""
+    """Sample a function, also at extrema of the opposite sign between samples; return places, values (NaN at gaps), gaps."""
     values, gaps = np.full(len(samples), np.nan), []
     for i, place in enumerate(samples.tolist()):
         try:
@@ -143,9 +144,9 @@ def _sampled(
 def lowest(
     function: Callable[[float], float], low: float, high: float, *, samples: int = 40, tolerance: float = 1e-9
 ) -> tuple[float, float]:
-    """Find place and value of the minimum of a smooth function on an interval.
+    """Find the minimum of a smooth function on an interval; return its place and its value.
 
-    The place is exact to a tolerance relative to the length of the interval, the value to its square.
+    The error of the place is the tolerance, relative to the length of the interval; that of the value is of second order.
 
     Raises
     ------
@@ -204,13 +205,14 @@ class Boundary:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        (x, y) in the units of the axes; of a closed one the last is the first.
+        Points (x, y) in the units of the axes; a closed boundary ends with its first point.
     tangents : ndarray, shape (n, 2)
-        Directions, of unit length with the box scaled to 1 by 1.
+        Unit tangents in coordinates in which the box is 1 by 1.
     residual : float
-        Largest distance of a point from the boundary, estimated from the test function and its slope, with the box scaled.
+        Largest distance of a point from the true boundary, estimated from the test function and its slope, in the same
+        coordinates.
     ends : (End, End)
-        At the first and at the last point.
+        Ends at the first and at the last point.
     """
 
     points: NDArray[np.float64]
@@ -220,11 +222,11 @@ class Boundary:
 
     @property
     def closed(self) -> bool:
-        """Whether it is a loop."""
+        """Whether the boundary is a closed loop."""
         return self.ends[0].reason is Reason.CLOSED
 
     def crossings(self, axis: int, value: float, box: Box) -> NDArray[np.float64]:
-        """Return where it crosses x = value (axis 0) or y = value (axis 1): values of the other, by cubic interpolation."""
+        """Return where the boundary crosses x = value (axis 0) or y = value (axis 1): the other coordinates, interpolated."""
         scaled = (self.points - box.corner) / box.size
         level = (value - box.corner[axis]) / box.size[axis]
         found = []
@@ -241,7 +243,7 @@ class Boundary:
                     - u * u * (1.0 - u) * t
                 )
 
-            # the ends may be zero: brentq takes them as they are
+            # an end may be a zero, which brentq accepts
             u = scipy.optimize.brentq(lambda u: curve(u)[axis] - level, 0.0, 1.0)
             found.append(curve(u)[1 - axis] * box.size[1 - axis] + box.corner[1 - axis])
         return np.array(found)
@@ -257,13 +259,13 @@ _TURN, _STRAIGHT = 0.35, 0.1
 
 @dataclass(frozen=True, slots=True)
 class _Zero:
-    """A test function as the one equation of a curve; the unknown is x, the parameter y."""
+    """The equation of a boundary, test(x, y) = 0, for a `Follower`: x is the unknown, y the parameter."""
 
     test: Test
     box: Box
 
     def residual(self, x: NDArray[np.float64], y: float) -> NDArray[np.float64]:
-        """Return the test function, shape (1,), scaled by the size of x."""
+        """Return the test function times the width of the box, shape (1,)."""
         place = float(x[0]), y
         value = self.test(*place)
         if not isfinite(value):
@@ -271,7 +273,7 @@ class _Zero:
         return np.array([value * self.box.size[0]])
 
     def evaluate(self, x: NDArray[np.float64], y: float) -> Evaluation:
-        """Return it with its slope, by second-order differences inside the box; the data are the distance from zero."""
+        """Return the residual, its slopes by second-order differences inside the box, and as data the distance from zero."""
         place, low, high = np.array([x[0], y]), self.box.corner, self.box.corner + self.box.size
         here, slope = float(self.residual(x, y)[0]), np.empty(2)
         for axis, size in enumerate(self.box.size):
@@ -309,14 +311,14 @@ def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02
     step : float
         Longest step, with the box scaled to 1 by 1.
     most : int
-        Points at most, each way.
+        Largest number of points in each direction.
 
     Raises
     ------
     InputError
         If there is no boundary near the seed.
     LinkworkError
-        As the test function there.
+        If the test function has no value at the seed.
     """
     place = np.array(seed, dtype=float)
     sides = [axis for axis in (0, 1) if seed[axis] in (box.x, box.y)[axis]]
@@ -370,10 +372,10 @@ class Chart:
     ----------
     box : Box
     test : callable
-        The function whose zeros they are.
+        Test function, which is zero on the boundaries.
     boundaries : tuple of Boundary
     gaps : tuple of Gap
-        Points of the lines searched at which the test function has no value.
+        Points of the searched lines at which the test function has no value or jumps.
     """
 
     box: Box
@@ -382,7 +384,7 @@ class Chart:
     gaps: tuple[Gap, ...]
 
     def across(self, y: float, *, samples: int = 200) -> Line:
-        """Boundaries and intervals of instability along x at a y, from the test function itself."""
+        """Scan the line at this y: return where it crosses boundaries, and its intervals of instability."""
         return scan(lambda x: self.test(x, y), *self.box.x, samples=samples)
 
 
@@ -399,11 +401,11 @@ def chart(
     Parameters
     ----------
     test : callable
-        Negative in a region of instability.
+        Test function, negative in a region of instability.
     box : Box
     lines : (int, int)
-        Lines x = const and y = const, evenly spaced from side to side, on which boundaries are sought: every one that crosses
-        at least one of them is found. A line searched costs ``samples`` values of the test function.
+        Numbers of lines x = const and y = const that are searched, evenly spaced from side to side of the box. Every boundary
+        that crosses one of these lines is found. A line costs ``samples`` values of the test function.
     samples : int
         See `scan`.
     step : float
@@ -412,7 +414,7 @@ def chart(
     Raises
     ------
     InputError
-        If there are no lines, or one line of a kind, which has no place.
+        If there are no lines, or just one of a kind, whose place would not be determined.
     """
     if 1 in lines or min(lines) < 0 or lines == (0, 0):
         raise InputError(f"lines is {lines}: none or two and more of each kind, and at least one kind")
@@ -429,17 +431,17 @@ def chart(
             gaps += [Gap(point=point(place), message=message) for place, message in line.gaps]
     found: list[Boundary] = []
     for axis, seed in candidates:
-        if any(_on(boundary, axis, seed, box) for boundary in found):
+        if any(_passes_through(boundary, axis, seed, box) for boundary in found):
             continue
         try:
             found.append(trace(test, seed, box, step=step))
         except LinkworkError as error:
-            # the sign changes where the function jumps, too
+            # the sign also changes where the function jumps
             gaps.append(Gap(point=seed, message=f"no boundary leads through: {error}"))
     return Chart(box=box, test=test, boundaries=tuple(found), gaps=tuple(gaps))
 
 
-def _on(boundary: Boundary, axis: int, seed: tuple[float, float], box: Box) -> bool:
-    """Return whether a boundary passes through a root of a line, to within the interpolation between its points."""
+def _passes_through(boundary: Boundary, axis: int, seed: tuple[float, float], box: Box) -> bool:
+    """Return whether a boundary passes through a root found on a line, to within the error of interpolation."""
     others = boundary.crossings(axis, seed[axis], box)
     return len(others) > 0 and float(np.abs(others - seed[1 - axis]).min()) < 1e-5 * box.size[1 - axis]

@@ -14,39 +14,40 @@ from pathlib import Path
 from filelock import FileLock
 from platformdirs import user_cache_dir
 
-#: Bytes that must fit into a folder for code.
+#: Free space (bytes) that a folder for code must have.
 _LEAST = 1_000_000
 
 
 def cache_root() -> Path:
-    """Return the root of the cache: LINKWORK_CACHE_DIR, else the user's cache folder."""
+    """Return the root folder of the cache: the environment variable LINKWORK_CACHE_DIR, else the user's cache folder."""
     return Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False))
 
 
 def code_folder(name: str) -> Path:
     """Return a folder for files that are loaded as code, below `cache_root` or below a temporary folder.
 
-    A folder that other users can write to could make us run their code: it is not used, which is said once on standard error.
+    A folder to which other users can write is not used, as we could be made to run their code; a message on standard error
+    says so once.
     """
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = cache_root() / name
-    if _usable(folder):
-        if _ours(folder, user):
+    if _is_usable(folder):
+        if _is_safe(folder, user):
             return folder
         _say_shared(folder.parent)
     folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
-    if _usable(folder) and _ours(folder, user):
+    if _is_usable(folder) and _is_safe(folder, user):
         return folder
     return Path(tempfile.mkdtemp(prefix="linkwork-"))
 
 
 def alone(folder: Path) -> FileLock:
-    """Return a lock on a folder of the cache: of the processes that hold it with ``with``, one at a time goes on."""
+    """Return a lock on a folder of the cache, to use in ``with``: one process at a time holds it."""
     return FileLock(folder.with_suffix(".lock"))
 
 
 def put(path: Path, content: bytes) -> None:
-    """Write a file, complete or not at all."""
+    """Write a file so that no other process sees it half written."""
     part = path.with_suffix(f".{os.getpid()}")
     try:
         part.write_bytes(content)
@@ -56,26 +57,26 @@ def put(path: Path, content: bytes) -> None:
 
 
 def keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache as `put`; where the disk is full or read-only it is made again the next time."""
+    """Write a file of the cache as `put` does; do nothing if the disk is full or read-only: the cache can do without it."""
     with suppress(OSError):
         put(path, content)
 
 
 def hashes_below(folder: Path) -> dict[str, str]:
-    """Return the hash of every file below a folder, by its path in the folder."""
+    """Return the SHA-256 hash of every file below a folder, by the file's path relative to the folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
 def keep_hashes(path: Path, hashes: Mapping[str, str]) -> None:
-    """Write the hashes of files to a list, one a line as `sha256sum` does, if the list has others."""
+    """Write the hashes of files to a file, one a line as `sha256sum` does, unless it has just these lines."""
     content = "".join(f"{digest}  {name}\n" for name, digest in hashes.items()).encode()
     if not path.is_file() or path.read_bytes() != content:
         keep(path, content)
 
 
 def read_hashes(path: Path) -> dict[str, str]:
-    """Return what `keep_hashes` wrote; nothing if there is no such file."""
+    """Return the hashes that `keep_hashes` wrote; empty if there is no such file."""
     with suppress(OSError):
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
         return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
@@ -90,20 +91,20 @@ def _say_shared(folder: Path) -> None:
     )
 
 
-def _usable(folder: Path) -> bool:
-    """Return whether a folder is there, or can be made, and has room for code."""
+def _is_usable(folder: Path) -> bool:
+    """Return whether a folder exists or can be made, and has space for code."""
     try:
         for path in (folder.parent, folder):
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(_LEAST))  # on a full disk files can be made, but not filled
+            file.write(bytes(_LEAST))  # on a full disk a file can be made, but not filled
             file.flush()
             return True
     except OSError:
         return False
 
 
-def _ours(folder: Path, user: int) -> bool:
+def _is_safe(folder: Path, user: int) -> bool:
     """Return whether only ``user`` and root can change the content of a folder, or replace the folder."""
     if os.name == "nt":
         return True  # user_cache_dir is below the user's profile, which others cannot write to
@@ -119,7 +120,7 @@ def _ours(folder: Path, user: int) -> bool:
 
 
 def _is_owned(entry: os.DirEntry[str], user: int) -> bool:
-    """Return whether a user owns a file; a file that another process has just renamed or removed does no harm."""
+    """Return whether a user owns a file; True if another process has just renamed or removed it."""
     try:
         return entry.stat(follow_symlinks=False).st_uid == user
     except FileNotFoundError:
@@ -127,7 +128,7 @@ def _is_owned(entry: os.DirEntry[str], user: int) -> bool:
 
 
 def _is_private(group: int, user: int) -> bool:
-    """Return whether a group has one user alone and that user's name, as many systems make them."""
+    """Return whether a group is a user's private group: it has the user's name and no other members."""
     import grp
     import pwd
 

@@ -1,9 +1,9 @@
-"""Curves of solutions of G(y, lambda) = 0, past their folds, by predictor and corrector in arc length.
+"""Follow a curve of solutions of G(y, lambda) = 0, through its folds too, by predictor and corrector in arc length.
 
-It knows no mechanics. Each step goes along the tangent and returns to the curve in the plane across it (E. L. Allgower,
-K. Georg, Numerical Continuation Methods, Springer 1990); its length follows from the effort of the correction and the turn
-of the tangent. Unknowns and parameter are scaled, so that arc length does not depend on units. The corrections are Newton's if
-G comes with its derivatives, and of the secant type (Broyden) if a value alone is cheaper.
+The module knows no mechanics. A step predicts a point along the tangent and corrects it in the plane normal to the tangent
+(E. L. Allgower, K. Georg, Numerical Continuation Methods, Springer 1990). The step length is adapted to the number of
+corrections and to the turn of the tangent. Unknowns and parameter are scaled, so that arc length does not depend on units.
+The corrections are Newton's, or Broyden's (secant) if G alone is much cheaper than G with its derivatives.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from linkwork.errors import InputError, LinkworkError
 
 #: Correction, relative to the scales, at which a point counts as on the curve.
 TOLERANCE = 1e-10
-#: Corrections at most, and the number from which on a step counts as hard.
+#: Largest number of corrections in a step; number of corrections from which on a step counts as hard: the next is not longer.
 MOST_CORRECTIONS, HARD = 10, 5
 #: Distance of a point from the end of the tangent, relative to the step, beyond which it may lie on another curve.
 REACH = 0.5
-#: Inverse cosine of the angle between successive tangents from which on the old one does not serve to compute the new one.
+#: 1 / cos of the angle between old and new tangent from which on the new tangent is not computed with the help of the old one.
 _OBLIQUE = 1e3
 #: Factors by which a step grows and shrinks.
 GROWTH, SHRINKAGE = 1.4, 0.5
@@ -34,7 +34,7 @@ Vector = NDArray[np.float64]
 
 
 class Evaluation(NamedTuple):
-    """G and its derivatives at a point: shapes (n,), (n, n), (n,); ``data`` goes into the `Point`."""
+    """G and its derivatives by y and by lambda, shapes (n,), (n, n), (n,), and any ``data`` that the `Point` is to keep."""
 
     residual: Vector
     jacobian: Vector
@@ -42,7 +42,7 @@ class Evaluation(NamedTuple):
     data: Any
 
 
-#: G(y, lambda); raises a `LinkworkError` if it is not defined there.
+#: Computes G(y, lambda) and its derivatives; raises a `LinkworkError` where G is not defined.
 Evaluate = Callable[[Vector, float], Evaluation]
 
 
@@ -63,7 +63,7 @@ class Reason(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class End:
-    """An end of a curve in a plane: its reason, the last good point, and why there is no value beyond."""
+    """An end of a curve in a plane: the reason, the last point, and the message that goes with the reason, if there is one."""
 
     reason: Reason
     point: tuple[float, float]
@@ -84,9 +84,9 @@ class Point:
     tangent : ndarray, shape (n + 1,)
         Direction of the curve in scaled unknowns and parameter, of length 1.
     derivatives : ndarray, shape (n, n + 1)
-        Of G with respect to unknowns and parameter, scaled.
+        Derivatives of G with respect to the unknowns and the parameter, scaled.
     data : object
-        What the evaluation gave with it.
+        ``data`` of the `Evaluation` at this point.
     """
 
     y: Vector
@@ -97,7 +97,7 @@ class Point:
 
     @property
     def orientation(self) -> float:
-        """Sign of the determinant of the derivatives above the tangent: it changes where two curves cross."""
+        """Sign of the determinant whose rows are the derivatives and the tangent; it changes where two curves cross."""
         return float(np.linalg.slogdet(np.vstack([self.derivatives, self.tangent]))[0])
 
     def turned(self) -> Point:
@@ -112,15 +112,15 @@ class Curve:
     Attributes
     ----------
     points : tuple of Point
-        Of a closed curve the last is the first.
+        Points in order; a closed curve ends with its first point.
     steps : tuple of float
-        Scaled arc length from each point to the next, along the tangent of the former.
+        Scaled length of each step, measured along the tangent at its beginning.
     end : Reason
-        Why it ended.
+        Why the curve ended.
     reason : str
-        The same in words, with the obstacle.
+        The end in words, with what stopped the curve.
     message : str
-        The message of G if it has no value; else empty.
+        Error message of G if the curve ended because G has no value; else empty.
     """
 
     points: tuple[Point, ...]
@@ -130,18 +130,18 @@ class Curve:
     message: str = ""
 
     def plane_end(self, message: str) -> End:
-        """Return its end in the plane of the last unknown and the parameter."""
+        """Return the last point in the plane of last unknown and parameter as an `End` with this message."""
         last = self.points[-1]
         return End(reason=self.end, point=(float(last.y[-1]), last.parameter), message=message)
 
     @property
     def closed(self) -> bool:
-        """Whether it came back to where it began."""
+        """Whether the curve came back to its first point."""
         return self.end is Reason.CLOSED
 
     @property
     def reached(self) -> bool:
-        """Whether it ended as it should: at an end of the range, or where it began."""
+        """Whether the curve ended at an end of the range or at its first point."""
         return self.end in (Reason.BOX, Reason.CLOSED)
 
 
@@ -154,16 +154,16 @@ class Settings:
     low, high : float
         Range of the parameter.
     bounds : mapping
-        Ranges (low, high) of unknowns, by their number.
+        Ranges (low, high) of unknowns, by index.
     first, least, greatest : float
-        Steps in scaled arc length, in which the range of the parameter has length 1.
+        First, shortest and longest step in scaled arc length; the range of the parameter has length 1.
     widest : float
-        Greatest step of the parameter itself, and of the unknowns that have ranges, in their scale.
+        Largest scaled change in a step of the parameter, and of each unknown that has a range.
     most_points : int
     greatest_turn, growing_turn : float
-        Greatest angle between the tangents at neighbouring points (rad), and the angle up to which the step grows.
+        Largest angle between the tangents at neighbouring points (rad), and the angle up to which the step grows (rad).
     oriented : bool
-        Whether the curve ends where it crosses another. This also keeps the two sides of a narrow region apart.
+        Whether the curve ends where it crosses another one. Then no step jumps to the other side of a narrow region.
 
     Raises
     ------
@@ -193,7 +193,7 @@ class Settings:
 
 
 class _Failure(NamedTuple):
-    """Why a step could not be taken: TIP or NO_VALUE, and in words."""
+    """Reason why a step could not be taken (TIP or NO_VALUE), and the same in words."""
 
     reason: Reason
     text: str
@@ -208,7 +208,7 @@ class _Landing(NamedTuple):
 
 
 def _null_vector(derivatives: Vector, ahead: Vector) -> Vector:
-    """Return the unit vector in the kernel of the derivatives, (n, n + 1), in the direction of ``ahead``, at folds too."""
+    """Return the unit tangent of the curve, the null vector of the derivatives (n, n + 1), that points along ``ahead``."""
     try:
         vector = np.linalg.solve(np.vstack([derivatives, ahead]), np.append(np.zeros(len(derivatives)), 1.0))
         length = float(np.linalg.norm(vector))
@@ -222,18 +222,18 @@ def _null_vector(derivatives: Vector, ahead: Vector) -> Vector:
 
 
 class Follower:
-    """The continuation of one curve.
+    """Continuation of one curve.
 
     Parameters
     ----------
     evaluate : callable
-        G with its derivatives; see `Evaluation`. It is not called beyond the bounds, where G is extrapolated linearly.
+        G with its derivatives; see `Evaluation`. It is not called outside the bounds: there G is extrapolated linearly.
     scale : array_like, shape (n,)
         Magnitudes of the unknowns.
     settings : Settings
     residual : callable, optional
-        G alone, if its derivatives cost much more: corrections are then of the secant type, from the derivatives at the last
-        point.
+        G alone, if the derivatives cost much more. Broyden's method then corrects the points, starting from the derivatives
+        at the last point.
     """
 
     def __init__(
@@ -252,14 +252,15 @@ class Follower:
             self.low[number], self.high[number] = low, high
 
     def start(self, y: ArrayLike, parameter: float, direction: int, across: ArrayLike | None = None) -> Point:
-        """Return the point of the curve at a parameter, near ``y``, directed to higher (+1) or lower (-1) parameters.
+        """Find the point of the curve at a parameter, near ``y``, with its tangent to higher (+1) or lower (-1) parameters.
 
-        With ``across``, of shape (n + 1,) and scaled, it lies in the plane across this direction, and is directed along it.
+        With ``across``, scaled and of shape (n + 1,), the point is sought in the plane through the guess normal to ``across``
+        instead, and ``direction`` is the sign of the tangent along ``across``.
 
         Raises
         ------
         ContinuationError
-            If Newton's method does not lead to one.
+            If Newton's method does not converge.
         """
         fixed = np.append(np.zeros(len(self.scale) - 1), 1.0) if across is None else np.asarray(across, dtype=float)
         z = np.append(np.asarray(y, dtype=float), parameter) / self.scale
@@ -271,7 +272,7 @@ class Follower:
         return self._point(found, direction * fixed)
 
     def along(self, y: ArrayLike, parameter: float, tangent: ArrayLike) -> Point:
-        """Return a given point as the first of a curve in a direction (unscaled, shape (n + 1,)), to switch to a branch."""
+        """Return a first `Point` at a given solution with a given tangent (unscaled, shape (n + 1,)), to switch branches."""
         direction = np.asarray(tangent, dtype=float) / self.scale
         evaluation = self.evaluate(np.asarray(y, dtype=float), parameter)
         return Point(
@@ -283,13 +284,13 @@ class Follower:
         )
 
     def resume(self, y: ArrayLike, parameter: float, ahead: ArrayLike) -> Point:
-        """Return a point on the curve as the first of a curve that goes on towards ``ahead`` (scaled, shape (n + 1,))."""
+        """Return a first `Point` at a known solution, with its tangent to the side of ``ahead`` (scaled, shape (n + 1,))."""
         whole = np.append(np.asarray(y, dtype=float), parameter)
         found = _Landing(whole / self.scale, self.evaluate(whole[:-1], parameter), 0)
         return self._point(found, np.asarray(ahead, dtype=float))
 
     def step(self, point: Point, length: float) -> Point | None:
-        """Return the point an arc length further along the tangent; None if there is none."""
+        """Take a step of a given arc length along the tangent; return its end, or None if the corrections fail."""
         found = self._step(point, length)
         return None if isinstance(found, _Failure) else self._point(found, point.tangent)
 
@@ -300,7 +301,7 @@ class Follower:
         watch: Callable[[Point], None] | None = None,
         leave: Callable[[Point], str] | None = None,
     ) -> Curve:
-        """Follow the curve from a point to an end of the range, back to the point, or as far as it goes.
+        """Follow the curve until it reaches an end of the range, comes back to its first point or cannot be continued.
 
         ``watch`` receives every point; ``leave`` returns a reason to stop at a point, or an empty text.
         """
@@ -319,7 +320,7 @@ class Follower:
                     return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
-            point, length = self._turned_beyond(last, point, length)
+            point, length = self._turn_outside(last, point, length)
             end = None
             if self.is_beyond(point):
                 point, length = self._to_bound(last, point, length)
@@ -351,7 +352,7 @@ class Follower:
     def follow_both(
         self, first: Point, *, leave: Callable[[Point], str] | None = None
     ) -> tuple[list[Point], Curve, Curve]:
-        """Follow the curve from a point in both directions; return all its points, and both curves, backward first."""
+        """Follow the curve from a point both ways; return all points in forward order, the backward and the forward curve."""
         forth = self.follow(first, leave=leave)
         if forth.closed:
             return [*forth.points], forth, forth
@@ -359,7 +360,10 @@ class Follower:
         return [*(point.turned() for point in back.points[:0:-1]), *forth.points], back, forth
 
     def locate(self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]) -> tuple[Point, float]:
-        """Return the point within a step at which a test with opposite signs at its ends is zero, and its distance."""
+        """Find where a test function is zero within a step; return that point and its distance from the step's beginning.
+
+        The step from ``point`` has this length and ends at ``beyond``; the test function has opposite signs at its ends.
+        """
         # the parabola through the end of the step
         bend = 2.0 * (self._scaled(beyond) - self._scaled(point) - length * point.tangent) / length**2
 
@@ -377,7 +381,7 @@ class Follower:
         return at(s), s
 
     def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:
-        """Take a step if its end is certainly on the same curve; return it with the number of corrections."""
+        """Take a step; return its end and the number of corrections, or a failure if it may have left the curve."""
         found = self._step(last, length, bend)
         if isinstance(found, _Failure):
             return found
@@ -392,7 +396,7 @@ class Follower:
         return point, found.corrections
 
     def _step(self, point: Point, length: float, bend: Vector | None = None) -> _Landing | _Failure:
-        """Take a step along the tangent, which turns by ``bend`` per arc length if that is known."""
+        """Take a step along the tangent, or along a parabola if ``bend``, the tangent's change per arc length, is given."""
         aside = np.zeros(len(point.tangent)) if bend is None else 0.5 * length**2 * bend
         aside = aside - (aside @ point.tangent) * point.tangent
         return self._correct(self._scaled(point) + length * point.tangent, point.tangent, point, aside)
@@ -400,7 +404,7 @@ class Follower:
     def _correct(
         self, plane: Vector, normal: Vector, last: Point | None, aside: Vector | float = 0.0
     ) -> _Landing | _Failure:
-        """Solve G = 0 by Newton's or Broyden's method in the plane through a point across ``normal``; all scaled."""
+        """Solve G = 0 from ``plane + aside`` in the plane through the point ``plane`` normal to ``normal``; all scaled."""
         n, z, before = len(plane) - 1, plane + aside, np.inf
         matrix = np.vstack([np.zeros((n, n + 1)), normal])
         secant = self.residual is not None and last is not None
@@ -414,7 +418,7 @@ class Follower:
                 else:
                     new = self._value(z)
                     if count > 1:
-                        # Broyden's update: what the last correction has seen of the derivatives
+                        # Broyden's update: the derivatives must explain the change of G in the last correction
                         matrix[:n] += np.outer(new - value - matrix[:n] @ change, change) / (change @ change)
                     value = new
                 change = -np.linalg.solve(matrix, np.append(value, normal @ (z - plane)))
@@ -431,7 +435,7 @@ class Follower:
         return _Failure(Reason.TIP, "the corrections do not converge")
 
     def _inside(self, z: Vector) -> tuple[Vector, Vector]:
-        """Return unscaled unknowns and parameter clipped to the bounds, and the distance beyond them."""
+        """Return unknowns and parameter, unscaled and clipped to the bounds, and how far they lie beyond the bounds."""
         whole = z * self.scale
         inside = np.clip(whole, self.low, self.high)
         return inside, whole - inside
@@ -473,12 +477,12 @@ class Follower:
         scaled: Vector = np.append(point.y, point.parameter) / self.scale
         return scaled
 
-    def _turned_beyond(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
-        """Return where the curve turns back beyond a bound within a step that ends inside; otherwise the step itself."""
+    def _turn_outside(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
+        """Return the turning point and its distance if a step leaves the bounds and comes back; else the end of the step."""
         for axis in np.flatnonzero(last.tangent * point.tangent < 0.0).tolist():
             ahead, behind = abs(last.tangent[axis]), abs(point.tangent[axis])
             bound = (self.high if last.tangent[axis] > 0.0 else self.low)[axis] / self.scale[axis]
-            # twice the height of the parabola with these slopes
+            # twice the height of the parabola with these slopes at its ends
             if abs(bound - self._scaled(last)[axis]) < length * ahead**2 / (ahead + behind):
                 turn, s = self.locate(last, length, point, lambda p, axis=axis: float(p.tangent[axis]))  # type: ignore[misc]
                 if self.is_beyond(turn):
@@ -486,7 +490,7 @@ class Follower:
         return point, length
 
     def _to_bound(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
-        """Return the point of a step exactly on a bound, and its distance along the step."""
+        """Return the point at which a step meets a bound, and its distance from the beginning of the step."""
         here, there = self._scaled(last), self._scaled(beyond)
         low, high = self.low / self.scale, self.high / self.scale
         way = there - here
@@ -501,7 +505,7 @@ class Follower:
         guess, fixed = here + parts[axis] * way, np.eye(len(here))[axis]
         found = self._correct(guess, fixed, last)
         point = self._point(found, last.tangent) if isinstance(found, _Landing) else last
-        # next to a fold the corrections may lead to its other side, where the curve comes in
+        # next to a fold the corrections may lead to its other side, where the curve comes back inside
         if isinstance(found, _Landing) and (
             np.linalg.norm(found.z - guess) < REACH * length and point.tangent[axis] * way[axis] > 0.0
         ):
@@ -519,7 +523,7 @@ class Follower:
         return bool((whole < self.low).any() or (whole > self.high).any())
 
     def _passes(self, first: Point, last: Point, point: Point) -> bool:
-        """Return whether the step between two points passes the first one in its direction."""
+        """Return whether the step from ``last`` to ``point`` passes the first point of the curve in the same direction."""
         chord, way = self._scaled(point) - self._scaled(last), self._scaled(first) - self._scaled(last)
         length = float(np.linalg.norm(chord))
         part = float(way @ chord) / length**2

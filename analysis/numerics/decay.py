@@ -1,12 +1,12 @@
-"""Damping and natural frequency of a freedom on a spring from its free decay: the logarithmic decrement.
+"""Compute damping and natural frequency of a freedom on a spring from the logarithmic decrement of its free decay.
 
 A freedom of mass m on a spring k with a damper c and dry friction F turns back at
 
     x_n = b + (-1)^n [(A + f) q^n - f],  f = r (1 + q) / (1 - q),  r = F / k,
 
 every half period T/2 = pi / omega_d, where q = exp(-delta / 2) and delta = pi c / (m omega_d) is the logarithmic decrement of
-a whole cycle. Dry friction shortens each swing by the same amount, the damper by the same part; friction does not change the
-period.
+a whole cycle. Dry friction shortens each swing by the same length, the damper by the same percentage; friction does not change
+the period.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from scipy.optimize import curve_fit
 
 from linkwork.errors import InputError
 
-#: Part of the record's range that a swing must have by default: smaller ones count as noise.
+#: Default of the smallest swing, as a fraction of the record's range: smaller swings count as noise.
 LEAST_SWING = 0.1
-#: Part of a period about a turning point over which a parabola is fitted: a cosine is one to 0.03 % there.
+#: Half width of the parabola fitted at a turning point, as a fraction of half a period: a cosine is a parabola to 0.03 % there.
 _WINDOW = 1.0 / 6.0
-#: Part of half a period by which turning points may be out of step.
+#: Largest deviation of the time between turning points from half a period, as a fraction of half a period.
 _UNEVEN = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decay:
-    """What the turning points of a free decay show; ``*_error`` are standard errors.
+    """Fit of the turning points of a free decay; ``*_error`` are standard errors.
 
     Attributes
     ----------
     time, position : ndarray, shape (n,)
-        The turning points (s, and the record's unit).
+        Turning points (s, and the record's unit).
     fitted : ndarray, shape (n,)
-        The same by the fit.
+        Positions of the turning points by the fit.
     decrement : float
         Logarithmic decrement of a cycle.
     frequency : float
-        Of the damped oscillation (rad/s).
+        Frequency of the damped oscillation (rad/s).
     friction : float
-        Dry friction over the stiffness of the spring, in the record's unit; 0 where it was not asked for.
+        Dry friction divided by the spring's stiffness, in the record's unit; 0 if it was not fitted.
     offset : float
-        Where the motion comes to rest, but for friction.
+        Position of rest without friction.
     residual : float
-        Root of the mean square of ``position - fitted``, relative to the first amplitude.
+        Root mean square of ``position - fitted``, relative to the first amplitude.
     """
 
     time: NDArray[np.float64]
@@ -73,7 +73,7 @@ class Decay:
 
     @property
     def natural_frequency(self) -> float:
-        """Of the freedom without its damper (rad/s)."""
+        """Natural frequency of the freedom without its damper (rad/s)."""
         return self.frequency * self._phase / (2.0 * pi)
 
     @property
@@ -83,24 +83,24 @@ class Decay:
 
     @property
     def cycle_decrements(self) -> NDArray[np.float64]:
-        """Logarithmic decrement of each cycle from its two swings alone: it grows from cycle to cycle under dry friction."""
+        """Logarithmic decrement of each cycle by itself: with dry friction it grows from cycle to cycle."""
         swings = np.abs(np.diff(self.position))
         return np.log(swings[:-2] / swings[2:])
 
     @property
     def _phase(self) -> float:
-        """Length of (2 pi, decrement)."""
+        """Return the square root of (2 pi)^2 + decrement^2."""
         return sqrt(4.0 * pi**2 + self.decrement**2)
 
     def damping(self, mass: float) -> tuple[float, float]:
-        """Damping coefficient of a mass (kg), and its standard error (N.s/m)."""
+        """Return the damping coefficient for a mass (kg), and its standard error (N.s/m)."""
         factor = mass / pi
         value = factor * self.decrement * self.frequency
         relative = self.decrement_error / self.decrement, self.frequency_error / self.frequency
         return value, abs(value) * sqrt(relative[0] ** 2 + relative[1] ** 2)
 
     def stiffness(self, mass: float) -> tuple[float, float]:
-        """Stiffness of the spring of a mass (kg), and its standard error (N/m)."""
+        """Return the stiffness of the spring for a mass (kg), and its standard error (N/m)."""
         value = mass * self.natural_frequency**2
         return value, 2.0 * value * self.natural_frequency_error / self.natural_frequency
 
@@ -108,24 +108,24 @@ class Decay:
 def fit_decay(
     time: ArrayLike, position: ArrayLike, *, friction: bool = False, least_swing: float = LEAST_SWING
 ) -> Decay:
-    """Logarithmic decrement, damping ratio and natural frequency of a freely decaying record.
+    """Fit logarithmic decrement, damping ratio and natural frequency to a record of a free decay.
 
-    The turning points are fitted by least squares: where they lie in time, and how their distance from a constant offset
-    shrinks. Each of them is the top of a parabola through the samples about it, which averages noise.
+    The times of the turning points and the decay of their distances from a constant offset are fitted by least squares. Each
+    turning point is the vertex of a parabola fitted to the samples near it, which averages noise.
 
     Parameters
     ----------
     time, position : array_like, shape (n,)
-        The record (s, and any unit), from after the impulse on; it need not begin at a turning point.
+        The record (s, and any unit) after the impulse; it need not begin at a turning point.
     friction : bool
-        Fit dry friction beside the damper.
+        Whether to fit dry friction besides the damper.
     least_swing : float
-        Part of the record's range that the way from one turning point to the next must have. What is smaller counts as noise.
+        Smallest distance between successive turning points, as a fraction of the record's range. Smaller ones count as noise.
 
     Raises
     ------
     InputError
-        If the record is no record, has too few swings, or does not decay.
+        If the arrays are not a record, or the record has too few swings or does not decay.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def fit_decay(
     >>> round(decay.decrement / (2.0 * np.pi / 40.0), 2)
     2.0
     """
-    t, x = _record(time, position)
+    t, x = _check_record(time, position)
     if not 0.0 < least_swing < 1.0:
         raise InputError(
             f"the least swing is {least_swing!r}: it must be between 0 and 1, a part of the record's range"
@@ -155,11 +155,11 @@ def fit_decay(
             f"the record's turning points lie {spaces.min():.3g} to {spaces.max():.3g} s apart, which is no free oscillation: "
             "begin after the impulse, and where noise makes turning points of its own, ask for a greater least swing"
         )
-    tops = np.array([_top(t, x, turn, half * _WINDOW) for turn in turns])
-    return _fitted(tops, friction)
+    tops = np.array([_vertex(t, x, turn, half * _WINDOW) for turn in turns])
+    return _fit(tops, friction)
 
 
-def _record(time: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _check_record(time: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     try:
         t, x = np.asarray(time, dtype=float), np.asarray(position, dtype=float)
     except (TypeError, ValueError) as error:
@@ -178,7 +178,7 @@ def _record(time: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], 
 
 
 def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
-    """Indices of highs and lows in turn, a swing or more on both sides of each."""
+    """Return the indices of alternating maxima and minima that differ by at least ``swing``."""
     found: list[int] = []
     low = high = 0
     sign = 0
@@ -194,8 +194,8 @@ def _turning_points(x: NDArray[np.float64], swing: float) -> list[int]:
     return found
 
 
-def _top(t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float) -> tuple[float, float]:
-    """Place and height of the parabola through the samples within a reach of a turning point, three at least."""
+def _vertex(t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float) -> tuple[float, float]:
+    """Fit a parabola to the samples within ``reach`` of a turning point, at least three; return its vertex (time, position)."""
     first, last = np.searchsorted(t, (t[turn] - reach, t[turn] + reach))
     near = slice(max(min(int(first), turn - 1), 0), max(int(last), turn + 2))
     middle, scale = t[turn], t[turn + 1] - t[turn - 1]
@@ -204,8 +204,8 @@ def _top(t: NDArray[np.float64], x: NDArray[np.float64], turn: int, reach: float
     return middle + scale * place, (a * place + b) * place + c
 
 
-def _fitted(tops: NDArray[np.float64], friction: bool) -> Decay:
-    """The fit of the turning points."""
+def _fit(tops: NDArray[np.float64], friction: bool) -> Decay:
+    """Fit the decay to the turning points (time, position)."""
     place, height = tops.T
     n = np.arange(len(height), dtype=float)
     sides = np.where(n % 2 == 0, 1.0, -1.0)
@@ -232,7 +232,7 @@ def _fitted(tops: NDArray[np.float64], friction: bool) -> Decay:
         raise InputError("no decaying motion fits the record's turning points: is there more friction than damping?")
     side = 1.0 if values[0] > 0.0 else -1.0
     fitted = model(n, *values)
-    # the place of a flat top is as much less certain as the top is lower
+    # the time of a turning point is the less certain, the smaller its distance from the offset
     (half_period, _), spread = np.polyfit(n, place, 1, w=np.abs(fitted - values[2]), cov=True)
     return Decay(
         time=place,

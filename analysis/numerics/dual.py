@@ -1,7 +1,7 @@
 """Dual numbers a + eps b with eps^2 = 0, whose parts are NumPy arrays: exact derivatives, and screws in space.
 
-As numbers they differentiate: f(a + eps b) = f(a) + eps f'(a) b. NumPy's functions work on them (``np.sin(x)``), they mix
-with scalars and arrays, and comparisons compare their real parts.
+Dual numbers give derivatives: f(a + eps b) = f(a) + eps f'(a) b. NumPy's functions take them (``np.sin(x)``), they can be
+combined with scalars and arrays, and comparisons compare their real parts.
 
 >>> x = Dual(2.0, 1.0)
 >>> (x * x + np.sqrt(x)).dual == 4.0 + 0.5 / np.sqrt(2.0)
@@ -10,8 +10,8 @@ True
 In mechanics they are screws (Rahman, chapter II): a dual angle is an angle + eps a distance along the same axis, a dual
 velocity an angular velocity + eps the velocity of the point at the origin, a dual force a force + eps its moment about the
 origin, a dual momentum likewise. Dual vectors have shape (..., 3), dual matrices (..., 3, 3). The matrix of a frame with
-orientation R and origin p is R + eps [p]R, with [p] the matrix of the cross product by p; it is orthogonal, takes screws
-from that frame's axes and origin to those in which p and R are given, and its inverse is its transpose (eq 4).
+orientation R and origin p is R + eps [p]R, with [p] the matrix of the cross product by p. It is orthogonal, so that its
+inverse is its transpose (eq 4), and takes screws from that frame to the frame in which p and R are given.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _UNARY: dict[Any, Callable[[Array, Array], Any]] = {
 
 
 def _power(a: Dual, b: Dual) -> Dual:
-    """Return a^b; the logarithm of a is taken only where b varies, so that a negative a has constant powers."""
+    """Return a^b; log a is computed only where b has a derivative, so that a negative a can have a constant exponent."""
     value = np.power(a.real, b.real)
     # b a^(b-1), which is 0 for b = 0 whatever a is
     slope = b.real * np.power(a.real, np.where(b.real == 0.0, 1.0, b.real - 1.0)) * a.dual
@@ -83,11 +83,11 @@ def _hypot(a: Dual, b: Dual) -> Dual:
 
 
 def _chosen(value: Array, a: Dual, b: Dual) -> Dual:
-    """Return the one of two numbers that has the ``value``; the first if both have it."""
+    """Return the dual number, a or b, whose real part is ``value``; a if both have it."""
     return Dual(value, np.where(value == a.real, a.dual, b.dual))
 
 
-#: Functions of two arguments, without the matrix product, which treats vectors separately.
+#: Functions of two arguments, except the matrix product, in which vectors are a special case.
 _BINARY: dict[Any, Callable[[Dual, Dual], Dual]] = {
     np.add: lambda a, b: Dual(a.real + b.real, a.dual + b.dual),
     np.subtract: lambda a, b: Dual(a.real - b.real, a.dual - b.dual),
@@ -107,10 +107,10 @@ class Dual(NDArrayOperatorsMixin):
     Parameters
     ----------
     real, dual : array_like
-        The parts, broadcast to a common shape. The dual part may have more axes in front, one entry for each direction of
+        The parts, broadcast to a common shape. The dual part may have additional axes in front, one entry for each direction of
         differentiation: ``Dual(2.0, [1.0, 0.0])`` is a number with its derivatives in two directions, and a real part of shape
-        (n,) with m directions has a dual part of shape (m, n). Calculations match the axes of real parts with each other,
-        and the axes of directions with each other.
+        (n,) with m directions has a dual part of shape (m, n). In calculations axes of real parts are matched with each other,
+        and axes of directions with each other.
     """
 
     __slots__ = ("dual", "real")
@@ -138,12 +138,12 @@ class Dual(NDArrayOperatorsMixin):
 
     @property
     def T(self) -> Dual:
-        """Transpose in the last two axes, the inverse of an orthogonal dual matrix (eq 4)."""
+        """Transpose of the last two axes: the inverse of an orthogonal dual matrix (eq 4)."""
         return Dual(np.swapaxes(self.real, -1, -2), np.swapaxes(self.dual, -1, -2))
 
     @property
     def directions(self) -> int:
-        """Number of axes of directions, in front of the dual part."""
+        """Number of axes of directions, the first axes of the dual part."""
         return self.dual.ndim - self.real.ndim
 
     def __len__(self) -> int:
@@ -191,7 +191,7 @@ class Dual(NDArrayOperatorsMixin):
 
 
 def _aligned(*x: Dual) -> tuple[Dual, ...]:
-    """Give all real parts the same number of axes, so that NumPy matches directions with directions."""
+    """Return dual numbers whose real parts have the same number of axes, so that NumPy matches directions with directions."""
     axes = max(part.real.ndim for part in x)
     return tuple(part if part.real.ndim == axes or not part.directions else _with_axes(part, axes) for part in x)
 
@@ -207,7 +207,7 @@ def _inexact(part: Any) -> Array:
 
 
 def dual(x: Any) -> Dual:
-    """Return ``x`` as a dual number, with the dual part zero if it is none."""
+    """Return ``x`` itself if it is a dual number, else as a dual number with dual part zero."""
     return x if isinstance(x, Dual) else Dual(x)
 
 
@@ -219,7 +219,7 @@ def variables(*values: Any) -> tuple[Dual, ...]:
     Parameters
     ----------
     values : array_like
-        Of one shape, or scalars.
+        Values of the variables: arrays of one shape, or scalars.
     """
     real = np.broadcast_arrays(*(_inexact(x) for x in values))
     directions = np.eye(len(real)).reshape(len(real), len(real), *(1,) * real[0].ndim)
@@ -227,7 +227,7 @@ def variables(*values: Any) -> tuple[Dual, ...]:
 
 
 def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
-    """Join dual numbers along a new axis, counted from the end (negative)."""
+    """Join dual numbers along a new axis; ``axis`` is negative, counted from the end."""
     x = _aligned(*(dual(part) for part in parts))
     real = np.broadcast_arrays(*(part.real for part in x))
     slopes = np.broadcast_arrays(*(part.dual for part in x), np.empty(real[0].shape))[:-1]
@@ -244,8 +244,8 @@ def join(*parts: Dual) -> Dual:
 def cross(a: Any, b: Any) -> Dual:
     """Return the cross product a x b of dual vectors (..., 3).
 
-    If a is the dual velocity of a body, this is the rate of a screw b fixed in the body; for others add their rate relative
-    to the body.
+    If a is the dual velocity of a body and b is a screw fixed in the body, a x b is the rate of b. If b moves in the body, add
+    its rate relative to the body.
     """
     x, y = _aligned(dual(a), dual(b))
     return Dual(np.cross(x.real, y.real), np.cross(x.real, y.dual) + np.cross(x.dual, y.real))

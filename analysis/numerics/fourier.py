@@ -42,7 +42,7 @@ class FourierSeries:
 
     @classmethod
     def constant(cls, value: float) -> FourierSeries:
-        """Return a constant as a series."""
+        """Return the series of a constant."""
         return cls(np.array([value]), np.zeros(1))
 
     @classmethod
@@ -54,7 +54,7 @@ class FourierSeries:
         Raises
         ------
         InputError
-            If the order is higher.
+            If ``order`` is higher than that.
         """
         values = np.asarray(samples, dtype=float)
         c = np.fft.rfft(values) / len(values)
@@ -115,14 +115,14 @@ class FourierSeries:
         return FourierSeries(k * self.sin, -k * self.cos)
 
     def to_order(self, order: int) -> FourierSeries:
-        """Return the series cut off after an order, or padded with zeros."""
+        """Return the series truncated to an order, or padded with zeros up to it."""
         n = order + 1
         pad = max(0, n - len(self.cos))
         return FourierSeries(*(np.append(values[:n], np.zeros(pad)) for values in (self.cos, self.sin)))
 
 
 def trigonometric(values: NDArray[np.float64], period: float) -> Callable[[float], NDArray[np.float64]]:
-    """Return the trigonometric polynomial through values at n equal steps of a period, shape (n, ...), as a function."""
+    """Return the trigonometric polynomial f(t) through values, shape (n, ...), at n equal steps of a period from t = 0."""
     n = len(values)
     order = (n - 1) // 2
     c = np.fft.rfft(values, axis=0)[: order + 1] / n

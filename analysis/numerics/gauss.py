@@ -19,7 +19,7 @@ class Gauss(NamedTuple):
     ----------
     nodes, weights : ndarray, shape (s,)
     integrals : ndarray, shape (s, s)
-        Integrals from 0 to each node of the polynomial through values at the nodes, as a matrix that acts on these values.
+        Matrix from values at the nodes to the integrals, from 0 to each node, of the polynomial through these values.
     coefficients : ndarray, shape (s, s)
         Matrix from values at the nodes to the coefficients of Legendre's polynomials on -1 to 1.
     """

@@ -1,11 +1,11 @@
-"""Elementary functions of vectors of doubles, as straight lines of LLVM: each lane of the processor has its own argument.
+"""Write elementary functions of vectors of doubles as LLVM code without branches: a lane is one number of the vector.
 
-Every function is written with fused multiplications and additions, and each lane is computed from its own argument alone, so
-that its bits depend neither on what stands beside it nor on the number of lanes. Reductions and polynomials are the usual
-ones (Cody and Waite; Tang; the coefficients of Sun's fdlibm, and of Taylor where it needs none better). What has no straight
-line goes through the C library, lane by lane: ``pow``, and sine and cosine of angles beyond `GREATEST_ANGLE`.
+Every function is written with fused multiplications and additions. A lane is computed from its own argument alone, so its bits
+depend neither on the other lanes nor on their number. Argument reductions and polynomials are the usual ones (Cody and Waite;
+Tang; coefficients of Sun's fdlibm, or of Taylor series where these suffice). ``pow``, and sine and cosine of angles beyond
+`GREATEST_ANGLE`, cannot be written without branches: they call the C library for each lane.
 
-`BOUNDS` has the greatest errors in units in the last place, which the tests hold against mpmath. They hold for arguments
+`BOUNDS` has the largest errors in units in the last place, which the tests check against mpmath. They hold for arguments
 between 1e-150 and 1e150; the sign of a result that is zero is not kept.
 """
 
@@ -26,13 +26,13 @@ BOUNDS = {
     "sin": 1.0, "cos": 1.0, "tan": 2.5, "asin": 2.5, "acos": 2.5, "atan": 1.5, "atan2": 1.5, "sinh": 2.5, "cosh": 2.5,
     "tanh": 3.0, "exp": 1.0, "log": 1.0, "sqrt": 0.5, "fabs": 0.0, "hypot": 2.0,
 }  # fmt: skip
-#: Angle (rad) from which on the C library takes the sine: 1.7e8 turns, up to which the reduction is exact.
+#: Angle (rad) beyond which the C library computes the sine: 1.7e8 turns; up to it the argument reduction is exact.
 GREATEST_ANGLE = 2.0**30
 
-# added and subtracted again, it rounds to an integer, which its last bits then are
+# adding this number rounds to an integer, which the last bits of the sum then are; subtracting it gives the integer as a double
 _ROUNDER = 1.5 * 2.0**52
 _ROUNDER_BITS = 0x4338000000000000
-# half of pi and its next parts, the logarithm of 2 with 21 zeros at its end and the rest
+# pi / 2 as a sum of three doubles; log 2 as a sum of two, the first of which ends with 21 zero bits
 _HALF_PI = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33
 _LOG_2 = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _SINE = (
@@ -52,7 +52,7 @@ _ARCTANGENT = (
     9.09088713343650656196e-02, -7.69187620504482999495e-02, 6.66107313738753120669e-02, -5.83357013379057348645e-02,
     4.97687799461593236017e-02, -3.65315727442169155270e-02, 1.62858201153657823623e-02,
 )  # fmt: skip
-# arctangents of 0.5, 1, 1.5 and infinity, each in two parts
+# arctangents of 0.5, 1, 1.5 and infinity, each as a sum of two doubles
 _ARCTANGENTS = (
     (4.63647609000806093515e-01, 2.26987774529616870924e-17), (7.85398163397448278999e-01, 3.06161699786838301793e-17),
     (9.82793723247329054082e-01, 1.39033110312309984516e-17), (1.57079632679489655800e00, 6.12323399573676603587e-17),
@@ -61,7 +61,7 @@ _ARCTANGENTS = (
 
 @cache
 def width() -> int:
-    """Return the number of doubles that the processor takes at once; 1 if it has no fused multiplication of vectors."""
+    """Return the number of doubles in a vector of the processor; 1 if it has no fused multiply-add for vectors."""
     features = binding.get_host_cpu_features()
     if features.get("avx512f"):
         return 8
@@ -71,12 +71,12 @@ def width() -> int:
 
 
 def vector(lanes: int, of: Any = DOUBLE) -> Any:
-    """Return the type of vectors of so many numbers; of the numbers themselves for one."""
+    """Return the LLVM type of a vector of ``lanes`` numbers of the type ``of``; for one lane, the type ``of`` itself."""
     return ir.VectorType(of, lanes) if lanes > 1 else of
 
 
 def repeated(build: Any, number: Any, lanes: int) -> Any:
-    """Return a vector with the same number in each lane; the number itself for one."""
+    """Return a vector with the same number in each lane; for one lane, the number itself."""
     if lanes == 1:
         return number
     single = build.insert_element(ir.Constant(vector(lanes), ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
@@ -84,7 +84,7 @@ def repeated(build: Any, number: Any, lanes: int) -> Any:
 
 
 class Vector:
-    """A value of LLVM with the operators of Python; the other operand may be a number."""
+    """An LLVM vector whose Python operators write LLVM instructions; the other operand may be a number."""
 
     def __init__(self, build: Any, value: Any) -> None:
         self.build = build
@@ -96,7 +96,7 @@ class Vector:
         return count
 
     def like(self, other: Any) -> Any:
-        """Return the value of an operand."""
+        """Return an operand as an LLVM vector; a number becomes the same in all lanes."""
         return other.value if isinstance(other, Vector) else ir.Constant(self.value.type, [float(other)] * self.lanes)
 
     def _make(self, value: Any) -> Vector:
@@ -133,21 +133,21 @@ class Vector:
         return self.build.fcmp_ordered("<", self.value, self.like(other))
 
     def equals(self, other: Any) -> Any:
-        """Return where two are equal."""
+        """Return a mask of the lanes in which two vectors are equal."""
         return self.build.fcmp_ordered("==", self.value, self.like(other))
 
     def where(self, condition: Any, other: Any) -> Vector:
-        """Return this where a condition holds, and else the other."""
+        """Return this vector in the lanes where a condition holds, the other vector elsewhere."""
         return self._make(self.build.select(condition, self.value, self.like(other)))
 
     def intrinsic(self, name: str, *others: Any) -> Vector:
-        """Apply one of LLVM's functions to this and others."""
+        """Call one of LLVM's intrinsic functions with this vector and others as arguments."""
         kind = self.value.type
         function = declared(self.build.module, f"llvm.{name}.v{kind.count}f64", kind, 1 + len(others))
         return self._make(self.build.call(function, [self.value, *map(self.like, others)]))
 
     def fused(self, factor: Any, summand: Any) -> Vector:
-        """Return this times a factor plus a summand, rounded once."""
+        """Return this vector times a factor plus a summand, rounded once."""
         return self.intrinsic("fma", factor, summand)
 
     def root(self) -> Vector:
@@ -157,7 +157,7 @@ class Vector:
         return self.intrinsic("fabs")
 
     def signed(self, other: Vector) -> Vector:
-        """Return the size of this with the sign of another."""
+        """Return the absolute values of this vector with the signs of another."""
         return self.intrinsic("copysign", other)
 
     def bits(self) -> Any:
@@ -171,7 +171,7 @@ class Vector:
         return ir.Constant(vector(self.lanes, _LONG), [number] * self.lanes)
 
     def polynomial(self, coefficients: tuple[float, ...]) -> Vector:
-        """Evaluate a polynomial by its coefficients, the constant first."""
+        """Evaluate a polynomial in this vector; the constant is the first coefficient."""
         result = self._make(self.like(coefficients[-1]))
         for c in coefficients[-2::-1]:
             result = result.fused(self, c)
@@ -179,7 +179,7 @@ class Vector:
 
 
 def declared(module: Any, name: str, kind: Any, arguments: int) -> Any:
-    """Return a function of so many arguments of one kind, declared in a module where it is not yet."""
+    """Return an external function of so many arguments, all of one type; declare it in the module if that is not done yet."""
     if (found := module.globals.get(name)) is None:
         found = ir.Function(module, ir.FunctionType(kind, [kind] * arguments), name)
         found.attributes.add("nounwind")
@@ -187,7 +187,7 @@ def declared(module: Any, name: str, kind: Any, arguments: int) -> Any:
 
 
 def lane_by_lane(name: str, *arguments: Vector) -> Vector:
-    """Apply a function of the C library to each lane."""
+    """Call a function of the C library for each lane; return the vector of its values."""
     build = arguments[0].build
     function = declared(build.module, name, DOUBLE, len(arguments))
     result = ir.Constant(arguments[0].value.type, ir.Undefined)
@@ -198,8 +198,8 @@ def lane_by_lane(name: str, *arguments: Vector) -> Vector:
     return Vector(build, result)
 
 
-def _unless(great: Any, result: Vector, name: str, x: Vector) -> Vector:
-    """Return the result, but the C library's function of x in the lanes where a condition holds."""
+def _with_fallback(great: Any, result: Vector, name: str, x: Vector) -> Vector:
+    """Return a result in which the lanes marked by ``great`` are replaced by the C library's function of x."""
     build = x.build
     before = build.block
     any_of_them = build.icmp_unsigned("!=", build.bitcast(great, ir.IntType(x.lanes)), ir.IntType(x.lanes)(0))
@@ -215,8 +215,8 @@ def _unless(great: Any, result: Vector, name: str, x: Vector) -> Vector:
 # Sine and cosine
 
 
-def _turned(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
-    """Return the number of quarter turns in x, with so many more, and the sine and the cosine of the rest."""
+def _split_quarter_turns(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
+    """Split x into quarter turns and a rest; return their number plus ``quarters``, and sine and cosine of the rest."""
     shifted = x.fused(2.0 / pi, _ROUNDER)
     k = shifted - _ROUNDER
     # exact, as the difference has no more bits than x
@@ -224,7 +224,7 @@ def _turned(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
     second = k * _HALF_PI[1]
     r = first - second
     back = r - first
-    # what the product and the difference lost (Knuth)
+    # rounding errors of the product and the difference (Knuth)
     lost = (first - (r - back)) - (second + back)
     rest = k.fused(-_HALF_PI[2], lost - k.fused(_HALF_PI[1], -second))
     z = r * r
@@ -236,14 +236,14 @@ def _turned(x: Vector, quarters: int) -> tuple[Any, Vector, Vector]:
 
 
 def _circular(x: Vector, quarters: int, name: str) -> Vector:
-    """Return the sine of x after so many quarter turns."""
+    """Return the sine of x plus a number of quarter turns; for large x from the C function ``name``."""
     build = x.build
-    number, sine, cosine = _turned(x, quarters)
+    number, sine, cosine = _split_quarter_turns(x, quarters)
     odd = build.icmp_unsigned("!=", build.and_(number, x.longs(1)), x.longs(0))
     chosen = cosine.where(odd, sine)
     sign = build.shl(build.and_(number, x.longs(2)), x.longs(62))
     result = x.from_bits(build.xor(chosen.bits(), sign))
-    return _unless(Vector.__lt__(-x.size(), -GREATEST_ANGLE), result, name, x)
+    return _with_fallback(Vector.__lt__(-x.size(), -GREATEST_ANGLE), result, name, x)
 
 
 def _sin(x: Vector) -> Vector:
@@ -258,12 +258,12 @@ def _cos(x: Vector) -> Vector:
 
 
 def _power_of_two(x: Vector, number: Any) -> Vector:
-    """Return 2 to an integer between -1022 and 1023."""
+    """Return 2 to the power of an integer between -1022 and 1023."""
     return x.from_bits(x.build.shl(x.build.add(number, x.longs(1023)), x.longs(52)))
 
 
-def _reduced(x: Vector) -> tuple[Any, Vector]:
-    """Return an integer n, and exp(r) - 1 of the rest r = x - n log 2."""
+def _reduce_exponent(x: Vector) -> tuple[Any, Vector]:
+    """Split x = n log 2 + r; return the integer n and exp(r) - 1."""
     shifted = x.fused(1.0 / log(2.0), _ROUNDER)
     k = shifted - _ROUNDER
     high = k.fused(-_LOG_2[0], x)
@@ -280,14 +280,14 @@ def _reduced(x: Vector) -> tuple[Any, Vector]:
 def _exp(x: Vector) -> Vector:
     build = x.build
     low = x._make(x.like(-746.0)).where(x < -746.0, x)
-    number, less = _reduced(low._make(low.like(710.0)).where(Vector.__lt__(-low, -710.0), low))
+    number, less = _reduce_exponent(low._make(low.like(710.0)).where(Vector.__lt__(-low, -710.0), low))
     half = build.ashr(number, x.longs(1))
     return (1.0 + less) * _power_of_two(x, half) * _power_of_two(x, build.sub(number, half))
 
 
-def _less_one(x: Vector) -> Vector:
+def _exp_minus_one(x: Vector) -> Vector:
     """Return exp(x) - 1 for x between 0 and 44."""
-    number, less = _reduced(x)
+    number, less = _reduce_exponent(x)
     scale = _power_of_two(x, number)
     return scale.fused(less, scale - 1.0)
 
@@ -297,13 +297,13 @@ def _at_most(a: Vector, limit: float) -> Vector:
 
 
 def _tanh(x: Vector) -> Vector:
-    e = _less_one(2.0 * _at_most(x.size(), 22.0))
+    e = _exp_minus_one(2.0 * _at_most(x.size(), 22.0))
     return (e / (e + 2.0)).signed(x)
 
 
 def _sinh(x: Vector) -> Vector:
     a = x.size()
-    small = _less_one(_at_most(a, 22.0))
+    small = _exp_minus_one(_at_most(a, 22.0))
     root = _exp(0.5 * a)
     return (0.5 * (small + small / (small + 1.0))).where(a < 22.0, 0.5 * root * root).signed(x)
 
@@ -318,7 +318,7 @@ def _log(x: Vector) -> Vector:
     build = x.build
     tiny = x < 2.0**-1022
     bits = (x * 2.0**54).where(tiny, x).bits()
-    # the power of two by which x lies between the roots of a half and of two
+    # the power of two by which x is divided to lie between sqrt(1/2) and sqrt(2)
     number = build.ashr(build.sub(bits, x.longs(0x3FE6A09E667F3BCD)), x.longs(52))
     f = x.from_bits(build.sub(bits, build.shl(number, x.longs(52)))) - 1.0
     k = x.from_bits(build.add(number, x.longs(_ROUNDER_BITS))) - _ROUNDER
@@ -352,14 +352,14 @@ def _angle(y: Vector, x: Vector) -> Vector:
     return y.where(y.equals(0.0), result)
 
 
-def _half_turned(angle: Vector, x: Vector) -> Vector:
-    """Return pi less the angle where x is negative."""
+def _supplement_of_negative(angle: Vector, x: Vector) -> Vector:
+    """Return pi - angle where x is negative, the angle elsewhere."""
     negative = x.build.icmp_signed("<", x.bits(), x.longs(0))
     return (pi - (angle - 2.0 * _HALF_PI[1])).where(negative, angle)
 
 
 def _atan2(y: Vector, x: Vector) -> Vector:
-    return _half_turned(_angle(y.size(), x.size()), x).signed(y)
+    return _supplement_of_negative(_angle(y.size(), x.size()), x).signed(y)
 
 
 def _atan(x: Vector) -> Vector:
@@ -377,13 +377,13 @@ def _hypot(x: Vector, y: Vector) -> Vector:
     return great.where(great.equals(0.0), great * ratio.fused(ratio, 1.0).root())
 
 
-#: By the names of `math`.
+#: The functions by their names in `math`.
 FUNCTIONS: dict[str, Callable[..., Vector]] = {
     "sin": _sin,
     "cos": _cos,
     "tan": lambda x: _sin(x) / _cos(x),
     "asin": lambda x: _angle(x.size(), _leg(x)).signed(x),
-    "acos": lambda x: _half_turned(_angle(_leg(x), x.size()), x),
+    "acos": lambda x: _supplement_of_negative(_angle(_leg(x), x.size()), x),
     "atan": _atan,
     "atan2": _atan2,
     "sinh": _sinh,

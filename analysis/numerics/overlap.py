@@ -1,8 +1,9 @@
-"""Compiled: the area between two closed curves and its gradient; the nearest places of one curve to points of another.
+"""Compiled functions for two closed curves: the area between them and its gradient, and the nearest points of a curve.
 
-The boundary of the area is made of pieces of both curves, cut where they cross one another or themselves. By Green's theorem
-the area is half the sum of x dy - y dx over them, each with the sign of its side. A curve that moves changes the area by what
-it sweeps: the gradient is exact for the polygons, and continuous, since where a piece begins to count it has no length yet.
+The boundary of the area consists of pieces of both curves, cut where they cross one another or themselves. By Green's theorem
+the area is half the sum of x dy - y dx over the pieces, with a sign for the side on which the area lies. If a curve moves, the
+area changes by the area that the pieces sweep: the gradient is exact for polygons, and continuous, since a new piece begins
+with length zero.
 """
 
 from __future__ import annotations
@@ -12,19 +13,19 @@ from numba import boolean, float64, int64, void
 
 from .codegen import MATRIX, VECTOR, inner, kernel, part
 
-#: Most crossings of one segment that are looked at, but for one.
+#: Limit of the number of crossings of one segment; further crossings are ignored.
 CROSSINGS = 64
-#: Sine of the angle between segments, and share of the extent by which they are apart, up to which they lie on one another.
+#: Segments coincide up to this sine of the angle between them and this distance, as a fraction of the extent of the curves.
 PARALLEL = 1e-12
-#: Horizontal bands by which segments are found: a segment is compared with those in its own bands alone.
+#: Number of horizontal bands into which segments are sorted: a segment is compared with those in its own bands only.
 BANDS = 96
-#: Segments of a polyline that are passed over together where none of them can be the nearest.
+#: Number of successive segments of a polyline in a group; a group is skipped if none of its segments can be the nearest.
 STRETCH = 12
 
 
 @part
 def _segments(curve, target):
-    """Return the ends of all segments of two closed polygons, rows xa, ya, xb, yb, and their boxes: x, then y."""
+    """Return the ends of all segments of two closed polygons, rows xa, ya, xb, yb, and their ranges of x and y."""
     n, m = curve.shape[1], target.shape[1]
     ends, box = np.empty((4, n + m)), np.empty((4, n + m))
     for i in range(n + m):
@@ -40,14 +41,17 @@ def _segments(curve, target):
 
 @part
 def _banded(box, floor, scale):
-    """Sort segments into horizontal bands: the first and last band of each, and the segments of each band."""
+    """Sort segments into horizontal bands; return first and last band of each segment, and the segments of each band.
+
+    The segments of band b are ``members[begin[b] : begin[b + 1]]``; the return value is (first, last, begin, members).
+    """
     total = box.shape[1]
     first, last = np.empty(total, np.int64), np.empty(total, np.int64)
     begin = np.zeros(BANDS + 1, np.int64)
     for i in range(total):
         first[i] = min(int(scale * (box[2, i] - floor)), BANDS - 1)
         last[i] = min(int(scale * (box[3, i] - floor)), BANDS - 1)
-        # a sum of slices has Numba compile the writing of messages about shapes
+        # for a sum of slices Numba would also compile its messages about shapes
         for band in range(first[i], last[i] + 1):
             begin[band + 1] += 1
     for band in range(BANDS):
@@ -62,9 +66,10 @@ def _banded(box, floor, scale):
 
 @inner
 def _cut(i, ends, box, bands, near, cuts, twins, spans):
-    """Cut a segment where others cross it, from 0 to 1; list the segments that lie on it and where.
+    """Find where other segments cross segment i, and which segments coincide with part of it.
 
-    Returns the number of pieces and that of these segments.
+    Fills ``cuts`` with the crossings, fractions of the segment from 0 to 1, ``twins`` with the coinciding segments and
+    ``spans`` with the fractions between which they coincide. Returns the numbers of pieces and of coinciding segments.
     """
     first, last, begin, members = bands
     dx, dy = ends[2, i] - ends[0, i], ends[3, i] - ends[1, i]
@@ -75,7 +80,7 @@ def _cut(i, ends, box, bands, near, cuts, twins, spans):
     count, like = 1, 0
     for band in range(first[i], last[i] + 1):
         for k in members[begin[band] : begin[band + 1]]:
-            # once, in the first band that both are in
+            # compare two segments once, in the first band that both are in
             apart = (high_x[k] < left) | (low_x[k] > right) | (high_y[k] < low) | (low_y[k] > high)
             if apart or k == i or band != max(first[i], first[k]) or count >= CROSSINGS:
                 continue
@@ -103,9 +108,10 @@ def _cut(i, ends, box, bands, near, cuts, twins, spans):
 
 @kernel(float64(MATRIX, MATRIX, MATRIX), purpose="the curves of linkages")
 def symmetric_difference(curve, target, gradient):
-    """Compute the area between two closed polygons by the even-odd rule, and its gradient by the curve's vertices.
+    """Return the area between two closed polygons by the even-odd rule; compute its gradient with respect to the vertices.
 
-    ``curve`` and ``target`` have the rows x, y, shape (2, n) and (2, m); ``gradient`` takes the derivatives, shape (2, n).
+    ``curve`` and ``target`` have the rows x, y, shape (2, n) and (2, m); ``gradient`` receives the derivatives of
+    the area with respect to the vertices of ``curve``, shape (2, n).
     """
     n = curve.shape[1]
     ends, box = _segments(curve, target)
@@ -119,7 +125,7 @@ def symmetric_difference(curve, target, gradient):
     _, _, begin, members = bands
     area = 0.0
     cuts, twins, spans = np.empty(CROSSINGS + 2), np.empty(CROSSINGS, np.int64), np.empty((2, CROSSINGS))
-    # the last piece that a segment lies on
+    # number of the last piece with which each segment coincides
     covered, number = np.full(ends.shape[1], -1), 0
     for i in range(ends.shape[1]):
         count, like = _cut(i, ends, box, bands, near, cuts, twins, spans)
@@ -138,11 +144,11 @@ def symmetric_difference(curve, target, gradient):
                     covered[twins[t]] = number
                     shared += 1
             if shared % 2 == 0:
-                # an even number of them on one another bounds nothing
+                # an even number of coinciding segments bounds no area
                 continue
-            # left of the middle of this piece: the ray from there to the right counts what is gone round
+            # even-odd rule for a point just left of the middle of this piece, with a ray to the right
             x, y = xi + middle * dx, yi + middle * dy
-            # a horizontal segment has its left above or below, any other to one side
+            # the left of a horizontal segment is above or below it
             odd = (dy > 0.0) or (dy == 0.0 and dx < 0.0)
             band = min(max(int(scale * (y - floor)), 0), BANDS - 1)
             for k in members[begin[band] : begin[band + 1]]:
@@ -153,7 +159,7 @@ def symmetric_difference(curve, target, gradient):
             x0, y0 = xi + a * dx, yi + a * dy
             area += 0.5 * side * (b - a) * (x0 * dy - y0 * dx)
             if i < n:
-                # shares of the piece's sweep that go to the segment's two ends
+                # shares of the swept area due to the two ends of the segment
                 late = 0.5 * (b * b - a * a)
                 early = (b - a) - late
                 j = (i + 1) % n
@@ -166,13 +172,14 @@ def symmetric_difference(curve, target, gradient):
 
 @kernel(void(MATRIX, MATRIX, boolean, VECTOR, int64[::1], VECTOR), purpose="the curves of linkages")
 def nearest(points, line, closed, distance, segment, share):
-    """Find the nearest place of a polyline to each point: distance, number of the segment, share of it, shape (k,).
+    """Find the nearest place on a polyline to each point; write its distance, segment number and fraction of the segment.
 
     ``points`` and ``line`` have the rows x, y, shape (2, k) and (2, m); a closed line goes on from its last point to its first.
+    The results have shape (k,).
     """
     m = line.shape[1]
     count = m if closed else m - 1
-    # boxes about stretches of the line: one that is farther off than the nearest segment so far is passed over
+    # boxes around groups of segments: a group is skipped if its box is farther off than the nearest segment so far
     stretches = -(-count // STRETCH)
     box = np.empty((stretches, 4))
     for b in range(stretches):
@@ -186,7 +193,7 @@ def nearest(points, line, closed, distance, segment, share):
         x, y = points[0, i], points[1, i]
         least = np.inf
         segment[i], share[i] = 0, 0.0
-        # first where the point before was nearest
+        # begin with the group that was nearest to the last point
         for turn in range(stretches):
             b = (begin + turn) % stretches
             ex, ey = max(box[b, 0] - x, x - box[b, 2], 0.0), max(box[b, 1] - y, y - box[b, 3], 0.0)

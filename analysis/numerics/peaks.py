@@ -1,4 +1,4 @@
-"""Peaks of a series of values and their prominences."""
+"""Find the peaks of a series of values and their prominences."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 
 def peaks(values: NDArray[np.float64]) -> list[tuple[int, float]]:
-    """Find the peaks inside a series, of a flat peak its middle, with their prominences.
+    """Return index and prominence of each peak inside a series; of a flat peak, the index of its middle.
 
-    The prominence is a peak's height above the higher of two minima: those between the peak and the next higher value, or the
-    end, on either side. It equals `scipy.signal.find_peaks`, whose import takes longer than a response curve.
+    On each side of a peak, take the minimum between the peak and the next higher value or the end of the series: the prominence
+    is the peak's height above the higher of these two minima. The results are those of `scipy.signal.find_peaks`, whose import
+    takes longer than a response curve.
 
     >>> peaks(np.array([0.0, 3.0, 1.0, 2.0, 2.0, 0.5]))
     [(1, 2.5), (3, 1.0)]

@@ -1,7 +1,7 @@
-"""References to NamedTuples, which compiled functions pass on instead of the tuples.
+"""References to NamedTuples, which compiled functions take as arguments instead of the tuples.
 
-Numba passes a tuple by value, number by number: two hundred numbers for a tuple of thirty arrays, for each function that takes
-it. Compiling that took longer than compiling the functions.
+Numba passes a tuple by value, number by number: two hundred numbers for a tuple of thirty arrays, in each call. To compile
+these calls took longer than to compile the functions.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic
 
 
 class Reference(types.Type):  # type: ignore[misc]
-    """Type of a reference to a NamedTuple."""
+    """Numba type of a reference to a NamedTuple of the type ``of``."""
 
     def __init__(self, of: Any) -> None:
         self.dtype = of
@@ -49,7 +49,7 @@ def _field(context: Any, builder: Any, reference: Reference, value: Any, name: s
 
 @intrinsic
 def refer(typing_context, fields):
-    """Return a reference to a NamedTuple; it is valid until the function that made it returns."""
+    """Return a reference to a NamedTuple; it is valid until the function that calls `refer` returns."""
 
     def generate(context, builder, signature, arguments):
         return cgutils.alloca_once_value(builder, arguments[0])

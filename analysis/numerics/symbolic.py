@@ -1,4 +1,4 @@
-"""Functions traced with CasADi: exact derivatives of the one set of equations.
+"""Trace functions with CasADi, for exact derivatives of the equations without writing these a second time.
 
 The code of the equations runs unchanged on symbols (`tracing`). The result can be differentiated to any order, evaluated
 as a ``casadi.Function``, or compiled to machine code (`codegen`).
@@ -23,14 +23,14 @@ ELEMENTARY = (
 
 
 def library() -> Any:
-    """Return CasADi, imported when it is first used, as that takes a tenth of a second."""
+    """Return CasADi; the first call imports it, as the import takes a tenth of a second."""
     import casadi
 
     return casadi
 
 
 def traced(modules: tuple[ModuleType, ...], **others: Any) -> Rebound:
-    """Return the functions of ``modules`` for CasADi symbols instead of floats; ``others`` replace further names."""
+    """Return the functions of ``modules`` for CasADi symbols; ``others`` replace further functions by their names."""
     casadi = library()
     functions = {name: getattr(casadi, {"pow": "power"}.get(name, name)) for name in ELEMENTARY}
     return rebound(modules, functions | others)
@@ -43,12 +43,12 @@ def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64]
     ----------
     function : casadi.Function
     *arguments : array_like
-        For a scalar input an array, all of one shape, or a number; for a column input one column, which serves all.
+        For a scalar input a number or an array, all arrays of one shape; for a column input one column for all points.
 
     Returns
     -------
     tuple of ndarray
-        Outputs of that shape.
+        One array of that shape for each output.
     """
     scalar = [function.numel_in(i) == 1 for i in range(function.n_in())]
     shape = np.broadcast_shapes(*(np.shape(a) for a, one in zip(arguments, scalar) if one))
@@ -61,21 +61,21 @@ def evaluate_arrays(function: Any, *arguments: Any) -> tuple[NDArray[np.float64]
 
 
 def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple[Any, Any]]) -> Any:
-    """Wrap a function of Python for CasADi, which calls it instead of tracing it.
+    """Wrap a Python function that cannot be traced as a CasADi function, which calls it.
 
     Parameters
     ----------
     name : str
     inputs, outputs : int
-        Lengths of its argument and of its value, both columns.
+        Lengths of the columns that it takes and returns.
     evaluate : callable
-        ``evaluate(x, slopes)`` returns values (outputs,) and, if ``slopes``, derivatives (outputs, inputs); NaN where
-        there are none.
+        ``evaluate(x, slopes)`` returns values (outputs,) and, if ``slopes`` is true, derivatives (outputs, inputs); both are
+        NaN where the function has no value.
 
     Returns
     -------
     casadi.Callback
-        The caller must keep a reference as long as an expression contains it.
+        The caller must keep a reference to it as long as an expression contains it.
     """
     casadi = library()
 
@@ -124,7 +124,7 @@ def external(name: str, inputs: int, outputs: int, evaluate: Callable[..., tuple
 
 
 def ipopt(name: str, program: dict[str, Any], **options: Any) -> Any:
-    """Return IPOPT for a CasADi program, silent; its ``stats()`` say whether it found a solution."""
+    """Return an IPOPT solver for a CasADi program, without output; its ``stats()`` say whether it found a solution."""
     settings = {
         "print_time": False,
         "error_on_fail": False,

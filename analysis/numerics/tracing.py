@@ -1,7 +1,7 @@
 """Run the plant's own functions on other numbers than floats: the same code objects with other globals.
 
-The equations are straight lines of arithmetic and functions of `math`. With the functions of another library in place of these,
-the same code runs on CasADi's symbols, on NumPy's arrays and on dual numbers. The modules themselves are not changed.
+The equations are arithmetic without branches and functions of `math`. With another library's functions in place of those of
+`math`, the same code runs on CasADi's symbols, on NumPy's arrays and on dual numbers. The modules are not changed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from linkwork.errors import LinkworkError
 
 
 class Rebound(SimpleNamespace):
-    """Functions by name, the later module first; methods of classes are found by `of` only."""
+    """Functions as attributes by name, the later module's if two share a name; methods are found by `of` only."""
 
     def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
         super().__init__(**{f.__name__: f for f in functions.values() if "." not in f.__qualname__})
@@ -28,7 +28,7 @@ class Rebound(SimpleNamespace):
         Raises
         ------
         LinkworkError
-            If it is in none of the modules.
+            If the function is in none of the modules.
         """
         if function not in self._functions:
             name = f"{function.__module__}.{function.__qualname__}"
@@ -37,14 +37,14 @@ class Rebound(SimpleNamespace):
 
 
 def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> Rebound:
-    """Return the functions of ``modules`` for another kind of numbers.
+    """Return copies of the functions of ``modules`` that calculate with another kind of number.
 
     Parameters
     ----------
     modules : tuple of modules
-        Functions that they import by name from one another are replaced too.
+        Functions that the modules import by name from one another are replaced too.
     elementary : mapping
-        Functions of that kind of numbers, by their names in `math` or among the built-in functions.
+        Functions for that kind of number, by the names of the functions of `math` or built-in functions that they replace.
     """
     spaces = [dict(vars(module)) for module in modules]
     functions: dict[Callable[..., Any], FunctionType] = {}

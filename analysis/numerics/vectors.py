@@ -1,7 +1,7 @@
-"""Vectors of doubles as values in kernels: one number of each lane of the processor, with the operators of Python.
+"""Vectors of doubles as values in Numba kernels: one number for each lane of the processor, with the operators of Python.
 
-Numba makes vectors only of loops whose arrays it can tell apart, and seldom of a loop over the few lanes. Here each operation
-is one instruction for all lanes. An array in lanes is flat: number i of lane l is at ``LANES * i + l``.
+Numba vectorises only loops whose arrays cannot overlap, and seldom a loop over a few lanes. Here each operation is one
+instruction for all lanes. An array in lanes is flat: number i of lane l is at ``LANES * i + l``.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from numba.extending import intrinsic, lower_builtin
 
 from .lanes import declared, repeated, vector, width
 
-#: Numbers in a vector: as many as the processor takes at once.
+#: Number of doubles in a vector of the processor.
 LANES = width()
 
 
 class Lanes(types.Type):  # type: ignore[misc]
-    """Type of a number in each lane."""
+    """Numba type of a vector: one double in each lane."""
 
     def __init__(self) -> None:
         super().__init__(name=f"Lanes({LANES})")
@@ -39,13 +39,13 @@ class _Model(PrimitiveModel):  # type: ignore[misc]
         super().__init__(models, kind, _KIND)
 
 
-def _wide(builder: Any, kind: Any, value: Any) -> Any:
-    """Return a value as a vector: a number becomes the same in all lanes."""
+def _to_vector(builder: Any, kind: Any, value: Any) -> Any:
+    """Return a value of the Numba type ``kind`` as a vector; a number becomes the same in all lanes."""
     return value if isinstance(kind, Lanes) else repeated(builder, value, LANES)
 
 
 def _operator(function: Any, instruction: str) -> None:
-    """Give an operator its meaning for vectors, and for a vector and a number."""
+    """Define an operator, by its LLVM instruction, for two vectors and for a vector and a number."""
     pairs = ((LANE, LANE), (float64, LANE), (LANE, float64))
 
     @infer_global(function)
@@ -53,7 +53,7 @@ def _operator(function: Any, instruction: str) -> None:
         cases: ClassVar = [signature(LANE, *pair) for pair in pairs]
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return getattr(builder, instruction)(*map(_wide, [builder] * 2, signature.args, arguments))
+        return getattr(builder, instruction)(*map(_to_vector, [builder] * 2, signature.args, arguments))
 
     for pair in pairs:
         lower_builtin(function, *pair)(lower)
@@ -65,8 +65,8 @@ _operator(operator.mul, "fmul")
 _operator(operator.truediv, "fdiv")
 
 
-def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
-    """Return a pointer to a vector of an array."""
+def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    """Return a pointer to the vector with an index in an array in lanes."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [builder.mul(index, ir.Constant(index.type, LANES))]), _KIND.as_pointer())
 
@@ -76,7 +76,7 @@ def load(typing_context, array, index):
     """Return number ``index`` of each lane from an array in lanes."""
 
     def generate(context, builder, signature, arguments):
-        return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
+        return builder.load(_pointer(context, builder, signature.args[0], *arguments), align=8)
 
     return LANE(array, int64), generate
 
@@ -86,8 +86,8 @@ def store(typing_context, array, index, value):
     """Write number ``index`` of each lane into an array in lanes."""
 
     def generate(context, builder, signature, arguments):
-        value = _wide(builder, signature.args[2], arguments[2])
-        builder.store(value, _place(context, builder, signature.args[0], *arguments[:2]), align=8)
+        value = _to_vector(builder, signature.args[2], arguments[2])
+        builder.store(value, _pointer(context, builder, signature.args[0], *arguments[:2]), align=8)
         return context.get_dummy_value()
 
     return types.void(array, int64, value), generate
@@ -95,9 +95,9 @@ def store(typing_context, array, index, value):
 
 @intrinsic
 def spread(typing_context, rows, index, value):
-    """Write the number of each lane at ``index`` of its row of an array, to be read there by single lanes.
+    """Write the number of each lane into row ``lane`` of an array, shape (LANES, n), at the column ``index``.
 
-    To gather the numbers of a lane takes some processors longer than to compute them.
+    Single lanes read their rows: to gather a lane's numbers from an array in lanes is slower on some processors.
     """
 
     def generate(context, builder, signature, arguments):
@@ -114,11 +114,11 @@ def spread(typing_context, rows, index, value):
     return types.void(rows, int64, LANE), generate
 
 
-def _called(name: str) -> Any:
-    """Return the writer of a call of one of LLVM's functions; numbers among the arguments become vectors."""
+def _call_intrinsic(name: str) -> Any:
+    """Return a function that writes the call of an LLVM intrinsic; numbers among the arguments become vectors."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        values = [_wide(builder, *one) for one in zip(signature.args, arguments)]
+        values = [_to_vector(builder, *one) for one in zip(signature.args, arguments)]
         full = f"llvm.{name}.v{LANES}f64" if LANES > 1 else f"llvm.{name}.f64"
         return builder.call(declared(builder.module, full, _KIND, len(values)), values)
 
@@ -127,25 +127,25 @@ def _called(name: str) -> Any:
 
 @intrinsic
 def fused(typing_context, a, b, c):
-    """Return a b + c of vectors or numbers, rounded once."""
-    return LANE(a, b, c), _called("fma")
+    """Return a * b + c for vectors or numbers, rounded once."""
+    return LANE(a, b, c), _call_intrinsic("fma")
 
 
 @intrinsic
 def size(typing_context, a):
-    """Return the absolute values."""
-    return LANE(LANE), _called("fabs")
+    """Return the absolute value in each lane."""
+    return LANE(LANE), _call_intrinsic("fabs")
 
 
 @intrinsic
 def root(typing_context, a):
-    """Return the square roots."""
-    return LANE(LANE), _called("sqrt")
+    """Return the square root in each lane."""
+    return LANE(LANE), _call_intrinsic("sqrt")
 
 
 @intrinsic
 def greater(typing_context, a, b):
-    """Return the greater of two in each lane; the second where they do not compare."""
+    """Return the greater of two numbers in each lane; the second if one of them is NaN."""
 
     def generate(context, builder, signature, arguments):
         a, b = arguments

@@ -25,17 +25,18 @@ Made = TypeVar("Made")
 #: How often workers are restarted after one was killed.
 RETRIES = 3
 
-#: Greatest pickled result (bytes) that goes through the pipe: with what joblib adds, a pipe takes it in one piece.
+#: Size of a pickled result (bytes) up to which it is sent through the pipe: with joblib's additions it passes in one piece.
 _PIECE = 2048
 
-#: Work, number of an item, the item, the caller's process id, a folder for results. Number of an item, its result, its error.
+#: A task: function, number of the item, item, process id of the caller, folder for results.
 _Task = tuple[Callable[[Any], Any], int, Any, int, str]
+#: A result: number of the item, value of the function, error that the function raised.
 _Found = tuple[int, Any, Exception | None]
 
 _WATCHED: set[int] = set()
 #: Seconds between two checks that the caller is alive.
 _INTERVAL = 0.5
-#: Seconds without a result after which the scheduler of a cluster is asked whether it is there, and that it has to answer.
+#: Seconds without a result after which the scheduler of a cluster is asked whether it is alive; also its time to answer.
 _PATIENCE = 60.0
 
 
@@ -51,9 +52,9 @@ class Heard(list[bool]):
 
 @contextmanager
 def interruptible() -> Iterator[Heard]:
-    """Record Ctrl-C as an entry in a list, for the caller to look at between two steps.
+    """Record each Ctrl-C in a list, which the caller checks between two steps.
 
-    An exception could arise anywhere: inside an FMU that runs in this interpreter, or inside Numba, which may drop it.
+    An exception instead could be raised inside an FMU that runs in this interpreter, or inside Numba, which may drop it.
     """
     heard = Heard()
     if threading.current_thread() is not threading.main_thread():
@@ -86,12 +87,12 @@ def check_jobs(n_jobs: int | None) -> None:
 
 
 def worker_count(n_jobs: int | None, *, threads: bool = False) -> int:
-    """Return the number of workers of `over_workers`, as `joblib.Parallel` counts them; on a cluster all of its cores."""
+    """Return how many workers `over_workers` uses, as `joblib.Parallel` counts them; on a cluster, all of its cores."""
     return _workers(n_jobs, threads)[0]
 
 
 def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
-    """Return whether the workers of `over_workers` are this process and its threads."""
+    """Return whether `over_workers` works in this process and its threads."""
     return not _workers(n_jobs, threads)[1]
 
 
@@ -102,7 +103,7 @@ def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool, Any]:
     check_jobs(n_jobs)
     backend, default = joblib.parallel.get_active_backend(prefer="threads" if threads else None)
     if hasattr(backend, "client"):
-        _ask(backend.client)  # joblib would wait for ever
+        _ask_scheduler(backend.client)  # joblib would wait for ever for a scheduler that is gone
     try:
         count = int(backend.effective_n_jobs((default or 1) if n_jobs is None else n_jobs))
     except TimeoutError as error:
@@ -118,16 +119,16 @@ def over_workers(
     n_jobs: int | None = None,
     threads: bool = False,
 ) -> Iterator[tuple[int, Made]]:
-    """Yield number and result of each item as soon as it is done.
+    """Apply a function to items in parallel; yield number and result of each item as soon as it is done.
 
-    The workers are ``n_jobs`` processes of this machine, threads if ``threads`` are preferred, or those of the backend that
-    `joblib.parallel_config` has set, such as "dask", "loky" or "threading". One job runs in this process. An item
-    whose worker was killed goes to another worker. Processes that are started here end with this one.
+    The workers are ``n_jobs`` processes of this machine, threads if ``threads`` is true, or those of the backend that
+    `joblib.parallel_config` has set, such as "dask", "loky" or "threading". With one worker the work is done in this process.
+    An item whose worker was killed goes to another worker. Processes that are started here end with this one.
 
     Parameters
     ----------
     work : callable
-        An exception that it raises is raised here.
+        Function of an item; its exceptions are raised here.
     items : sequence
     heard : Heard, optional
         From `interruptible`. With it, Ctrl-C ends the iteration; without it, Ctrl-C raises KeyboardInterrupt.
@@ -135,13 +136,13 @@ def over_workers(
     Raises
     ------
     WorkersLost
-        If workers were killed more than `RETRIES` times, or fail otherwise, or the scheduler of a cluster does not answer. A
-        part that ends every worker of a cluster is named, after the others have been yielded.
+        If workers were killed more than `RETRIES` times, or fail otherwise, or the scheduler of a cluster does not answer. If
+        an item kills every worker of a cluster, the message names it; the results of all other items are yielded first.
 
     Notes
     -----
-    Processes of this machine pass large results in files: if a sender is killed in the middle of a message, joblib waits for
-    ever for the rest.
+    Processes of this machine pass large results in files: if a process is killed in the middle of a message, joblib waits for
+    ever for the rest of it.
     """
     count, elsewhere, backend = _workers(n_jobs, threads)
     listening = Heard() if heard is None else heard
@@ -152,7 +153,7 @@ def over_workers(
         for attempt in range(RETRIES + 1):
             tasks = [(work, number, item, os.getpid(), folder) for number, item in todo.items()]
             if not elsewhere:
-                results = _here(tasks, count)
+                results = _in_this_process(tasks, count)
             elif hasattr(backend, "client"):
                 results = _in_cluster(tasks, backend)
             else:
@@ -161,11 +162,11 @@ def over_workers(
                 while todo:
                     listening.waiting = elsewhere
                     try:
-                        number, made, error = _taken(next(results))
+                        number, made, error = _read_result(next(results))
                     finally:
                         listening.waiting = False
                     if error is not None:
-                        raise _OfWork(error)
+                        raise _WorkError(error)
                     del todo[number]
                     yield number, made
                 return
@@ -175,7 +176,7 @@ def over_workers(
                 if not heard:
                     heard.append(True)
                 return
-            except _OfWork as caught:
+            except _WorkError as caught:
                 raise caught.error from None
             except LinkworkError:  # from an item that cannot be sent
                 raise
@@ -201,24 +202,25 @@ def over_workers(
 
 
 def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Generator[Any, None, None]:
-    """Yield what other processes send, as it comes; they may be lost before the first of it."""
+    """Yield the results of processes of this machine in the order in which they arrive."""
     import joblib
 
     # small results in one batch would make a large message
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered", batch_size=1)
-    yield from parallel(joblib.delayed(_one)(task) for task in tasks)
+    yield from parallel(joblib.delayed(_do_task)(task) for task in tasks)
 
 
 def _in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, None]:
-    """Yield what the workers of a Dask cluster send, as it comes; joblib would wait for ever for a part that ends its worker.
+    """Yield the results of the workers of a Dask cluster in the order in which they arrive.
 
-    Raises WorkersLost for such a part when the others are done, and if the scheduler does not answer or has no worker.
+    Raises WorkersLost for tasks that kill their workers, when all others are done, and if the scheduler does not answer or has
+    no worker. Through joblib a task that kills its worker would be waited for without end.
     """
-    suspects = yield from _round(tasks, backend)
-    # a cluster gives up parts that waited on a worker that was killed, too: one after the other it is clear which it was
+    suspects = yield from _run_round(tasks, backend)
+    # a cluster also gives up tasks that waited on the killed worker: run one by one, the task that killed it shows
     guilty = suspects if len(suspects) < 2 else []
     for task in suspects[len(guilty) :]:
-        guilty += yield from _round([task], backend)
+        guilty += yield from _run_round([task], backend)
     if guilty:
         numbers = ", ".join(str(number + 1) for _, number, *_ in guilty)
         raise WorkersLost(
@@ -226,32 +228,32 @@ def _in_cluster(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, No
         )
 
 
-def _round(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, list[_Task]]:
-    """Yield the results of tasks given to a cluster; return the tasks that it gave up as their workers were killed."""
+def _run_round(tasks: Sequence[_Task], backend: Any) -> Generator[Any, None, list[_Task]]:
+    """Submit tasks to a cluster and yield their results; return the tasks given up because their workers were killed."""
     client, done = backend.client, SimpleQueue[Any]()
     # as one tuple: Dask would keep a large argument on one worker only, and lose it with that worker
-    futures = {client.submit(_one, task, pure=False, **backend.submit_kwargs): task for task in tasks}
+    futures = {client.submit(_do_task, task, pure=False, **backend.submit_kwargs): task for task in tasks}
     for future in futures:
         future.add_done_callback(done.put)
     given_up = []
     try:
         for _ in tasks:
-            future = _patiently(client, partial(done.get, timeout=_PATIENCE))
-            error = _patiently(client, partial(future.exception, timeout=_PATIENCE))
+            future = _wait_for_cluster(client, partial(done.get, timeout=_PATIENCE))
+            error = _wait_for_cluster(client, partial(future.exception, timeout=_PATIENCE))
             if type(error).__name__ == "KilledWorker":
                 given_up.append(futures[future])
             elif error is not None:
                 raise error
             else:
-                yield _patiently(client, partial(future.result, timeout=_PATIENCE))
+                yield _wait_for_cluster(client, partial(future.result, timeout=_PATIENCE))
     finally:
-        with suppress(Exception):  # of a scheduler that is gone
+        with suppress(Exception):  # the scheduler may be gone
             client.cancel(list(futures))
     return given_up
 
 
-def _ask(client: Any) -> Mapping[str, Any]:
-    """Return the workers that the scheduler of a cluster knows; raises WorkersLost if it does not answer in time."""
+def _ask_scheduler(client: Any) -> Mapping[str, Any]:
+    """Ask the scheduler of a cluster for its workers; raises WorkersLost if it does not answer in time."""
     try:
         workers: Mapping[str, Any] = client.sync(client.scheduler.identity, callback_timeout=_PATIENCE)["workers"]
     except Exception as error:
@@ -259,30 +261,30 @@ def _ask(client: Any) -> Mapping[str, Any]:
     return workers
 
 
-def _patiently(client: Any, wait: Callable[[], Any]) -> Any:
-    """Return what ``wait`` waits for, as long as the scheduler of a cluster answers and has workers."""
+def _wait_for_cluster(client: Any, wait: Callable[[], Any]) -> Any:
+    """Call ``wait`` until it returns, and return its value; raises WorkersLost if the cluster is gone or has no workers."""
     while True:
         try:
             return wait()
         except (Empty, TimeoutError):
-            if not _ask(client):
+            if not _ask_scheduler(client):
                 raise WorkersLost(f"the cluster has had no worker for {_PATIENCE:g} s") from None
 
 
-def _here(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
-    """Yield results from this process or its threads; joblib would look for them only a hundred times a second."""
+def _in_this_process(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
+    """Do tasks in this process or its threads and yield the results; joblib would check for them every 10 ms only."""
     if count == 1:
-        yield from map(_one, tasks)
+        yield from map(_do_task, tasks)
         return
     pool = ThreadPoolExecutor(count)
     try:
-        for future in as_completed([pool.submit(_one, task) for task in tasks]):
+        for future in as_completed([pool.submit(_do_task, task) for task in tasks]):
             yield future.result()
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-class _OfWork(Exception):
+class _WorkError(Exception):
     """An error raised by the work, not by the workers."""
 
     def __init__(self, error: Exception) -> None:
@@ -290,20 +292,20 @@ class _OfWork(Exception):
         super().__init__()
 
 
-def _one(task: _Task) -> _Found | Path:
-    """Return the result of an item, or the file that holds it."""
+def _do_task(task: _Task) -> _Found | Path:
+    """Do the work of a task; return its result, or the file that holds the result."""
     work, number, item, caller, folder = task
     end_with(caller)
     found: _Found
     try:
         found = number, work(item), None
-    except Exception as error:  # is passed on, to be told from errors of the workers
+    except Exception as error:  # returned, as one that is raised would count as an error of the workers
         found = number, None, error
-    return _handed_over(found, Path(folder, str(number))) if folder and os.getppid() == caller else found
+    return _store_if_large(found, Path(folder, str(number))) if folder and os.getppid() == caller else found
 
 
-def _handed_over(found: _Found, path: Path) -> _Found | Path:
-    """Return a result that a pipe takes in one piece: itself if it is small, else the file that it is written to."""
+def _store_if_large(found: _Found, path: Path) -> _Found | Path:
+    """Return a result if it is small enough for a pipe; else write it to a file and return the path."""
     try:
         content = pickle.dumps(found)
         if len(content) <= _PIECE:
@@ -314,21 +316,21 @@ def _handed_over(found: _Found, path: Path) -> _Found | Path:
     return path
 
 
-def _taken(sent: _Found | Path) -> _Found:
-    """Return a result, read from its file if it is in one."""
+def _read_result(sent: _Found | Path) -> _Found:
+    """Return a result that a worker sent, read from its file if the worker sent a path."""
     if not isinstance(sent, Path):
         return sent
     found: _Found = pickle.loads(sent.read_bytes())
-    with suppress(OSError):  # the folder goes with it at the end
+    with suppress(OSError):  # a file that stays is deleted with its folder
         sent.unlink()
     return found
 
 
 def end_with(caller: int) -> None:
-    """End this process soon after its parent, if that is ``caller``; a worker calls it first.
+    """Start a thread that ends this worker process when its parent, the process ``caller``, is gone.
 
-    Without it a worker would go on for minutes after its caller is gone. Workers that others started, as in a cluster, and the
-    caller's own process are left alone. It has no effect under Windows, which keeps the process id of a parent that is gone.
+    Without the thread a worker would go on for minutes. If the parent is another process, as in a cluster or in the caller
+    itself, nothing is done. Under Windows the thread has no effect: the process id of the parent stays when the parent is gone.
     """
     if os.getppid() == caller and caller not in _WATCHED:
         _WATCHED.add(caller)

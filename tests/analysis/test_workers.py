@@ -24,7 +24,7 @@ import pytest
 
 from analysis import Inputs, simulate_many
 from analysis.numerics import workers as workers_module
-from analysis.numerics.workers import WorkersLost, _handed_over, interruptible, over_workers, worker_count
+from analysis.numerics.workers import WorkersLost, _store_if_large, interruptible, over_workers, worker_count
 from analysis.periodic import Drive, grid, plane
 from analysis.slider_crank import Tolerance, force_turn, monte_carlo
 from analysis.synthesis import Search, TargetPath, TimedPath, UntimedPath, synthesize
@@ -169,7 +169,7 @@ def test_a_worker_killed_as_it_hands_over_is_noticed(tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [b"x" * 100_000, "lambda"])
 def test_what_cannot_be_written_is_sent_as_before(content: Any, tmp_path: Path) -> None:
     found = (1, (lambda: 3) if content == "lambda" else content, None)
-    assert _handed_over(found, tmp_path / "none" / "1") is found
+    assert _store_if_large(found, tmp_path / "none" / "1") is found
     assert not list(tmp_path.iterdir())
 
 
