@@ -1,4 +1,4 @@
-"""Charts over two parameters: a quantity in colours, boundaries drawn over it."""
+"""Charts over two parameters: a quantity as a colour map, with boundaries drawn over it."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from .style import COLOURS, LIGHT, legend_above, spoken, spoken_label
 
 #: Colour of points that have no value.
 EMPTY = "0.82"
-#: Hatching of classes, one after another, so that they are told apart without colours, and of what is unstable.
+#: Hatchings of the classes in order, so that they can be told apart without colours; and hatching of unstable points.
 _HATCHES, _UNSTABLE = ("", "//", "xx", "..", "--", "||"), "////"
 #: Size of a chart of a result (inches).
 _SIZE = 7.2, 4.6
-#: Classes of points by how many stable motions they have, with their colours; and those of none, one and more.
+#: Classes of points by the number of stable motions, with their colours; class numbers for none, one and several of them.
 _SEVERAL = {"one stable motion": "#C6DFF0", "several stable motions": "#F6C99F", "unstable motions only": "#E58267"}
 _BY_COUNT = np.array([2.0, 0.0, 1.0])
-#: Where starts end that end in no motion.
+#: Legend entries of initial conditions that settle to no known motion, by their number in `Basins.ends`.
 _LOST = {-1: "comes to the limit of assembly", -2: "ends in none of them, as far as it was followed"}
-#: Colours of the two sides of a value.
+#: Colours in the legend of values below and above the middle of a scale.
 _BELOW, _ABOVE = "#6AACD0", "#E58267"
 
 _Masked = np.ma.MaskedArray[Any, np.dtype[np.float64]]
@@ -40,28 +40,28 @@ _Masked = np.ma.MaskedArray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeatMap:
-    """A quantity over a grid, in colours that part at a value, under the curves of a panel.
+    """Colour map of a quantity over a grid, drawn under the curves of a panel.
 
     Attributes
     ----------
     panel : Panel
         Axes and curves.
     x, y : ndarray, shapes (nx,) and (ny,)
+        Coordinates of the grid lines, in the units of the axes.
     values : masked array, shape (ny, nx)
-        Masked where there is none; drawn in grey.
+        Masked points have no value and are grey.
     label : str
-        What it is, with unit.
+        Name and unit of the quantity.
     middle : float or None
-        Value that is white: below it blue, above it red; None for one colour scale from the least to the greatest.
+        Value that is white: smaller values are blue, greater ones red. None for a scale from the least to the greatest value.
     missing : str
-        What the legend calls masked points.
+        Name of masked points in the legend.
     classes : mapping
-        Where ``values`` are numbers of classes, from 0: what the legend calls each, and its colour. There is no colour scale
-        then.
+        Names in the legend and colours of classes, if ``values`` are class numbers from 0; there is no colour scale then.
     sides : (str, str), optional
-        What the legend calls values below and above the middle; those above are hatched.
+        Names in the legend of values below and above the middle; values above it are hatched.
     hover : mapping
-        What is beside x and y under the pointer, by its name with unit, each of shape (ny, nx); without any the value is.
+        Arrays of shape (ny, nx), by name with unit, that a page shows under the pointer beside x and y; by default ``values``.
     """
 
     panel: Panel
@@ -85,7 +85,7 @@ def plot_charts(
     ----------
     charts : sequence of Panel or HeatMap
     title : str
-        Above all of it; a figure of the thesis by its number.
+        Title of the figure; for a figure of the thesis its number.
     columns : int
         Charts side by side.
     size : (float, float)
@@ -95,7 +95,7 @@ def plot_charts(
 
 
 def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
-    """Return the scale of a map's values and its colours."""
+    """Return the scale from a map's values to [0, 1], and its colour map."""
     values = np.ma.masked_invalid(chart.values)
     if chart.classes:
         n = len(chart.classes)
@@ -111,7 +111,7 @@ def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
 
 
 def keys_of(chart: HeatMap) -> list[tuple[str, str, str]]:
-    """Return colour, hatching and name of a map's entries in the legend besides its curves."""
+    """Return colour, hatching and name of each legend entry of a map; the entries of its curves are not among them."""
     keys = [(colour, hatch, name) for (name, colour), hatch in zip(chart.classes.items(), cycle(_HATCHES))]
     if chart.sides is not None:
         keys += [(_BELOW, "", chart.sides[0]), (_ABOVE, _UNSTABLE, chart.sides[1])]
@@ -126,7 +126,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     norm, colours = colours_of(chart)
     axis.set_facecolor(EMPTY)
     mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, norm=norm, cmap=colours)
-    for of, hatch in _hatched(chart, values):
+    for of, hatch in _hatched_points(chart, values):
         if of.any() and min(of.shape) > 1:
             # a boundary half a cell inside of its own points
             area = axis.contourf(chart.x, chart.y, of, levels=[0.5, 1.5], colors="none", hatches=[hatch])
@@ -154,7 +154,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
 
 
 def _ticks(norm: Normalize) -> list[float] | None:
-    """Return ticks on both sides of the middle of a scale, which has as much room for either; None if it has no middle."""
+    """Return about four ticks on either side of the middle of a scale, and the middle; None if the scale has no middle."""
     if not isinstance(norm, TwoSlopeNorm):
         return None
     least, middle, greatest = (float(value or 0.0) for value in (norm.vmin, norm.vcenter, norm.vmax))
@@ -164,8 +164,8 @@ def _ticks(norm: Normalize) -> list[float] | None:
     return sorted({tick for tick in ticks if abs(tick - middle) > near} | {middle})
 
 
-def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:
-    """Return the hatched points, as ones among zeros, and the hatching."""
+def _hatched_points(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:
+    """Return pairs of an array, which is 1 at the points to be hatched and 0 elsewhere, and the hatching."""
     if chart.sides is not None and chart.middle is not None:
         return [(np.asarray(values.filled(-np.inf) > chart.middle + TOLERANCE, dtype=float), _UNSTABLE)]
     hatches = [_HATCHES[i % len(_HATCHES)] for i in range(len(chart.classes))]
@@ -174,7 +174,10 @@ def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64],
 
 @pictured
 def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
-    """Plot stable, unstable and missing points with the largest multiplier in colours, the boundaries, and the long runs."""
+    """Plot the largest Floquet multiplier in colours, the stability boundaries, and the outcomes of long runs.
+
+    If the chart has the coexisting motions, their number and amplitudes are plotted instead of the multiplier.
+    """
     x, y = chart.axes
     looks = {
         Crossing.PERIOD_DOUBLING: ("0.1", "-", "period doubling"),
@@ -226,7 +229,7 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
         y_range=(float(low[1]), float(high[1])),
     )
     if chart.beside is not None:
-        return _with_coexistence(chart, chart.beside, panel, title)
+        return _coexistence_picture(chart, chart.beside, panel, title)
     words = [["not found" if word is None else word.value for word in row] for row in chart.grid.stability().tolist()]
     map_ = HeatMap(
         panel=panel,
@@ -241,8 +244,8 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
     return Picture(parts=[map_], title=title, size=_SIZE)
 
 
-def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Picture:
-    """Plot the number of stable motions and the amplitudes of the smallest and the largest, with the boundaries."""
+def _coexistence_picture(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Picture:
+    """Describe maps of the number of stable motions, and of the least and greatest amplitude, with the boundaries."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
     shown, factor = display_of(unit)
@@ -276,7 +279,7 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
 
 @pictured
 def plot_basins(found: Basins, *, title: str = "") -> Picture:
-    """Plot each start in the colour of the motion in which it ends, and the motions at the crank angle 0."""
+    """Plot each initial condition in the colour of the motion it settles to, and mark the motions at crank angle 0."""
     name, _, position_unit = found.labels[0].removesuffix("]").partition(" [")
     drawn, scale = display_of(position_unit)
     half = len(found.motions[0].start) // 2
@@ -308,7 +311,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
     names = [
-        f"ends in motion {n}{'' if orbit.turns == 1 else f' of {orbit.crank_turns} turns'}, amplitude of {spoken(name)} "
+        f"ends in motion {n}{'' if orbit.periods == 1 else f' of {orbit.crank_turns} turns'}, amplitude of {spoken(name)} "
         f"{factor * orbit.amplitude:.3g} {shown}"
         for n, orbit in enumerate(found.motions, start=1)
     ]

@@ -1,4 +1,4 @@
-"""A periodic motion: what moves over a period, the torque that it takes, and its Floquet multipliers."""
+"""Plot periodic motions: coordinates and torque over a period, and Floquet multipliers."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ _SAMPLES = 512
 def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     """Plot a periodic motion over the crank angle and in the phase plane, and its Floquet multipliers.
 
-    The curves over the angle are of the coordinates that are free beside the crank, the crank's speed where it varies, and
-    the torque that drives it.
+    The curves over the crank angle are the free coordinates, the crank speed if it varies, and the driving torque.
 
     Parameters
     ----------
@@ -41,9 +40,9 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     names += [name for n in mechanism.cyclic for name in mechanism.names("drive", mechanism.freedoms[n].coordinate)]
 
     def closed(name: str) -> tuple[np.ndarray, str]:
-        """Return an output over the period in drawn units, with its first value repeated at the end, and its label."""
+        """Return an output over the period in display units, with its value at the end of the period, and its axis label."""
         unit, factor = display_unit(variables[name])
-        return factor * _closed(orbit, turn, name), f"{spoken(name)} [{unit}]"
+        return factor * _closed(turn, name), f"{spoken(name)} [{unit}]"
 
     angle = np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns))
     ticks = np.linspace(0.0, angle[-1], 5).tolist()
@@ -62,13 +61,15 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
     return plot_curves(panels, title=title or _title(orbit, turn.period), columns=2, size=(4.4, 2.9))
 
 
-def _closed(orbit: PeriodicOrbit, turn: Turn, name: str) -> np.ndarray:
-    """Return an output over the period with its value at the end, which of what goes round is not the first."""
-    return np.append(turn[name], turn[name][0] + turn.paces.get(name, 0.0) * orbit.flow.period * orbit.turns)
+def _closed(turn: Turn, name: str) -> np.ndarray:
+    """Return an output over the period with its value at the end, which of an angle may be whole turns on."""
+    values = turn[name]
+    whole = 2.0 * np.pi * np.round((values[-1] - values[0]) / (2.0 * np.pi)) if name in turn.angles else 0.0
+    return np.append(values, values[0] + whole)
 
 
 def _multipliers(orbit: PeriodicOrbit) -> Panel:
-    """Draw the Floquet multipliers and the unit circle, outside of which deviations grow."""
+    """Return the panel of the Floquet multipliers and the unit circle; multipliers outside of it mean growing deviations."""
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
     return Panel(
         x_label="real part",
@@ -90,7 +91,7 @@ def _title(orbit: PeriodicOrbit, period: float) -> str:
 
 @plot.register
 def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
-    """Plot the first free coordinate of all motions at a point over the period, unstable ones dashed."""
+    """Plot the first free coordinate of all motions found at one speed over the crank angle, unstable ones dashed."""
     curves, label = [], "first free coordinate"
     for orbit in found.orbits:
         turn = orbit.turn(_SAMPLES)
@@ -101,7 +102,7 @@ def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
         curves.append(
             Curve(
                 x=np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns)),
-                y=factor * _closed(orbit, turn, turn.swing),
+                y=factor * _closed(turn, turn.swing),
                 line="-" if stable else "--",
                 label=f"{orbit.verdict().stability.value}, largest multiplier {orbit.largest:.3g}",
             )

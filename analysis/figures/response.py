@@ -1,4 +1,4 @@
-"""Branches of periodic motions over a parameter: amplitude, harmonics, errors of approximations, torque and forces."""
+"""Plot branches of periodic motions over a parameter: amplitude, harmonics, errors of approximations, torque, forces."""
 
 from __future__ import annotations
 
@@ -34,37 +34,41 @@ from ..youssef import Approximations
 from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
 from .style import COLOURS, LINE, THIN, spoken
 
-#: Lines of the approximations beside, of motions by their stability, and of the reader's figure that has all panels.
+#: Line styles of the approximations, and of motions by their stability.
 _LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))
 _STABLE = {Stability.STABLE: "-", Stability.MARGINAL: ":", Stability.UNSTABLE: "--"}
-#: Width of a figure and height of its least panel (inches); of the first panel and of the second, relative to it.
+#: Width of a figure and height of an ordinary panel (inches); heights of the first and second panel relative to it.
 _SIZE, _MAIN, _HARMONICS = (7.6, 1.75), 2.4, 1.15
 
-#: Points of a branch at which approximations are compared with it, and places over the range at which they are drawn besides.
+#: Greatest number of points of a branch at which approximations are compared with it; number of further points of their curves.
 _COMPARED, _BESIDE = 240, 60
-#: Distance (points) within which a curve is hidden under another.
+#: Distance (points) from another curve up to which a curve counts as hidden.
 _HIDDEN = 1.5 * LINE
-#: Relative error (%) that counts as none; harmonic, relative to the greatest, that does.
+#: Relative error (%) that counts as zero; harmonic, relative to the greatest one, that counts as zero.
 _NONE, _SMALL = 1e-3, 2e-5
-#: Height above the valleys about it, relative to the axis, from which a peak has a text.
+#: Least prominence of a peak that gets a text, relative to the height of the axis.
 _STANDS_OUT = 0.005
-#: Share of the axis within which crossings have one text.
+#: Crossings closer than this share of the axis have one common text.
 _CASCADE = 0.01
-#: Letters along a branch.
+#: Number of letters along a branch.
 _LETTERS = 7
-#: Distance (points) along an axis from which letters are clear of one another.
+#: Letters closer than this along both axes (points) overlap.
 _LETTER = 11.0
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-#: Signs of the points at which a multiplier crosses the unit circle, and what they are called in the picture.
+#: Markers and short names of the points at which a multiplier crosses the unit circle.
 _MARKERS = {Crossing.FOLD: ("s", "fold"), Crossing.PERIOD_DOUBLING: ("D", "doubling"), Crossing.TORUS: ("^", "torus")}
 _RISKS = tuple(Risk)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Scale:
-    """How a parameter and the amplitude are drawn: factors from SI, units, names; ``what`` is the short one of the latter."""
+    """How parameter and amplitude are shown.
+
+    ``factor`` and ``unit`` are the parameter's factor from SI and display unit; ``scale``, ``shown``, ``what`` and ``name`` are
+    the amplitude's factor, unit, short name and long name.
+    """
 
     family: Family
     factor: float
@@ -80,12 +84,12 @@ class _Scale:
         return f"{name} [{self.unit}]" if self.unit else name
 
     def place(self, value: float) -> str:
-        """Return a value of the parameter in drawn units as text, to four digits or more to tell values apart."""
+        """Return a value of the parameter in its display unit as text, to four digits, or to whole units from 1000 on."""
         number = self.factor * value
         return f"{number:.0f} {self.unit}" if abs(number) >= 1e3 else f"{number:.4g} {self.unit}".rstrip()
 
     def size(self, value: float) -> str:
-        """Return an amplitude in drawn units as text, without the unit."""
+        """Return an amplitude in its display unit as text, without the unit."""
         return f"{self.scale * value:.4g}"
 
 
@@ -99,21 +103,21 @@ def plot_branches(
 ) -> Figure:
     """Plot amplitude, harmonics, crank torque and pin force along branches, stable parts solid, unstable ones dashed.
 
-    At folds an arrow goes to the motion that the machine jumps to. Of approximations there is a panel of the relative error;
-    those that the true motion covers are drawn only there.
+    At folds an arrow leads to the motion that the machine jumps to. Approximations have a panel of their relative errors; those
+    whose curve is hidden under the true motion are drawn only there.
 
     Parameters
     ----------
     branches : sequence of Branch
-        Of one family.
+        Branches of one family.
     title : str
     rpm : bool
         Whether a speed in rad/s is drawn in rpm.
     beside : callable, optional
-        ``beside(values)``: amplitudes (m) by approximations, by their names, at values of the parameter, of their shape. Their
-        errors are against the stable motions of one turn.
+        ``beside(values)`` returns the amplitudes (m) of approximations by name, at values (m,) of the parameter, each of shape
+        (m,). Their errors are relative to the stable motions of one turn.
     avoid : sequence of Avoided
-        Ranges to shade.
+        Ranges of the parameter to shade.
     """
     return draw(describe_branches(branches, title=title, rpm=rpm, beside=beside, avoid=avoid))
 
@@ -127,7 +131,7 @@ def describe_branches(
     avoid: Sequence[Avoided] = (),
     caution: str = "",
 ) -> Picture:
-    """Return the picture that `plot_branches` draws, with a line above the legend on what the ranges do not know."""
+    """Return the picture that `plot_branches` draws; ``caution`` is a line above the legend on limits of the shaded ranges."""
     family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     unit, factor = display_of(family.unit) if rpm or family.unit != "rad/s" else (family.unit, 1.0)
     shown, scale = display_of(si)
@@ -153,22 +157,22 @@ def _amplitudes(
     branches: Sequence[Branch], look: _Scale, others: Sequence[_Approximated], shades: Sequence[Shade]
 ) -> Panel:
     """Return the panel of the amplitude along all branches, with special points, jumps, and visible approximations."""
-    # what is linear has resonances without bound; the true motion sets the scale
+    # the scale is that of the true motion, as linear approximations have unbounded resonances
     top = 1.15 * max(look.scale * float(branch.amplitude.max()) for branch in branches)
     found = fold_jumps(branches)
     curves = [
         curve
         for n, branch in enumerate(branches)
-        for curve in _along(branch, n, look, look.scale * branch.amplitude, hover=_told(branch, n))
+        for curve in _stability_curves(branch, n, look, look.scale * branch.amplitude, hover=_hover_values(branch, n))
     ]
     for branch in branches:
-        if branch.turns > 1:
-            colour = COLOURS[(branch.turns.bit_length() - 1) % len(COLOURS)]
+        if branch.periods > 1:
+            colour = COLOURS[(branch.periods.bit_length() - 1) % len(COLOURS)]
             x, y = look.factor * branch.parameter, look.scale * branch.amplitude
             curves.append(_letters(x, y, str(branch.crank_turns), colour=colour))
     curves += _visible(others, branches, look, top)
     curves += _specials(branches, look, found)
-    labels = [label for branch in branches if branch.turns == 1 for label in _peaks(branch, look, top)]
+    labels = [label for branch in branches if branch.periods == 1 for label in _peaks(branch, look, top)]
     labels += [
         Label(x=look.factor * jump.parameter, y=look.scale * jump.before, text=_jump(jump, look)) for jump in found
     ]
@@ -191,7 +195,7 @@ def _amplitudes(
 
 
 def _jump(jump: FoldJump, look: _Scale) -> str:
-    """Return the text of a fold: the motions on its sides and the jump of the machine."""
+    """Return the text at a fold: on which side the motion exists, and where the machine jumps."""
     side, change = ("below", "rising") if jump.direction > 0 else ("above", "falling")
     there = f"{look.size(jump.before)} {look.shown} only {side} {look.place(jump.parameter)};\n{change}, it "
     if not jump.after:
@@ -201,7 +205,7 @@ def _jump(jump: FoldJump, look: _Scale) -> str:
 
 
 def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
-    """Return the texts of the peaks of a branch that are stable and stand out, with speed and amplitude."""
+    """Return labels with speed and amplitude for the prominent stable peaks of a branch."""
     x, y = branch.parameter, look.scale * branch.amplitude
     found, _ = find_peaks(y, prominence=_STANDS_OUT * top)
     labels = []
@@ -215,13 +219,13 @@ def _peaks(branch: Branch, look: _Scale, top: float) -> list[Label]:
 
 
 def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Label]:
-    """Return the texts of doublings and tori that a machine meets; those close together, as in a cascade, have one."""
-    # one that is on two branches, or is passed twice, is named once
+    """Return labels for period doublings and tori that a machine reaches; points close together, as in a cascade, share one."""
+    # a point on two branches, or passed twice, is named once
     met = {
         (special.kind, look.place(special.parameter)): special
         for branch in branches
         for special in branch.special
-        if special.kind is not Crossing.FOLD and _is_met(branch, special)
+        if special.kind is not Crossing.FOLD and _is_reachable(branch, special)
     }
     width = float(np.ptp(np.concatenate([branch.parameter for branch in branches])))
     groups: list[list[SpecialPoint]] = []
@@ -245,15 +249,15 @@ def _crossings(branches: Sequence[Branch], look: _Scale, top: float) -> list[Lab
     return labels
 
 
-def _is_met(branch: Branch, special: SpecialPoint) -> bool:
+def _is_reachable(branch: Branch, special: SpecialPoint) -> bool:
     """Return whether a motion beside a special point is stable, so that a machine reaches it."""
     return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
 
 
-def _along(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
-    """Return the curves of a quantity along a branch, one for each stability, coloured by the turns of the period."""
+def _stability_curves(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
+    """Return the curves of a quantity ``y`` (display units) along a branch, one per stability; the colour shows the period."""
     words = _words(branch)
-    order = branch.turns.bit_length() - 1
+    order = branch.periods.bit_length() - 1
     style: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "order": 2.0 + 0.1 * order}
     style["hover"] = {"branch": np.full(len(branch), number + 1), "stability": words}
     curves = []
@@ -269,8 +273,8 @@ def _along(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: 
     return curves
 
 
-def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
-    """Return the texts under the pointer for the points of a branch."""
+def _hover_values(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
+    """Return what a page shows under the pointer at the points of a branch: values by name."""
     table, torque = branch.columns(), "greatest crank torque [N.m]"
     return {
         "branch": np.full(len(branch), number + 1),
@@ -281,7 +285,7 @@ def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
 
 
 def _letters(x: FloatArray, y: FloatArray, text: str, *, shift: float = 0.0, **options: Any) -> Curve:
-    """Return letters at a few places of a curve, evenly along x; ``shift`` as a share of their distance."""
+    """Return letters at a few points of a curve, evenly along x; ``shift`` moves them by a share of their spacing."""
     finite = np.flatnonzero(np.isfinite(y))
     if len(finite):
         places = np.linspace(x[finite].min(), x[finite].max(), 2 * _LETTERS + 1)[1::2]
@@ -291,7 +295,7 @@ def _letters(x: FloatArray, y: FloatArray, text: str, *, shift: float = 0.0, **o
 
 
 def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump]) -> list[Curve]:
-    """Return the special points by kind."""
+    """Return the special points of all branches as markers, one curve per kind."""
     curves = []
     says = {jump.parameter: _jump(jump, look).replace("\n", " ") for jump in found}
     for kind, (marker, _) in _MARKERS.items():
@@ -320,8 +324,8 @@ def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump
 
 
 def _keys(branches: Sequence[Branch]) -> list[Curve]:
-    """Return the entries of the legend: turns of the period if there are several, and stability."""
-    turns = sorted({(branch.turns, branch.crank_turns) for branch in branches})
+    """Return the entries of the legend as curves without points: turns in a period, if they differ, and stability."""
+    turns = sorted({(branch.periods, branch.crank_turns) for branch in branches})
     words = {str(word) for branch in branches for word in _words(branch)}
     keys = []
     if len(turns) > 1:
@@ -346,9 +350,9 @@ def _keys(branches: Sequence[Branch]) -> list[Curve]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Approximated:
-    """An approximation over the parameter (m,), and its errors against the motion along each branch of one turn.
+    """Amplitude by an approximation over the parameter, both (m,), and its errors along each branch of one turn.
 
-    These have the parameter, the relative error (%) and the true amplitude as rows, (3, n), NaN where there is a gap.
+    Each item of ``errors`` has the rows parameter, relative error (%) and true amplitude, shape (3, n), with NaN at gaps.
     """
 
     name: str
@@ -359,15 +363,15 @@ class _Approximated:
 
     @property
     def look(self) -> dict[str, Any]:
-        """Return the look of the curve."""
+        """Return colour and line style of the curve."""
         return {"colour": COLOURS[(self.number + 1) % len(COLOURS)], "line": _LINES[self.number % len(_LINES)]}
 
 
 def _approximated(
     branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]
 ) -> list[_Approximated]:
-    """Return the approximations at stable motions and evenly over the range."""
-    chosen = [(branch, _chosen(branch)) for branch in branches if branch.turns == 1]
+    """Evaluate the approximations at stable motions of one turn, and evenly over the range of the parameter."""
+    chosen = [(branch, _comparison_points(branch)) for branch in branches if branch.periods == 1]
     every = np.concatenate([branch.parameter for branch, _ in chosen])
     spread = np.linspace(every.min(), every.max(), _BESIDE)
     places = np.unique(np.concatenate([spread, *(branch.parameter[i] for branch, i in chosen)]))
@@ -376,7 +380,7 @@ def _approximated(
         errors = []
         for branch, i in chosen:
             own, true = values[np.searchsorted(places, branch.parameter[i])], branch.amplitude[i]
-            # no line over where the motion is unstable
+            # no line across unstable motions
             gaps = np.flatnonzero(np.diff(np.cumsum(_unstable(branch))[i])) + 1
             error = 100.0 * np.abs(own / true - 1.0)
             errors.append(np.insert(np.array([branch.parameter[i], error, true]), gaps, np.nan, axis=1))
@@ -387,7 +391,7 @@ def _approximated(
 
 
 def _words(branch: Branch) -> NDArray[np.str_]:
-    """Return the stability of each point in words."""
+    """Return the stability of each point of a branch as a word."""
     margin = 1.0 - branch.largest_multiplier
     return np.select(
         [margin > TOLERANCE, margin < -TOLERANCE],
@@ -400,8 +404,8 @@ def _unstable(branch: Branch) -> NDArray[np.bool_]:
     return np.asarray(branch.largest_multiplier > 1.0 + TOLERANCE)
 
 
-def _chosen(branch: Branch) -> NDArray[np.int64]:
-    """Return the numbers of points of a branch that are not unstable, evenly along the drawn curve."""
+def _comparison_points(branch: Branch) -> NDArray[np.int64]:
+    """Return the indices of points of a branch, evenly along the drawn curve, whose motion is not unstable."""
     steps = [np.diff(v, prepend=v[0]) / (float(np.ptp(v)) or 1.0) for v in (branch.parameter, branch.amplitude)]
     way = np.cumsum(np.hypot(*steps))
     chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], _COMPARED)))
@@ -409,7 +413,7 @@ def _chosen(branch: Branch) -> NDArray[np.int64]:
 
 
 def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: _Scale, top: float) -> list[Curve]:
-    """Return the approximations that a figure of usual size shows apart from the true motion."""
+    """Return the curves of the approximations that can be told apart from the true motion in a figure of usual size."""
     if not others:
         return []
     x = look.factor * others[0].parameter
@@ -417,7 +421,7 @@ def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: 
     true = [
         points * np.column_stack([look.factor * b.parameter, look.scale * b.amplitude])
         for b in branches
-        if b.turns == 1
+        if b.periods == 1
     ]
     curves = []
     for other in others:
@@ -430,8 +434,8 @@ def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: 
 
 
 def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> Panel:
-    """Return the panel of the first harmonics of one-turn motions, each marked with its number."""
-    single = [(n, branch) for n, branch in enumerate(branches) if branch.turns == 1] or list(enumerate(branches))
+    """Return the panel of the first harmonics of one-turn motions, with their numbers along the curves."""
+    single = [(n, branch) for n, branch in enumerate(branches) if branch.periods == 1] or list(enumerate(branches))
     names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
     tops = [float(np.nanmax(branch.columns()[name], initial=0.0)) for _, branch in single for name in names]
     top = look.scale * max(tops, default=0.0)
@@ -443,12 +447,12 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
         label = f"harmonic {order + 1}"
         for n, branch in single:
             y = look.scale * branch.columns()[name]
-            # what is smaller is rounding
+            # smaller harmonics are rounding
             y = np.where(y > _SMALL * top, y, np.nan)
             least = min(least, float(np.nanmin(y, initial=np.inf)))
-            curves += _along(branch, n, look, y, **options)
+            curves += _stability_curves(branch, n, look, y, **options)
             x = look.factor * branch.parameter
-            # beside those of the other harmonics, whose curves may be near
+            # the letters of different harmonics are shifted, as their curves may be near each other
             shift = (order + 1.0) / (len(names) + 1.0) - 0.5
             stable = np.where(_unstable(branch), np.nan, y)
             if np.isfinite(stable).any():
@@ -457,7 +461,7 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     y_range = (0.5 * least, 2.0 * top) if top > 0.0 else None
     if y_range:
         width = look.factor * float(np.ptp(np.concatenate([branch.parameter for _, branch in single])))
-        curves += _apart(letters, width, y_range[1] / y_range[0])
+        curves += _without_overlaps(letters, width, y_range[1] / y_range[0])
     of = f",\n{format_turns(single[0][1].crank_turns)} " if len(single) < len(branches) else "\n"
     return Panel(
         x_label=look.axis,
@@ -470,8 +474,11 @@ def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]
     )
 
 
-def _apart(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
-    """Return letters without those that stand on others, in a panel of this width and this ratio of its logarithmic axis."""
+def _without_overlaps(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
+    """Return letters without those that overlap others.
+
+    ``width`` is the range of the panel's x axis, ``ratio`` that of its logarithmic y axis.
+    """
     points = 72.0 * 0.85 * np.array([_SIZE[0], 0.75 * _HARMONICS * _SIZE[1]]) / (width or 1.0, np.log(ratio))
     taken: list[FloatArray] = []
     kept = []
@@ -484,7 +491,7 @@ def _apart(letters: Sequence[Curve], width: float, ratio: float) -> list[Curve]:
 
 
 def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shade]) -> Panel:
-    """Return the panel of the approximations' errors relative to the stable one-turn motions, in per cent."""
+    """Return the panel of the errors of approximations relative to the stable one-turn motions (%)."""
     curves = [
         Curve(
             x=look.factor * parameter,
@@ -509,7 +516,7 @@ def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shad
 
 
 def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> list[Panel]:
-    """Return the panels of crank torque and joint forces along the branches, as far as the mechanism has them."""
+    """Return the panels of crank torque and joint forces along the branches, if the mechanism has them."""
     names = list(branches[0].columns())
     torque, forces = "greatest crank torque [N.m]", [name for name in names if name.startswith(FORCE)]
     rows: dict[str, Callable[[Branch], FloatArray]] = {}
@@ -522,7 +529,9 @@ def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) ->
         Panel(
             x_label=look.axis,
             y_label=label,
-            curves=[curve for n, branch in enumerate(branches) for curve in _along(branch, n, look, of(branch))],
+            curves=[
+                curve for n, branch in enumerate(branches) for curve in _stability_curves(branch, n, look, of(branch))
+            ],
             logarithmic="y",
             shades=shades,
         )
@@ -545,7 +554,7 @@ def plot_branch(branch: Branch, *, title: str = "") -> Picture:
 def plot_response(
     response: Response, *, title: str = "", rpm: bool = True, beside: Approximations | None = None
 ) -> Picture:
-    """Plot all branches of a response with speeds to avoid shaded and classical approximations; see `plot_branches`."""
+    """Plot all branches of a response with shaded ranges to avoid and classical approximations; see `plot_branches`."""
     return describe_branches(
         response.branches,
         title=title,

@@ -268,11 +268,11 @@ def _resample(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]
     lead = trigonometric(turn.time - wanted, way)
     columns = np.hstack([turn.states[:, : 2 * count], turn.inputs])
     columns[:, crank] = 0.0
-    # of another crank, what is periodic: its angle less whole turns
+    # of another crank, or a link that goes round, what is periodic: its angle less whole turns
     ratios = {
         k: mechanism.freedoms[k].period * round(ways[k][-1] * n / (n - 1) / mechanism.freedoms[k].period) / way
-        for k in mechanism.cyclic
-        if k != crank
+        for k, freedom in enumerate(mechanism.freedoms)
+        if freedom.period and k != crank
     }
     for k, ratio in ratios.items():
         columns[:, k] -= ratio * angle
@@ -363,7 +363,11 @@ def settled_motion(
     names = [f.coordinate for f in mechanism.freedoms] + [f.rate for f in mechanism.freedoms]
     before, after = np.split(full_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
     scale = np.array(mechanism.error_scale(parameters, tuple(after[0].tolist())))[:n]
-    gap = np.abs(after[:, :n] - before[:, :n]).max(axis=0) / scale
+    gap = after[:, :n] - before[:, :n]
+    for k in its.free:
+        if way := mechanism.freedoms[k].period:
+            gap[:, k] -= way * np.round(gap[:, k] / way)
+    gap = np.abs(gap).max(axis=0) / scale
     worst = max(its.free, key=lambda k: gap[k])
     if gap[worst] > 1e-7:
         raise LinearModelError(

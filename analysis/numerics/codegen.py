@@ -19,6 +19,7 @@ import errno
 import hashlib
 import shutil
 import sys
+import sysconfig
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -472,8 +473,9 @@ class Kernel:
 
     @property
     def carried(self) -> Path:
-        """Path of the code for any processor; there is none but for the Python and the operating system that made it."""
-        kind = f"{sys.implementation.cache_tag}-{binding.get_process_triple()}"
+        """Path of the code for any processor; such code is of one build of Python, one LLVM and one operating system."""
+        build = sysconfig.get_config_var("SOABI") or sysconfig.get_config_var("EXT_SUFFIX")
+        kind = f"{build}-llvm{binding.llvm_version_info[0]}-{binding.get_process_triple()}"
         return CARRIED / f"{self.__name__}-{self._fingerprint()}-{kind}"
 
     def __call__(self, *arguments: Any) -> Any:

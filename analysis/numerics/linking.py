@@ -5,14 +5,16 @@ caller. Where Python calls only the kernel, nobody uses the code of the inner fu
 has no public option for this: the classes below override private ones, hence the upper bound of its version. Nor does it
 notice that a bit of machine code on disk has changed: here every file ends with a hash of its bytes.
 
-An installation may carry kernels *for any processor* of its kind: what Numba, whose type inference takes most of the time,
-makes of them before LLVM optimises it. The code that follows from it on a processor is the same as if it were compiled there.
+An installation may carry kernels *for any processor* with lanes of the same width: what Numba, whose type inference takes
+most of the time, makes of them before LLVM optimises it. The machine code that follows from it on a processor is the same as
+if it were compiled there.
 """
 
 from __future__ import annotations
 
 import ctypes
 import io
+import os
 import pickle
 import warnings
 import zlib
@@ -31,6 +33,8 @@ from numba.core.serialize import dumps
 
 _HASH = hash(Flags())
 _DIGEST = sha256().digest_size
+#: Place of the type annotation in what Numba keeps of a kernel, after its code.
+_ANNOTATION = 5
 _ALIVE: list[Any] = []
 
 
@@ -97,6 +101,7 @@ def for_any_processor(dispatcher: Any) -> bytes:
     """Return the code for any processor of a kernel that `NotingCompiler` has compiled."""
     (result,) = dispatcher.overloads.values()
     (name, *_), *rest = result._reduce()
+    rest[_ANNOTATION] = ""  # a text with the paths of the sources
     return _with_hash(zlib.compress(dumps((name, result.library.noted, *rest))))
 
 
@@ -119,12 +124,17 @@ class _Files(IndexDataCacheFile):
 
     def load(self, key: Any) -> Any:
         found = super().load(key)
-        if found is None and self.source.is_file():
-            content = self.source.read_bytes()
-            if not _is_whole(content):
-                warnings.warn(f"{self.source} is damaged: the kernel is compiled", RuntimeWarning, stacklevel=2)
+        if found is None and os.path.exists(self.source):
+            try:
+                content = self.source.read_bytes()
+                if not _is_whole(content):
+                    raise ValueError("its bytes do not have their hash")
+                found = _for_this_processor(content)
+            except Exception as error:  # of the file, of pickle, zlib or LLVM
+                warnings.warn(
+                    f"{self.source} is not used ({error!r}): the kernel is compiled", RuntimeWarning, stacklevel=2
+                )
                 return None
-            found = _for_this_processor(content)
             self.save(key, found)
         return found
 

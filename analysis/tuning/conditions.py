@@ -109,7 +109,7 @@ def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
 
 def sampled(orbit: PeriodicOrbit) -> Turn:
     """Return the outputs over the period, each turn with the same number of samples."""
-    return orbit.turn(_SAMPLES * orbit.turns)
+    return orbit.turn(_SAMPLES * orbit.periods)
 
 
 def expansion(wish: Wish, spot: Spot) -> Expansion:

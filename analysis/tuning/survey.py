@@ -301,7 +301,7 @@ def _parts(
     special = [s for s in branch.special if s.kind is kind]
     ends = [-1, *(s.after for s in special), len(branch) - 1]
     points: list[SpecialPoint | None] = [None, *special, None]
-    if kind is Crossing.FOLD and branch.turns > 1:
+    if kind is Crossing.FOLD and branch.periods > 1:
         # it begins, and may end, where a motion of half the period has the multiplier -1
         points[0], points[-1] = (_doubling(wish, branch.orbits[i], response) for i in (0, -1))
     parts = [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
@@ -318,7 +318,8 @@ def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPo
     for branch in response.branches:
         for point in branch.special if 2 * branch.turns == orbit.turns else ():
             there = point.orbit
-            away = np.abs((there.start - orbit.start) / scale_of(there.parameters, there.drive, there.start)).max()
+            scale = scale_of(there.parameters, there.drive, there.start)
+            away = np.abs(there.flow.within(there.start - orbit.start) / scale).max()
             near = abs(wish.level(there) - wish.level(orbit)) < NEXT * (response.high - response.low)
             if point.kind is Crossing.PERIOD_DOUBLING and near and away < NEXT:
                 return point
@@ -462,7 +463,8 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
     several: list[float] = []
     for level in np.linspace(*wish.span, SOUGHT).tolist():
         parameters, drive = wish.operation(found.x, level)
-        start, stable = _nearest_start(wish, found.response, level), 0
+        near, stable = _nearest(wish, found.response, level), 0
+        start = None if wish.over in speed_names(wish.mechanism) else near.start
         for turns in range(1, wish.turns + 1):
             there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
             # a motion from which deviations grow more than that is none that a machine comes near
@@ -473,12 +475,10 @@ def other_motions(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float
     return tuple(new), tuple(several)
 
 
-def _nearest_start(wish: Wish, response: Response, level: float) -> FloatArray | None:
-    """Return the start of the one-turn motion nearest to a level; None at a prescribed speed, which needs no guess."""
-    if wish.over in speed_names(wish.mechanism):
-        return None
-    known = [orbit for branch in response.branches if branch.turns == 1 for orbit in branch.orbits]
-    return min(known, key=lambda orbit: abs(wish.level(orbit) - level)).start
+def _nearest(wish: Wish, response: Response, level: float) -> PeriodicOrbit:
+    """Return the motion of one common period that is nearest to a level."""
+    known = [orbit for branch in response.branches if branch.periods == 1 for orbit in branch.orbits]
+    return min(known, key=lambda orbit: abs(wish.level(orbit) - level))
 
 
 def charted(found: Survey) -> tuple[float, float, int]:
@@ -487,11 +487,12 @@ def charted(found: Survey) -> tuple[float, float, int]:
     levels = np.linspace(*wish.span, _CHARTED)
     rows: list[Any] = []
     drives: list[Drive] = []
+    near = _nearest(wish, found.response, wish.span[0])
     for level in levels.tolist():
         parameters, drive = wish.operation(found.x, level)
         rows.append(parameters)
-        drives.append(drive)
-    guess = _nearest_start(wish, found.response, wish.span[0])
+        drives.append(replace(drive, ratios=near.drive.ratios))
+    guess = None if wish.over in speed_names(wish.mechanism) and not near.rounds else near.start
     values = np.nan_to_num(largest_multipliers(rows, drives, guess)[0], nan=np.inf)
     i = int(values.argmax())
     return float(values[i]), float(levels[i]), len(levels)

@@ -6,10 +6,13 @@ import errno
 import io
 import math
 import os
+import pickle
 import stat
 import subprocess
 import sys
 import tempfile
+import zlib
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -310,12 +313,18 @@ def test_code_for_any_processor_is_used_without_compiling(
     assert "compiling an example" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5, 0.9999])
-def test_damaged_code_for_any_processor_is_not_used(
-    carried: Path, share: float, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("harm", [0.0, 0.5, 0.9999, "another LLVM"])
+def test_code_for_any_processor_that_cannot_be_read_is_not_used(
+    carried: Path, harm: float | str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    carried.write_bytes(flipped(carried.read_bytes(), share))
-    with pytest.warns(RuntimeWarning, match=f"{carried} is damaged"):
+    content = carried.read_bytes()
+    if isinstance(harm, float):
+        carried.write_bytes(flipped(content, harm))
+    else:
+        name, code, *rest = pickle.loads(zlib.decompress(content[:-32]))
+        content = zlib.compress(pickle.dumps((name, code[: len(code) // 2], *rest)))
+        carried.write_bytes(content + sha256(content).digest())
+    with pytest.warns(RuntimeWarning, match=f"{carried} is not used"):
         assert _made()(0.7) == 3.0 * 1.7 + math.sin(0.7)
     assert "compiling an example" in capsys.readouterr().err
 
@@ -329,18 +338,22 @@ def test_an_installation_carries_every_kernel() -> None:
 
 @pytest.mark.slow
 def test_code_for_any_processor_gives_the_same_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def run() -> str:
-        return str(float(simulate("table-3.1", stop_time=0.5)["slider.position"][-1]).hex())
-
-    here = run()
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(codegen, "CARRIED", tmp_path / "carried")
     kernels = (compiled.run, compiled.rows, sources.channels)
+
+    def run(cache: str) -> tuple[str, int]:
+        """Return a number of a run on an empty cache, and how many of its kernels were not compiled."""
+        monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / cache))
+        for one in kernels:
+            monkeypatch.setattr(one, "_compiled", None)
+        position = simulate("table-3.1", stop_time=0.5)["slider.position"][-1]
+        return float(position).hex(), sum(bool(one.compiled.stats.cache_hits) for one in kernels)
+
+    monkeypatch.setattr(codegen, "CARRIED", tmp_path / "carried")
+    here, found = run("compiled here")
+    assert found == 0
     for one in kernels:
         one.carry()
-        monkeypatch.setattr(one, "_compiled", None)
-    assert run() == here
-    assert all(one.compiled.stats.cache_hits for one in kernels)
+    assert run("carried") == (here, 3)
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])

@@ -127,7 +127,8 @@ def coexistence(
 
     The motions of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones
     divided out. A motion that exists only in a short part of a row may be missed; `find_orbits` searches one point closely.
-    The rows are distributed over workers and kept as in `grid`.
+    Of a link that nothing drives these are the motions in which it swings, or goes round as often as the drive says:
+    `find_orbits` finds both. The rows are distributed over workers and kept as in `grid`.
 
     Parameters
     ----------

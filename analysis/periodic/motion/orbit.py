@@ -93,8 +93,8 @@ class Turn:
         crank's speed if nothing else is free.
     rounding : float
         Amplitude of ``swing`` that is no more than rounding.
-    paces : dict of str to float
-        Of each coordinate that goes round its mean increase for each radian of the crank angle.
+    angles : frozenset of str
+        Outputs that are angles.
 
     Notes
     -----
@@ -112,7 +112,7 @@ class Turn:
     names: tuple[str, ...]
     swing: str
     rounding: float
-    paces: dict[str, float]
+    angles: frozenset[str]
 
     def __getitem__(self, name: str) -> FloatArray:
         if name not in self.names:
@@ -140,8 +140,13 @@ class Turn:
         return size if size > self.rounding else 0.0
 
     def around(self, name: str) -> FloatArray:
-        """Return an output about its mean increase, which a coordinate that goes round has."""
-        return self[name] - self.paces.get(name, 0.0) * self.angle
+        """Return an output about its mean increase, which an angle has that goes round; shape (n,)."""
+        values = self[name]
+        if name not in self.angles:
+            return values
+        followed = np.unwrap(np.append(values, values[0]))
+        increase = followed[-1] - followed[0]
+        return followed[:-1] - increase * np.arange(len(values)) / len(values) if increase else values
 
     def harmonic(self, name: str, order: float) -> float:
         """Return the amplitude of a harmonic of an output; its order counts per turn of the crank: 1/2 has two turns.
@@ -259,6 +264,11 @@ class PeriodicOrbit(Shown):
         return scale
 
     @property
+    def periods(self) -> int:
+        """Common periods of the cranks and gears in a period of the motion; links that go round may need several."""
+        return self.turns * self.flow.commons
+
+    @property
     def crank_turns(self) -> int:
         """Turns of the crank in a period of the motion: of each common period several with gears or other cranks."""
         return self.turns * self.flow.turns
@@ -329,7 +339,7 @@ class PeriodicOrbit(Shown):
             names=tuple(mechanism.output_names[n] for n in keep),
             swing=flow.components[0][0],
             rounding=_ROUNDING * float(self.scale[0]),
-            paces=flow.paces(self.point.vector),
+            angles=frozenset(v.name for v in mechanism.variables if v.unit == "rad"),
         )
 
     @property
@@ -366,7 +376,7 @@ class PeriodicOrbit(Shown):
         angles = np.array([0.0, flow.period / flow.commons])
         # y counts from an even turning that is a part of a turn on there
         ahead = angles[1] * np.array([paces.get(name, 0.0) for name, _ in flow.components])
-        for _ in range(self.turns * flow.commons - 1):
+        for _ in range(self.periods - 1):
             passed.append(self.point.shoot(angles, passed[-1][None, :]).y[0] + ahead)
         return np.array(passed)
 
@@ -451,7 +461,7 @@ def settle_motion(
 
 def _solve_as_it_goes(point: OperatingPoint, turns: int, start: FloatArray) -> PeriodicOrbit:
     """Find a motion by Newton's method, in which links go round as they do after the start; or else as the drive says."""
-    rounds = rounds_from(point, start, turns)
+    rounds = _rounds_from(point, start, turns)
     if rounds:
         drive, own = point.drive.with_rounds(point.mechanism, rounds, turns)
         with suppress(OrbitError):
@@ -459,7 +469,7 @@ def _solve_as_it_goes(point: OperatingPoint, turns: int, start: FloatArray) -> P
     return solve_orbit(point, turns, start)
 
 
-def rounds_from(point: OperatingPoint, start: FloatArray, turns: int = 1) -> dict[str, int]:
+def _rounds_from(point: OperatingPoint, start: FloatArray, turns: int) -> dict[str, int]:
     """Return how often links that nothing drives go round in the period after a start, unless the drive says it.
 
     Returns
@@ -510,7 +520,7 @@ def approach_even(point: OperatingPoint, turns: int, place: FloatArray) -> Float
     place : ndarray, shape (n,)
         y of the even turning, which stays the same.
     """
-    k, n = EVEN_PIECES * turns, point.flow.size
+    k, n = EVEN_PIECES * turns * point.flow.commons, point.flow.size
     angles, starts, scale = (
         np.linspace(0.0, point.flow.period * turns, k + 1),
         np.tile(place, (k, 1)),

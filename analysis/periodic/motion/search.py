@@ -12,7 +12,9 @@ machine does, including jumps between motions.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +38,6 @@ from .orbit import (
     first_guess,
     orbit_of,
     require_turns,
-    rounds_from,
     settle_motion,
     solve_orbit,
 )
@@ -221,9 +222,9 @@ def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
 
     From an unstable motion, as of a pendulum that hangs still, a small disturbance leads on.
     """
-    scale, start = point.scale(state), state
+    scale, disturbed = point.scale(state), state
     for _ in range(2):
-        status, start = settle_motion(point, start, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
+        status, start = settle_motion(point, disturbed, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
         if status is not Status.DONE:
             raise orbit_error(status, point.flow, start)
         away = None
@@ -241,7 +242,7 @@ def _settled(point: OperatingPoint, state: FloatArray) -> PeriodicOrbit:
                 away = vectors[:, np.abs(values).argmax()].real / scale
         if away is None or not away.any():
             break
-        start = start + _DISTURBANCE * scale * away / np.abs(away).max()
+        disturbed = start + _DISTURBANCE * scale * away / np.abs(away).max()
     most, after = (n * point.flow.turns for n in (PERIODS[-1], JUMP_TURNS))
     reason = f"no steady motion with a period of up to {most} turns after {after} turns"
     residual = float(np.abs(point.flow.within(point.period(start, 1).shift) / scale).max())
@@ -254,6 +255,8 @@ MANY, DEFLATED, ROUNDS = 64, 16, 2
 _NEAR = 1e-4
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
+#: Distance of a motion from the one on which a machine has settled, relative to the scale, beyond which it is another.
+_ARRIVED = 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -386,7 +389,8 @@ def find_orbit(
             raise failure
         # it repeats itself after fewer turns, and so after these
         return replace(first, others=0)
-    return replace(_met(found, drive, first, start), others=len(found) - 1)
+    met = _met(found, drive, turns, first, start)
+    return replace(met, others=sum(orbit is not met for orbit in found.orbits))
 
 
 @takes_published(inputs=driven, initial=started)
@@ -458,7 +462,7 @@ def orbits_of(
         return joined([orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))])
     mechanism, known = mechanism_of(parameters), list(known)
     flow = drive.flow(mechanism)
-    drives = [(drive, turns)]
+    drives = [(drive, turns), *((orbit.drive, orbit.turns) for orbit in known)]
     drives += [
         drive.with_rounds(mechanism, {name: sign * times}, turns)
         for name in _swinging(flow)
@@ -466,12 +470,13 @@ def orbits_of(
         for times in range(1, turns * flow.turns + 1)
         for sign in (1, -1)
     ]
-    return joined(
-        [
-            _orbits_of(operating_point(parameters, own), of, start, [o for o in known if o.drive.ratios == own.ratios])
-            for own, of in drives
-        ]
-    )
+    parts: dict[Any, Orbits] = {}
+    for own, of in drives:
+        kind = tuple(sorted(own.ratios.items()))
+        if kind not in parts:
+            alike = [orbit for orbit in known if orbit.drive.ratios == own.ratios]
+            parts[kind] = _orbits_of(operating_point(parameters, own), of, start, alike)
+    return joined(list(parts.values()))
 
 
 def _orbits_of(
@@ -582,29 +587,36 @@ class _Found:
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 
-def _met(found: Orbits, drive: Drive, first: PeriodicOrbit | None, start: ArrayLike | None) -> PeriodicOrbit:
-    """Return the motion that a machine reaches; if none of its kind is stable, ``first``; without that, the smallest."""
-    stable, rounds = found.stable, {}
-    if len(stable) == 1 and (first is None or stable[0].rounds == first.rounds):
-        return stable[0]
+def _met(
+    found: Orbits, drive: Drive, turns: int, first: PeriodicOrbit | None, start: ArrayLike | None
+) -> PeriodicOrbit:
+    """Return the motion that a machine reaches; if none is stable, ``first``; without that, the smallest.
+
+    A machine may settle on a motion of several turns where those of one turn are sought. If a link may go round, and what is
+    stable is of another kind, ``first`` is returned, too.
+    """
+    stable = found.stable
     if not stable:
         return first if first is not None else found.orbits[0]
+    if len(stable) == 1 and (first is None or stable[0].rounds == first.rounds):
+        return stable[0]
     point = operating_point(stable[0].parameters, drive)
     guess = first_guess(point.flow, drive, start)
     arrived, pace = None, None if drive.speed is None and start is not None else _pace(drive)
-    if pace is not None and pace > 0.0 and found.orbits[0].turns == 1:
-        speeds = np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS)
-        last = sweep(point.parameters, speeds, drive=drive).orbits[-1]
-        if last is not None and last.turns == 1:
-            arrived, rounds = last.start, last.rounds
+    if pace is not None and pace > 0.0 and turns == 1:
+        last = sweep(point.parameters, np.geomspace(_FIRST_SPEED * pace, pace, _SPEEDS), drive=drive).orbits[-1]
+        if last is not None and last.periods == 1:
+            arrived = last
     if arrived is None:
-        status, settled = settle_motion(point, guess, tolerance=1e-8, change=1e-6, turns=2000)
-        if status is Status.DONE:
-            arrived, rounds = settled, rounds_from(point, settled)
+        with suppress(OrbitError):
+            arrived = _settled(point, guess)
     if arrived is None:
         return stable[0]
-    stable = tuple(orbit for orbit in stable if orbit.rounds == rounds)
-    if not stable:
-        return first if first is not None else found.orbits[0]
     scale = point.scale(guess)
-    return min(stable, key=lambda orbit: float(np.abs(point.flow.within(orbit.start - arrived) / scale).max()))
+    apart = [
+        float(np.abs(point.flow.within(orbit.passages() - arrived.start) / scale).max(axis=1).min()) for orbit in stable
+    ]
+    nearest = int(np.argmin(apart))
+    if first is not None and turns == 1 and point.flow.ways.any() and apart[nearest] > _ARRIVED:
+        return first
+    return stable[nearest]

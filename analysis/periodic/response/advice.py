@@ -156,7 +156,7 @@ def _branch_arcs(branch: Branch) -> list[Arc]:
         order = 1 if parameter[last] > parameter[first] else -1
         found.append(
             Arc(
-                turns=branch.turns,
+                turns=branch.periods,
                 stable=bool(stable[first]),
                 parameter=parameter[way][::order],
                 amplitude=amplitude[way][::order],
@@ -174,7 +174,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
     # a motion of twice the period begins at a doubling, where its branch turns back on itself: no motion ends there
     born = [s.parameter for branch in branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
     for branch, special in ((b, s) for b in branches for s in b.special if s.kind is Crossing.FOLD):
-        if branch.turns > 1 and any(abs(special.parameter / value - 1.0) < _ROUNDING for value in born):
+        if branch.periods > 1 and any(abs(special.parameter / value - 1.0) < _ROUNDING for value in born):
             continue
         value, amplitude = special.parameter, special.orbit.amplitude
         for arc, (end, direction) in product(stable, ((-1, 1), (0, -1))):

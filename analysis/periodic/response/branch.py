@@ -79,6 +79,11 @@ class Branch(Shown):
         return len(self.orbits)
 
     @property
+    def periods(self) -> int:
+        """Common periods of the cranks and gears in a period: see `PeriodicOrbit.periods`."""
+        return self.orbits[0].periods
+
+    @property
     def crank_turns(self) -> int:
         """Turns of the crank in a period: see `PeriodicOrbit.crank_turns`."""
         return self.orbits[0].crank_turns
@@ -310,7 +315,7 @@ def _growth(orbit: PeriodicOrbit) -> float:
 def _divided(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
     """Return a follower of the same curve by multiple shooting, and its first point, from the last point so far."""
     orbit: PeriodicOrbit = last.data
-    places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.turns).states, orbit.point.vector)
+    places = orbit.flow.unknowns(orbit.turn(PLACES * orbit.periods).states, orbit.point.vector)
     angles, starts = choose_pieces(orbit.point, places, orbit.turns)
     divided = _follower(family, orbit, settings, angles)
     n = len(orbit.start)

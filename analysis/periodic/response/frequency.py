@@ -214,7 +214,7 @@ class Response(Shown):
         return self._extrema(-1)
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
-        found = [e for branch in self.branches if branch.turns == 1 for e in extrema(branch, sign)]
+        found = [e for branch in self.branches if branch.periods == 1 for e in extrema(branch, sign)]
         found.sort(key=lambda e: (e.parameter, e.amplitude))
         # a curve that was followed from both ends and reached neither has its extrema on both branches
         reach = 1e-5 * (self.high - self.low)
@@ -392,7 +392,7 @@ class _Search:
             return any(
                 turns == 2 * orbit.turns
                 and abs(value - special.parameter) < reach
-                and np.abs((y - orbit.start) / scale).max() < 0.1
+                and np.abs(orbit.flow.within(y - orbit.start) / scale).max() < 0.1
                 for turns, value, y in ends
             )
 
@@ -429,7 +429,7 @@ class _Search:
         start = None
         if not drive.speed_drive:
             # under a torque only a known motion gives a guess of the speed
-            simple = [b for b in self.branches if b.turns == 1]
+            simple = [b for b in self.branches if b.periods == 1]
             points = [point for b in simple for point in zip(np.abs(b.parameter - value), b.orbits)]
             start = min(points, key=lambda point: float(point[0]))[1].start
         limit = GREATEST if turns == 1 else GREATEST_OF_SEVERAL
@@ -466,7 +466,7 @@ class _Search:
 def ending(branch: Branch) -> str:
     """Return a sentence on a branch that was not followed to its end."""
     first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
-    period = "" if branch.turns == 1 else f"with a period of {branch.crank_turns} turns "
+    period = "" if branch.periods == 1 else f"with a period of {branch.crank_turns} turns "
     return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 

@@ -99,7 +99,7 @@ class Variations:
     def _divide(self, along: FloatArray) -> None:
         """Choose panels on which motion, derivatives and forcing are resolved."""
         flow = self.flow
-        edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.turns + 1)
+        edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.periods + 1)
         if self.orbit.stations is not None:
             edges = np.union1d(edges, self.orbit.stations.angles)
         relative = self.scale[:, None] / self.scale
