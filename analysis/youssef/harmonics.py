@@ -2,8 +2,8 @@
 
 The thesis puts zeta = a0 + a1 cos + b1 sin + a2 cos 2 + b2 sin 2 into the linear equation and balances each harmonic, eqs
 (4.30)-(4.35). `harmonic_balance` does this with any number of harmonics. `nonlinear_harmonic_balance` balances the
-plant's equations: it samples the motion over a turn, evaluates the force at the samples, and returns to harmonics, with
-exact derivatives. A balance finds stable and unstable motions alike and does not tell them apart.
+plant's equations: it samples the motion over a turn, evaluates the unbalanced force and its exact derivatives at the samples,
+and transforms them to harmonics. A balance finds stable and unstable motions alike and does not tell them apart.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .linearisation import NO_LOAD, Balance, Load, SliderEquation, Variant, bala
 ORDERS = (8, 16, 32, 64, 128, 256)
 #: Samples of a turn per harmonic of the nonlinear balance.
 SAMPLES_PER_HARMONIC = 8
-#: Newton steps, and halvings of one, at most.
+#: Greatest numbers of Newton steps and of halvings of a step.
 MOST_ITERATIONS, MOST_HALVINGS = 40, 12
 
 
@@ -110,7 +110,7 @@ def two_harmonics(equation: SliderEquation) -> HarmonicMotion:
 
 
 def harmonic_balance(equation: SliderEquation, order: int) -> HarmonicMotion:
-    """Return the periodic solution of a linear slider equation with harmonics up to an order.
+    """Return the periodic solution of a linear slider equation with the harmonics 0 to ``order``.
 
     Raises
     ------
@@ -146,8 +146,8 @@ def amplitudes_over(
 ) -> NDArray[np.float64]:
     """Return the amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), an array of their shape.
 
-    Except for its damping, a linear slider equation consists of constants and multiples of the inverse square of the speed.
-    Two speeds therefore determine it at all others.
+    Apart from the damping, each coefficient of a linear slider equation is a constant plus a multiple of 1/speed^2. The
+    equations at two speeds therefore determine the equation at every speed.
 
     Raises InputError as `slider_equation` does, and HarmonicBalanceError if the equations are singular at one of the speeds.
     """
@@ -176,7 +176,7 @@ def amplitudes_over(
 
 
 def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Convert coefficients of exp(i n theta), shape (..., 2 n + 1), to cosines and sines, (..., n + 1)."""
+    """Convert coefficients of exp(i k theta), shape (..., 2 n + 1), to those of cosines and of sines, each (..., n + 1)."""
     half = z[..., z.shape[-1] // 2 :]
     cos = 2.0 * np.real(half)
     cos[..., 0] *= 0.5
@@ -207,7 +207,7 @@ def _require_order(order: int) -> None:
 
 
 def _operator(equation: SliderEquation, order: int) -> NDArray[np.complex128]:
-    """Return the matrix of a zeta'' + b zeta' + c zeta on exp(i n theta), n = -order ... order."""
+    """Return the matrix of the operator a zeta'' + b zeta' + c zeta in the basis exp(i n theta), n = -order ... order."""
     return operator(equation.homogeneous().stiffened(equation.spring), np.arange(-order, order + 1.0))
 
 
@@ -266,7 +266,7 @@ def resonance(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Approximations:
-    """Amplitudes over the speed by approximations from the linear equation about u = 0.
+    """Amplitudes against crank speed, approximated by the linear equation about u = 0.
 
     Attributes
     ----------
@@ -275,9 +275,9 @@ class Approximations:
     load : Load
         Constant forces.
     speed : ndarray, shape (m,)
-        rad/s.
+        Crank speeds (rad/s).
     amplitudes : mapping
-        Half the range of u (m), shape (m,), by the name of the approximation.
+        Half the range of u (m) at each speed, shape (m,), by the name of the approximation.
     """
 
     parameters: FiveBarParameters
@@ -286,16 +286,18 @@ class Approximations:
     amplitudes: Mapping[str, NDArray[np.float64]]
 
     def at(self, speed: ArrayLike) -> dict[str, NDArray[np.float64]]:
-        """Return the amplitudes (m) computed at given speeds (rad/s), arrays of their shape."""
+        """Compute the amplitudes (m) at given speeds (rad/s), an array of their shape by the name of each approximation."""
         return _approximate(self.parameters, speed, self.load)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
-        """Return the columns of a table by name with unit."""
+        """Return speed and amplitudes as the columns of a table, by name with unit."""
         return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
 
 
 def approximations(response: Response, points: int = 160) -> Approximations:
-    """Approximate a response over its range of speeds by two and by ten harmonics of the corrected equation (4.21).
+    """Approximate the amplitudes of a response by the corrected equation (4.21), with two and with ten harmonics.
+
+    They are computed at ``points`` evenly spaced speeds over the response's range.
 
     Raises
     ------
@@ -330,7 +332,10 @@ def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) ->
 
 
 class _Basis(NamedTuple):
-    """Values and derivatives of 1, cos k x, sin k x at the samples, shape (samples, 2 order + 1), and their projection."""
+    """Functions 1, cos k x, sin k x at the samples ``angle`` x (rad): values and two derivatives, (samples, 2 order + 1).
+
+    ``projection``, shape (2 order + 1, samples), converts samples of a function to its coefficients.
+    """
 
     angle: NDArray[np.float64]
     value: NDArray[np.float64]
@@ -381,7 +386,7 @@ def nonlinear_harmonic_balance(
     start : FourierSeries, optional
         Initial slider position (m); by default the solution of the linear equation, reduced until the links can follow it.
     tolerance : float
-        Greatest last Newton step, relative to the rocker's length.
+        The iteration ends when a Newton step is at most this times the rocker's length.
     load : Load
 
     Raises
@@ -415,7 +420,7 @@ def nonlinear_harmonic_balance(
 
 
 def _linear_start(parameters: FiveBarParameters, speed: float, order: int, load: Load) -> FourierSeries:
-    """Return the slider position (m) by the linear equation, halved until the links can follow it."""
+    """Solve the linear equation for the slider position (m); halve it until the links can be joined over the whole turn."""
     equation = slider_equation(replace(parameters, slider_coulomb_friction=0.0), speed, load=load)
     start = parameters.rocker_length * harmonic_balance(equation, order).series
     angle = np.linspace(0.0, 2.0 * pi, 256, endpoint=False)
@@ -430,13 +435,13 @@ def _linear_start(parameters: FiveBarParameters, speed: float, order: int, load:
 def _newton(
     parameters: FiveBarParameters, speed: float, order: int, start: FourierSeries, tolerance: float, load: Load
 ) -> SliderMotion:
-    """Solve the nonlinear balance of one order."""
+    """Solve the nonlinear balance with harmonics up to ``order`` by Newton's method from ``start`` (m)."""
     p = parameters.constants()
     basis = _basis(order)
     scale = p.l4 * (p.m45 * speed**2 + p.k)
 
     def at(x: NDArray[np.float64]) -> tuple[Balance, NDArray[np.float64]]:
-        """Evaluate the plant at the samples, and the harmonics of the unbalanced force."""
+        """Return the plant's balance at the samples and the harmonics of its force, for coefficients ``x`` of the position."""
         u, v, a = basis.value @ x, speed * (basis.rate @ x), speed**2 * (basis.curvature @ x)
         plant = balance(basis.angle, u, v, a, speed, p, load)
         return plant, basis.projection @ plant.force

@@ -4,8 +4,8 @@ Three methods determine their stability and share only the coefficients: integra
 Hill's infinite determinant truncated at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
 perturbation for small harmonics (`perturbed_boundary`, `perturbed_region`).
 
-A region of parametric instability is numbered by N: it starts, as the harmonics vanish, from the stiffness at which the
-natural frequency is N/2 of the coefficients', and on its boundaries one Floquet multiplier is (-1)^N.
+A region of parametric instability has a number N. If the harmonics of the coefficients vanish, it shrinks to the stiffness at
+which the natural frequency is N/2 times the frequency of the coefficients. On its boundaries one Floquet multiplier is (-1)^N.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from ..periodic import liouville, require_sign
 
 #: Gauss points of a step: the method is of order 12.
 STAGES = 6
-#: Greatest product of step (rad) and rate of the equation at which the error of a turn is still at rounding.
+#: Greatest product of step (rad) and rate of the equation (1/rad) for which the error over a turn is only rounding.
 STEP_BY_RATE = 0.5
-#: Fewest samples of the coefficients over a turn that estimate the rate of the equation.
+#: Least number of samples a turn from which the rate of the equation is estimated.
 JUDGED = 64
-#: Harmonics of Hill's determinant beyond twice the order of the coefficients, by default.
+#: The default order of Hill's determinant is twice the order of the coefficients plus this number.
 MORE_HARMONICS = 16
-#: Imaginary part, relative to its size, up to which a boundary counts as real. Two boundaries that nearly coincide are only
-#: computed to the square root of the rounding errors.
+#: A boundary counts as real if its imaginary part is at most this times its magnitude, or times 1 if that is larger. Two
+#: boundaries that nearly coincide are accurate only to the square root of the rounding error.
 REAL = 1e-8
 
 
@@ -45,9 +45,9 @@ class PeriodicEquation:
     Attributes
     ----------
     a, b, c : FourierSeries
-        ``a`` must not pass zero.
+        ``a`` must keep one sign and not be zero.
     factor : FourierSeries
-        s, the factor of the stiffness lambda that `stiffened` adds: 1, but periodic in the thesis's equation.
+        s, by which `stiffened` multiplies the stiffness lambda: 1, except in the thesis's equation, where it is periodic.
     """
 
     a: FourierSeries
@@ -70,7 +70,7 @@ class PeriodicEquation:
         return max(series.order for series in (self.a, self.b, self.c, self.factor))
 
     def stiffened(self, stiffness: float) -> PeriodicEquation:
-        """Return the equation with a stiffness added: c + lambda s replaces c."""
+        """Return the equation with c + lambda s in place of c, where lambda is ``stiffness``."""
         return replace(self, c=self.c + stiffness * self.factor)
 
 
@@ -83,13 +83,13 @@ class SingularEquationError(InputError):
 
 @lru_cache(maxsize=32)
 def _waves(points: tuple[float, ...], order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return cos(k x) and sin(k x) for k up to an order, shape (order + 1, points)."""
+    """Return cos(k x) and sin(k x) at points x for k = 0 to ``order``, two arrays of shape (order + 1, number of points)."""
     phase = np.multiply.outer(np.arange(order + 1), np.array(points))
     return np.cos(phase), np.sin(phase)
 
 
 def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
-    """Stack the cosines and sines of many series, zero-padded to one order, shape (2, n, order + 1)."""
+    """Return the cosine and sine coefficients of n series, padded with zeros to one order, shape (2, n, order + 1)."""
     table = np.zeros((2, len(series), order + 1))
     for i, one in enumerate(series):
         table[0, i, : one.order + 1], table[1, i, : one.order + 1] = one.cos, one.sin
@@ -97,20 +97,20 @@ def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
 
 
 def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the table of the derivatives of the series of a table."""
+    """Differentiate the series whose coefficients a table holds (see `_table`); return the table of the derivatives."""
     k = np.arange(table.shape[2])
     return np.array([k * table[1], -k * table[0]])
 
 
 def _sampled(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
-    """Evaluate the series of a table at the same points, shape (n, points)."""
+    """Return the values of the n series of a table at the same points, shape (n, number of points)."""
     cos, sin = _waves(points, table.shape[2] - 1)
     values: NDArray[np.float64] = table[0] @ cos + table[1] @ sin
     return values
 
 
 def _tables(equations: Sequence[PeriodicEquation]) -> list[NDArray[np.float64]]:
-    """Return the tables of a, a', b and c."""
+    """Return the coefficient tables of a, a', b and c, each for all equations (see `_table`)."""
     order = max(e.order for e in equations)
     a, b, c = (_table([getattr(e, name) for e in equations], order) for name in "abc")
     return [a, _slope(a), b, c]
@@ -121,7 +121,7 @@ def _even(count: int) -> tuple[float, ...]:
 
 
 def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
-    """Return the number of steps a turn that keeps the error at rounding."""
+    """Return the number of steps a turn that reduces the integration error to rounding."""
     k = np.arange(tables[0].shape[2])
     points = _even(max(JUDGED, 4 * len(k)))
     a, slope, b, c = (_sampled(table, points) for table in tables)
@@ -141,7 +141,8 @@ def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
 def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = None) -> NDArray[np.float64]:
     """Return the monodromy matrices of many equations, which map (y, y') at x = 0 to (y, y') at x = 2 pi.
 
-    Gauss-Legendre collocation of order 12 on (y, a y') preserves the determinant 1 of a self-adjoint equation, b = a'.
+    The integration by Gauss-Legendre collocation of order 12 on (y, a y') keeps the determinant at 1 if the equation is
+    self-adjoint (b = a').
 
     Parameters
     ----------
@@ -211,20 +212,23 @@ def determinant(equation: PeriodicEquation) -> float:
 
 
 def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
-    """Return the matrix of multiplication by a series in terms of exp(i k x): entry (n, k) is its coefficient n - k."""
+    """Return the matrix that multiplies a function by a series, both by their coefficients of exp(i k x).
+
+    Entry (n, k) is coefficient n - k of the series; the shape is (size, size).
+    """
     coefficients = series.to_order(size).exponential[size:]
     return np.asarray(scipy.linalg.toeplitz(coefficients[:size], coefficients[:size].conj()))
 
 
 def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
-    """Return the harmonics of a motion of period 2 pi (multiplier +1) or 4 pi (-1), symmetric about zero."""
+    """Return the harmonic numbers k, symmetric about 0: whole for the multiplier +1 (period 2 pi), halves for -1 (4 pi)."""
     count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
     k: NDArray[np.float64] = first + np.arange(count, dtype=float)
     return k
 
 
 def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
-    """Return the order given, or the default of the equation increased by ``more``."""
+    """Return ``order`` if it is given, otherwise the default highest harmonic for the equation plus ``more``."""
     if order is None:
         return 2 * equation.order + MORE_HARMONICS + more
     if order < 1:
@@ -233,7 +237,7 @@ def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
 
 
 def operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Return the matrix of a D^2 + b D + c on exp(i k x), for evenly spaced k; shape (len(k), len(k))."""
+    """Return the matrix of the operator a D^2 + b D + c in the basis exp(i k x), k in steps of 1; shape (len(k), len(k))."""
     a, b, c = (_toeplitz(series, len(k)) for series in (equation.a, equation.b, equation.c))
     matrix: NDArray[np.complex128] = -a * k**2 + 1j * b * k + c
     return matrix
@@ -269,8 +273,9 @@ def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int 
 def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) -> NDArray[np.complex128]:
     """Return both Floquet multipliers from Hill's quadratic eigenvalue problem, the larger modulus first.
 
-    y = exp(s x) sum over k of y_k exp(i k x) gives (s^2 A + s B + C) y_k = 0. The infinite problem has with s all eigenvalues
-    s + i n, of the same multiplier exp(2 pi s); truncation falsifies the eigenvectors that reach its ends.
+    y = exp(s x) sum over k of y_k exp(i k x) gives (s^2 A + s B + C) y_k = 0. If s is an eigenvalue of the infinite problem, so
+    is s + i n for every whole n, with the same multiplier exp(2 pi s). Truncation spoils the eigenvectors that reach the
+    highest harmonics; the multipliers are taken from eigenvectors centred on low ones.
 
     Parameters
     ----------
@@ -309,7 +314,7 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
 def boundary_stiffnesses(
     equation: PeriodicEquation, multiplier: int, *, count: int, order: int | None = None
 ) -> NDArray[np.complex128]:
-    """Return the stiffnesses at which the equation has the multiplier +1 or -1, as eigenvalues; eq (5.35).
+    """Return the stiffnesses lambda at which one Floquet multiplier is +1 or -1, as eigenvalues; eq (5.35).
 
     Parameters
     ----------
@@ -318,7 +323,7 @@ def boundary_stiffnesses(
     multiplier : int
         +1 or -1.
     count : int
-        Number of boundaries, from the least real part on.
+        Number of stiffnesses returned, those of least real part.
     order : int, optional
         Highest harmonic.
 
@@ -370,7 +375,7 @@ class Region:
 
 
 def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = None) -> Mapping[int, Region]:
-    """Return the regions of instability, among the first ``count``, that damping has not removed, by number.
+    """Return the regions of instability from 1 to ``count`` that damping has not removed, by their number N.
 
     Parameters
     ----------
@@ -400,8 +405,8 @@ def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[n
     """Return the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed the region.
 
     On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count. To
-    second order the others add the sum over q of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), with the
-    lambda of constant coefficients.
+    second order the other harmonics q subtract the sum of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq),
+    in which lambda is that of the equation with the mean values as constant coefficients.
     """
     if order not in (1, 2):
         raise InputError(f"region {number} to order {order}: the order is 1 or 2")
@@ -428,7 +433,7 @@ def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[n
 
 
 def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
-    """Return the zeroth boundary for small harmonics, eq (5.13) to second order; below it the motion diverges.
+    """Return the stiffness of boundary 0 for small harmonics, eq (5.13) to second order; below it the motion diverges.
 
     Raises
     ------
@@ -439,15 +444,15 @@ def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
 
 
 def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2) -> Region | None:
-    """Return the boundaries of the region N in the stiffness lambda for small harmonics.
+    """Return the region N, for small harmonics of the coefficients, by perturbation.
 
     For (M y')' + lambda_c y' + (lambda + K) y = 0 to first order::
 
         lambda = k0 N^2/4 - K0 -+ sqrt(|N^2/4 M_N + K_N|^2 - (N lambda_c/2)^2),
 
-    k0 and K0 the means of M and K, M_N and K_N the complex coefficients of exp(i N x): eq (5.16) for N = 1, undamped. To second
-    order it is eq (5.26) for N = 2, undamped. The thesis's derivation is by Lindstedt's method; ours, by degenerate
-    perturbation of Hill's matrix, gives the same series.
+    where k0 and K0 are the means of M and K, and M_N and K_N their complex coefficients of exp(i N x). Without damping this is
+    eq (5.16) for N = 1; to second order it is eq (5.26) for N = 2. The thesis derives them by Lindstedt's method; the
+    degenerate perturbation of Hill's matrix used here gives the same series.
 
     Parameters
     ----------
@@ -477,9 +482,9 @@ def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2)
 
 
 def perturbed_removing_damping(equation: PeriodicEquation, number: int, *, order: int = 2) -> float:
-    """Return the lambda_c that removes the region N of an undamped equation: twice the half width over N.
+    """Return the damping lambda_c that removes the region N of an undamped equation: the region's width divided by N.
 
-    Its factor in the equation is assumed to have the mean of s, the factor of the stiffness.
+    The factor of lambda_c in the equation is assumed to have the same mean as s, the factor of the stiffness.
     """
     region = perturbed_region(equation, number, order=order)
     return region.width / number if region else 0.0

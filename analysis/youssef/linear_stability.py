@@ -21,7 +21,7 @@ from .premises import require_five_bar
 
 
 def constant_load(drive: Drive) -> Load:
-    """Return the constant forces of a five-bar's drive."""
+    """Return the constant forces (N) of a five-bar's drive."""
     x, y, slider = (drive.forces.get(name, 0.0) for name in ("load.fx", "load.fy", "slider.force"))
     return Load(x=x, y=y, slider=slider)
 
@@ -51,7 +51,10 @@ def linear_verdict(
 
 
 def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
-    """Return a function for the monodromy matrix of the linear equation over a plane of parameters; it caches points."""
+    """Return a function that computes, and caches, the linear equation's monodromy matrix at a point of a plane of parameters.
+
+    ``operation`` returns parameters and drive at a point (x, y) of the plane.
+    """
 
     @cache
     def matrix(x: float, y: float) -> NDArray[np.float64]:
@@ -61,7 +64,10 @@ def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> M
 
 
 def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """Return the stability test of a multiplier of the linear equation over a plane; see `analysis.periodic.plane_test`."""
+    """Return a function over a plane of parameters that is zero where the linear equation has the given multiplier, +1 or -1.
+
+    See `linear_monodromy` and `analysis.periodic.plane_test`.
+    """
     return plane_test(linear_monodromy(operation, variant=variant), multiplier)
 
 
@@ -69,9 +75,10 @@ def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant
 def linear_motion(
     parameters: FiveBarParameters, drive: Drive, names: tuple[str, str]
 ) -> Mapping[str, Callable[[Plane], Monodromy]]:
-    """Return the linear equation as a second motion for a `stability_chart` over parameters of these names.
+    """Return the linear equation as a second motion for a `stability_chart`, whose axes are the parameters ``names``.
 
-    The mapping is empty where no linear equation exists: for a drive by torque and with friction that is not viscous.
+    The mapping has `linear_monodromy` by the motion's name. It is empty if there is no linear equation: if the drive is by
+    torque, or if friction that is not viscous acts or is one of the axes.
     """
     rough = set(FIVE_BAR.names("friction"))
     friction = parameters != without_friction(parameters) or not rough.isdisjoint(names)

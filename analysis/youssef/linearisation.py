@@ -39,7 +39,7 @@ from .printed_coefficients import Form
 
 #: Largest amplitude of a neglected harmonic of the exact coefficients, relative to the largest harmonic.
 NEGLIGIBLE = 1e-13
-#: Numbers of samples a turn for the exact coefficients: doubled until the harmonics have died away.
+#: Least and greatest number of samples a turn for the exact coefficients: doubled until the highest harmonics are negligible.
 FEWEST_SAMPLES, MOST_SAMPLES = 64, 8192
 
 
@@ -49,15 +49,15 @@ class Variant(StrEnum):
     Attributes
     ----------
     EXACT
-        All harmonics.
+        Exact derivatives of the plant's functions, with all harmonics.
     FIRST_ORDER, SECOND_ORDER
         Taylor polynomials in the crank's length (sigma2 = l2/l4), harmonics up to 1 and up to 2.
     PRINTED
         Coefficients of (4.21) as the thesis prints them; see `analysis.youssef.printed_coefficients`.
     FORTRAN
-        Coefficients of the listings in appendices 2 and 4, which halve the crank's terms in the inertia and have another K.
+        Coefficients of the listings in appendices 2 and 4, which halve the crank's terms in the inertia and have a different K.
     APPENDIX_3
-        Coefficients of appendix 3: the same with a sine where a cosine belongs.
+        Coefficients of appendix 3: those of ``FORTRAN`` with a sine where a cosine belongs.
     """
 
     EXACT = "exact"
@@ -70,7 +70,7 @@ class Variant(StrEnum):
 
 #: Highest power of the crank's length in a variant's Taylor polynomial.
 _POWERS: Mapping[Variant, int] = MappingProxyType({Variant.FIRST_ORDER: 1, Variant.SECOND_ORDER: 2})
-#: Coefficients of the thesis.
+#: Functions that compute the thesis's own coefficients, by variant.
 _THESIS: Mapping[Variant, Callable[[printed_coefficients.Ratios], printed_coefficients.Coefficients]] = (
     MappingProxyType(
         {
@@ -114,11 +114,11 @@ class Balance(NamedTuple):
 
 
 @cache
-def _traced() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
-    """Compile ``balance`` and ``taylor``, the slider's equation and its derivatives for arrays of angles and motions.
+def _compiled() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
+    """Compile the functions ``balance`` and ``taylor`` of arrays of angles and motions; return them by name.
 
-    ``taylor`` gives M m45, K m45 and F m45 l4 in SI at u = u' = 0, then their first and their halved second derivatives with
-    respect to the crank's length.
+    ``balance`` gives the fields of `Balance`. ``taylor`` gives M m45, K m45 omega^2 and F m45 l4 omega^2 in SI at u = u' = 0,
+    followed by their first and halved second derivatives with respect to the crank's length.
     """
     casadi = symbolic.library()
     f = traced(FIVE_BAR)
@@ -165,14 +165,14 @@ def balance(
     Raises
     ------
     AssemblyError
-        If the links cannot be joined at one of them, or coupler and rocker are collinear.
+        If at one of the angles and positions the links cannot be joined, or coupler and rocker are collinear.
     InputError
         If there is friction by contact forces.
     """
     require_no_contact_friction(p, "the balance of harmonics")
     arrays = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (angle, position, velocity, acceleration)))
     _require_assembly(arrays[0], arrays[1], p)
-    values = _traced()["balance"](*arrays, speed, p, load)
+    values = _compiled()["balance"](*arrays, speed, p, load)
     return Balance(*(np.broadcast_to(value, arrays[0].shape) for value in values))
 
 
@@ -212,7 +212,7 @@ class SliderEquation:
     spring, damping : float
         lambda_k^2 and lambda_c.
     spring_factor, damping_factor : FourierSeries
-        Their factors: 1, but periodic in the thesis's equation.
+        Factors of lambda_k^2 and of lambda_c: 1, except in the thesis's equation, where they are periodic.
     mass_rate : bool
         Whether M' zeta' is kept; the thesis's equation leaves it out.
     variant : Variant
@@ -239,7 +239,7 @@ class SliderEquation:
             raise InputError(f"lambda_k^2 = {self.spring} and lambda_c = {self.damping} must be finite")
 
     def homogeneous(self) -> PeriodicEquation:
-        """Return the equation without F and without lambda_k^2, which is the stiffness axis of its unstable regions."""
+        """Return the equation without F and lambda_k^2; lambda_k^2 is the stiffness on whose axis `hill_regions` lie."""
         rate = self.mass.derivative() if self.mass_rate else FourierSeries.constant(0.0)
         b = rate + self.damping * self.damping_factor
         return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)
@@ -330,7 +330,10 @@ def _without_spring(p: Constants, load: Load) -> tuple[Constants, Load]:
 def _exact(
     p: Constants, speed: float, load: Load, order: int | None
 ) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """Return m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) from samples, doubled until the harmonics die away."""
+    """Return m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) as series over the crank angle, from exact samples.
+
+    The number of samples is doubled until the highest harmonics are negligible.
+    """
     bare, loaded = _without_spring(p, load)
     samples = FEWEST_SAMPLES if order is None else max(FEWEST_SAMPLES, 4 * order)
     while True:
@@ -367,7 +370,7 @@ def _taylor(p: Constants, speed: float, load: Load, order: int) -> tuple[Fourier
     bare = bare._replace(l2=0.0)
     angle = np.linspace(0.0, 2.0 * pi, 8, endpoint=False)
     _require_assembly(angle, np.zeros(8), bare)
-    terms = np.array([np.broadcast_to(term, 8) for term in _traced()["taylor"](angle, speed, bare, loaded)])
+    terms = np.array([np.broadcast_to(term, 8) for term in _compiled()["taylor"](angle, speed, bare, loaded)])
     values = np.tensordot(p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
     mass, stiffness, force = (FourierSeries.from_samples(value, order) for value in values)
     return mass, stiffness, force

@@ -10,7 +10,7 @@ from ..mechanisms import FIVE_BAR, Parameters
 
 
 def require_five_bar(parameters: Parameters, what: str) -> None:
-    """Raise InputError, naming the analysis ``what``, if the parameters are not those of a five-bar."""
+    """Raise InputError if the parameters are not those of a five-bar; ``what`` names the analysis in the message."""
     if not isinstance(parameters, FIVE_BAR.parameters):
         raise InputError(
             f"{what} is defined for five-bars only: the parameters are {type(parameters).__name__}, not FiveBarParameters"
@@ -18,6 +18,6 @@ def require_five_bar(parameters: Parameters, what: str) -> None:
 
 
 def require_no_contact_friction(p: Any, what: str) -> None:
-    """Raise InputError, naming the analysis ``what``, if a five-bar's constants have friction by contact forces."""
+    """Raise InputError if a five-bar's constants have contact friction; ``what`` names the analysis in the message."""
     if FIVE_BAR.switched(p):
         raise InputError(f"slider.friction_coefficient and pin.*_friction_radius must be 0: {what} cannot hold them")

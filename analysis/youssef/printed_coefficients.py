@@ -5,7 +5,7 @@
 I, S, K and F have a mean and a first harmonic, since the thesis linearises about one position of the mechanism, the datum. Its
 results all hold for a coupler without mass and a rocker whose centre of mass is on the slider. The printed equation
 lacks M' zeta'. The programs lack it too, halve the crank's terms in the inertia and in the factors of spring and damper, and
-have another K.
+have a different K.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Form(StrEnum):
         As in appendix 2, which divides the harmonics of S by its mean k0 once too often; the damper's mean is 1 as in
         (4.34).
     STABILITY
-        As in appendix 4: the same, but the damper's mean is k0.
+        As in appendix 4: as in appendix 2, but the damper's mean is k0.
     """
 
     QUOTIENT = "(4.21)"
@@ -69,7 +69,7 @@ class Coefficients(NamedTuple):
 
 
 class Ratios(NamedTuple):
-    """Dimensionless parameters of the coefficients: l2/l4, l3/l4, p45 = m4/(m4 + m5), I4."""
+    """Dimensionless parameters of the coefficients: l2/l4, l3/l4, p45 = m4/(m4 + m5), I4 = rocker inertia/(m4 l4^2)."""
 
     sigma2: float
     sigma3: float
@@ -97,7 +97,10 @@ def ratios(parameters: FiveBarParameters) -> Ratios:
 
 
 def printed(ratios: Ratios, datum: Datum = DATUM) -> Coefficients:
-    """Return the coefficients listed after (4.21), the sign of P1, illegible, from H1, and the force from the listings."""
+    """Return the coefficients that the thesis lists after (4.21).
+
+    The sign of P1, which is illegible, is taken from H1, and the force from the program listings.
+    """
     s2, s3, p45, i4 = ratios
     alpha, a3, a4 = datum
     # all divided by their common factor sigma3^2
@@ -113,7 +116,10 @@ def printed(ratios: Ratios, datum: Datum = DATUM) -> Coefficients:
 
 
 def listed(ratios: Ratios, datum: Datum = DATUM, function: Callable[[float], float] = cos) -> Coefficients:
-    """Return the coefficients at label 17 of appendices 2 and 4; ``function=sin`` repeats the slip of appendix 3."""
+    """Return the coefficients computed at label 17 of the listings in appendices 2 and 4.
+
+    ``function=sin`` repeats the slip of appendix 3, a sine for the cosine of alpha - alpha4.
+    """
     s2, s3, p45, i4 = ratios
     alpha, a3, a4 = datum
     cf04 = function(alpha - a4)
@@ -147,18 +153,18 @@ def _series(mean: float, cosine: float, sine: float) -> FourierSeries:
 
 
 def _force(ratios: Ratios, datum: Datum) -> FourierSeries:
-    """Return the force with harmonics -U and -V of the listings (L8449-8450), which stand for R1 and S1 here.
+    """Return the force with the harmonics -U and -V of the listings (L8449-8450), used in place of R1 and S1.
 
-    The scan's lines of R1 and S1 (L2786-2794) are not whole: what can be read are terms in r4 and mr3, which vanish here, and
-    none in I4. At sigma3 = 1, U and V are the term in I4 of the line of Q1 (L2781) times cos and sin of alpha3. The listings
-    have no mean of the force, nor has the right equation to first order.
+    In the scan the lines of R1 and S1 (L2786-2794) are incomplete: the legible terms are in r4 and mr3, which vanish here, and
+    none is in I4. At sigma3 = 1, U and V are the I4 term in the line of Q1 (L2781) times cos and sin of alpha3. The force has
+    no mean in the listings, nor to first order in the correct equation.
     """
     size = ratios.p45 * ratios.inertia_ratio * ratios.sigma2 * cos(datum.coupler)
     return _series(0.0, -size * cos(datum.coupler), -size * sin(datum.coupler))
 
 
 def _divided(part: FourierSeries, inertia: FourierSeries) -> FourierSeries:
-    """Divide by the inertia to second order as (4.23) to (4.28) do, without the second-order part of the mean."""
+    """Divide a coefficient by the inertia as (4.23) to (4.28) do: to second order, but the mean to first order only."""
     mean = part.mean / inertia.mean
     # first harmonics as cos - i sin: the product of two has half their product as its second harmonic
     first, by = ((one.cos[1] - 1j * one.sin[1]) / inertia.mean for one in (part, inertia))

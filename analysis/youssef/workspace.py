@@ -40,13 +40,13 @@ from .premises import require_five_bar
 COARSEST, FINEST = 128, 4096
 #: Halvings of a cell's edge that locate the boundary on it.
 BISECTIONS = 40
-#: Greatest share of sampled configurations outside the boundaries of a fine enough grid.
+#: A grid is fine enough if at most this share of the sampled configurations lies outside the boundaries.
 MISSED = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
-    """Arc of a coupler curve along which the linkage can be assembled: crank angle (rad) and P (m), shapes (n,)."""
+    """Arc of a coupler curve on which the linkage can be assembled: crank angles (rad), coordinates of P (m), shapes (n,)."""
 
     crank_angle: NDArray[np.float64]
     x: NDArray[np.float64]
@@ -84,9 +84,10 @@ class AccessibleArea:
     area : float
         Area without the holes (m2).
     error : float
-        Change of the area at the last refinement (m2), about three times its error.
+        Change of the area at the last refinement (m2), about three times the area's error.
     missed : float
-        Share of configurations sampled over (th2, u) whose P lies outside by more than a cell: zero on a fine enough grid.
+        Share of the configurations sampled over (th2, u) whose point P lies more than a cell outside the boundaries: zero on
+        a fine enough grid.
     cells : int
         Cells across the area in the last grid.
     converged : bool
@@ -122,7 +123,7 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int
     slider_position : float
         m.
     n : int
-        Intervals of each arc. In an open arc they shorten towards the ends, where P varies as the square root.
+        Intervals of each arc. In an open arc they shorten towards the ends, where P varies as the square root of the angle.
 
     Raises
     ------
@@ -167,7 +168,7 @@ def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
     phi = atan2(dy, dx)
 
     def angle(distance: float) -> float:
-        """Return |th2 - phi| at which BD has that length, 0 if BD is always longer, pi if it is always shorter."""
+        """Return |th2 - phi| at which BD has the length ``distance``, 0 if BD is always longer, pi if it is always shorter."""
         if e == 0.0:
             return 0.0 if p.l2 > distance else pi
         return acos(min(1.0, max(-1.0, (e * e + p.l2 * p.l2 - distance * distance) / (2.0 * e * p.l2))))
@@ -187,7 +188,10 @@ def assembly_ranges(u: float, p: Constants) -> list[tuple[float, float]]:
 
 
 def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[float, float]:
-    """Return P at a crank angle, moved towards the middle of its range if rounding puts it beyond a limit of assembly."""
+    """Return P (m) at the crank angle ``th2``, for slider position u.
+
+    If rounding puts the angle beyond a limit of assembly, it is moved slightly towards ``middle``, the middle of its range.
+    """
     share = 1e-16
     angle = th2
     while True:
@@ -315,7 +319,10 @@ def _sampled(parameters: FiveBarParameters, low: float, high: float) -> NDArray[
 
 
 class _Grid(NamedTuple):
-    """Square grid over the plane: the points that P can reach, and the test for any other points."""
+    """Square grid over the plane: coordinates of its points (m), whether P can reach each, and the test for other points.
+
+    ``inside`` has the shape (len(ys), len(xs)); ``reaches(x, y)`` tests points of any coordinates.
+    """
 
     xs: NDArray[np.float64]
     ys: NDArray[np.float64]
@@ -326,7 +333,7 @@ class _Grid(NamedTuple):
 def _trace(
     parameters: FiveBarParameters, slider_range: tuple[float, float], sample: NDArray[np.float64], cells: int
 ) -> tuple[list[NDArray[np.float64]], float]:
-    """Return the boundaries on a grid with that many cells across, and the share of the sample outside of them."""
+    """Return the boundaries (m) from a grid with ``cells`` cells across, and the share of the sample that lies outside them."""
     least, most = sample.min(axis=0), sample.max(axis=0)
     size = float((most - least).max()) / cells
     margin = 0.02
@@ -346,7 +353,7 @@ def _trace(
 
 
 def _rings(grid: _Grid) -> list[NDArray[np.float64]]:
-    """Return the closed boundaries, their vertices located on the edges of the grid by bisection."""
+    """Return the closed boundaries (m), the largest first; their vertices are located on the grid's edges by bisection."""
     xs, ys, inside, reaches = grid
     heights = inside.astype(float)
     # if two diagonal corners of a cell are inside, its centre decides whether they connect: the contour uses their mean
@@ -370,7 +377,10 @@ def _rings(grid: _Grid) -> list[NDArray[np.float64]]:
 
 
 def _crossings(grid: _Grid, between: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the points of the boundary between neighbours of the grid; ``between`` has fractional indices, (k, 2)."""
+    """Locate the boundary between neighbouring points of the grid by bisection; return its points (m), shape (k, 2).
+
+    ``between`` (k, 2) has grid indices, one of each pair fractional: a place on the edge between the two neighbours.
+    """
     xs, ys, inside, reaches = grid
     (i, j), (far_i, far_j) = np.floor(between).astype(int).T, np.ceil(between).astype(int).T
     first = np.column_stack([xs[i], ys[j]])
@@ -385,6 +395,6 @@ def _crossings(grid: _Grid, between: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _signed_area(ring: NDArray[np.float64]) -> float:
-    """Return the area within a closed ring (m2), negative if the ring runs clockwise."""
+    """Return the area that a closed boundary encloses (m2), negative if its points (n, 2) run clockwise."""
     x, y = (ring - ring[0]).T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
