@@ -1,8 +1,8 @@
 """Linkwork's plants: the mechanisms' equations and their integrator, in plain Python.
 
 Only the standard library is used here, because this package travels inside the FMUs. Where the package `analysis` is installed
-beside it, its public names can be asked for here too: ``linkwork.simulate`` is ``analysis.simulate``, imported when it is first
-used. The plants' own modules come first: ``linkwork.slider_crank`` is the plant.
+beside it, its public names are available here too: ``linkwork.simulate`` is ``analysis.simulate``, imported when it is first
+used. If both packages have a module of the same name, this package's is returned: ``linkwork.slider_crank`` is the plant.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def __getattr__(name: str) -> Any:
     AttributeError
         If there is no such name or, as inside an FMU, no such package.
     ImportError
-        If another module of that name is imported in its place.
+        If another module named ``analysis`` is imported instead of Linkwork's.
     """
     from importlib import import_module, util
     from pathlib import Path

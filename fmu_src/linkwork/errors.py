@@ -7,7 +7,7 @@ class LinkworkError(Exception):
     """Base of every error that Linkwork raises on purpose."""
 
 
-#: Names that a message lists at most, where there are many: to choose from, and missing.
+#: Greatest number of names that a message lists: of valid names if there are many, and of missing parameters.
 _LISTED, _MISSING = 5, 12
 
 
@@ -15,7 +15,7 @@ def _shown(value: object) -> str:
     """Return the text of a value for an error message, cut to a bounded length."""
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # a whole number of thousands of digits; lists inside each other without end
+    except (ValueError, RecursionError):  # an integer with thousands of digits; endlessly nested lists
         return f"a {type(value).__name__} that is too long to be shown"
     return text if len(text) <= 500 else f"{text[:500]}..."
 
@@ -45,9 +45,9 @@ class InputError(LinkworkError, ValueError):
 
 
 class UnknownNameError(ParameterError, InputError):
-    """An unknown name; ``known`` are the valid names, ``near`` the one that was probably meant.
+    """An unknown name; ``known`` are the valid names, ``near`` the valid name that was probably meant, or None.
 
-    The message lists the valid names, or the nearest five if there are more than ten; ``words`` replace the name in it.
+    The message lists the valid names, or the nearest five if there are more than ten; ``words``, if given, replace the name.
     """
 
     def __init__(self, name: str, known: tuple[str, ...], words: str = "") -> None:
@@ -64,11 +64,11 @@ class UnknownNameError(ParameterError, InputError):
 
 
 class MissingParameterError(ParameterError):
-    """A parameter that is needed was not given."""
+    """A required parameter was not given; ``others`` are the other missing ones."""
 
     def __init__(self, name: str, others: tuple[str, ...] = ()) -> None:
         super().__init__(name, None, "be given")
-        # all of them have to be given: more are listed than of names to choose from
+        # all missing parameters have to be given, so that more are listed than valid names
         rest = len(others) - _MISSING
         also = f", and so {'is' if len(others) == 1 else 'are'} {', '.join(others[:_MISSING])}" if others else ""
         also += f" and {rest} more" if rest > 0 else ""
@@ -84,7 +84,7 @@ class JammingError(AssemblyError):
 
 
 class StepError(LinkworkError):
-    """A communication step was asked for that cannot be taken (time, order, state)."""
+    """A communication step cannot be taken, because of its length, its start time or the state of the run."""
 
 
 class IntegrationError(LinkworkError):
@@ -96,4 +96,4 @@ class StateError(LinkworkError):
 
 
 class Interrupted(LinkworkError):
-    """Work was interrupted from the keyboard; what had been done is kept."""
+    """Work was interrupted from the keyboard; the results so far are kept."""

@@ -6,11 +6,11 @@ from math import fabs, sqrt, tanh
 
 #: Slider speed (m/s) at which the regularised Coulomb friction F tanh(u'/v0) has reached 76 % of its level.
 FRICTION_SPEED = 1e-3
-#: The same of a pin: relative rate of its links (rad/s).
+#: The same for a pin: relative angular velocity of its links (rad/s).
 FRICTION_RATE = 0.1
-#: What rounds off the magnitude of a force F where it passes zero (N): it is taken as sqrt(F^2 + F0^2).
+#: Force F0 that rounds off the magnitude of a contact force F near zero (N): it is taken as sqrt(F^2 + F0^2).
 FRICTION_FORCE = 1e-2
-#: Norm of the response of the contacts' forces to friction up to which they are solved for: at 1 friction may jam the links.
+#: Greatest norm of the response of the contact forces to friction at which a motion is followed: at 1 friction may jam it.
 MOST_RESPONSE = 0.8
 #: Sweeps of Newton's method for the forces of contacts with friction, before the last.
 SWEEPS = 4
@@ -24,15 +24,15 @@ def lesser(a: float, b: float) -> float:
 
 
 def resistance(v: float, mu: float, fc: float) -> float:
-    """Return the force against a motion at speed v (N): damper mu v and Coulomb friction of level fc; odd in v."""
+    """Return the force that opposes a motion at speed v (N): damper mu v plus Coulomb friction of level fc; odd in v."""
     return mu * v + fc * tanh(v / FRICTION_SPEED)
 
 
 def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...]) -> tuple[float, ...]:
     """Solve for the magnitudes s of contact forces (N) with friction proportional to them: s_j = sqrt(|F_j|^2 + F0^2).
 
-    ``smooth`` are the forces without friction; ``response[k]`` is by how much all of them change with the magnitude of the
-    k-th, so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method from the forces without friction.
+    ``smooth`` are the forces without friction; ``response[k]`` has the change of each force per newton of the k-th magnitude,
+    so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method starts at the forces without friction.
     """
     least = FRICTION_FORCE * FRICTION_FORCE
     s = tuple(sqrt(x * x + y * y + least) for x, y in smooth)
@@ -42,19 +42,19 @@ def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...
 
 
 def jamming_margin(response: tuple[tuple[Vector, ...], ...]) -> float:
-    """Return how far friction is from where it may jam the links, negative beyond; ``response`` is that of `contact_forces`.
+    """Return the margin to jamming by friction, 1 - |response|/MOST_RESPONSE; it is negative beyond the limit.
 
-    It is taken from the norm of the response: below 1 the solution for the contact forces is unique.
+    ``response`` is that of `contact_forces`. If its norm is below 1, the solution for the contact forces is unique.
     """
-    # what is added, lost in any other sum, gives the root a derivative at rest
+    # the 1e-24, lost in any other sum, gives the root a finite derivative at rest
     return 1.0 - sqrt(1e-24 + sum(x * x + y * y for forces in response for x, y in forces)) / MOST_RESPONSE
 
 
 def settled(s: tuple[float, ...]) -> tuple[float, ...]:
-    """Return ``s`` unchanged, a solution to within rounding; derivatives are taken from here on.
+    """Return ``s``, the solution to within rounding, unchanged: it marks where differentiation may begin.
 
-    A sweep of Newton's method from there has the derivatives of the solution whatever those of ``s``, so that what
-    differentiates these equations need not differentiate the sweeps before.
+    One more sweep of Newton's method from ``s`` has the derivatives of the solution, whatever the derivatives of ``s`` are.
+    Code that differentiates these equations can therefore skip the earlier sweeps.
     """
     return s
 
@@ -62,12 +62,12 @@ def settled(s: tuple[float, ...]) -> tuple[float, ...]:
 def _swept(
     smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...]
 ) -> tuple[float, ...]:
-    """Take one step of Newton's method for the magnitudes."""
+    """Take one step of Newton's method for the magnitudes ``s``; see `contact_forces`."""
     n = range(len(smooth))
     least = FRICTION_FORCE * FRICTION_FORCE
     forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
     size = tuple(sqrt(x * x + y * y + least) for x, y in forces)
-    # of the tangent of sqrt(|F|^2 + F0^2): size_j s_j = F_j . (smooth_j + sum_k response[k]_j s_k) + F0^2
+    # from the tangent of sqrt(|F|^2 + F0^2): size_j s_j = F_j . (smooth_j + sum_k response[k]_j s_k) + F0^2
     matrix = tuple(
         tuple(
             (1.0 if j == k else 0.0) - (forces[j][0] * response[k][j][0] + forces[j][1] * response[k][j][1]) / size[j]

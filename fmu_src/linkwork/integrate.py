@@ -24,12 +24,12 @@ LEAST_FACTOR = 0.2
 GREATEST_FACTOR = 6.0
 #: Shortest step as a fraction of the whole interval, below which the integration gives up.
 LEAST_STEP = 1e-14
-#: What a right-hand side may raise where it is not defined; the step is then tried again shorter.
+#: Exceptions that a right-hand side may raise where it is not defined; a shorter step is then tried.
 UNDEFINED = (ArithmeticError, ValueError)
 
 
 class Result(NamedTuple):
-    """End of an integration: the state, the step size to go on with, and the work done."""
+    """Result of an integration: final state, step size with which to continue, numbers of steps tried and evaluations of f."""
 
     x: Vector
     step: float
@@ -38,7 +38,10 @@ class Result(NamedTuple):
 
 
 def rk_step(f: Callable[[Vector], Vector], x: Vector, k1: Vector, h: float, scale: Vector) -> tuple[Vector, float]:
-    """Take a step of size ``h`` from ``x`` with ``k1 = f(x)``; return the new state and its error relative to ``scale``."""
+    """Take a step of size ``h`` from ``x`` with ``k1 = f(x)``; return the new state and the norm of its relative error.
+
+    The error of each component is divided by ``scale + |x|``.
+    """
     (a1,) = _A[1]
     k2 = f(tuple([y + h * (a1 * p1) for y, p1 in zip(x, k1)]))
     a1, a2 = _A[2]
@@ -131,9 +134,9 @@ def integrate(
     accept: Callable[[Vector], None] | None = None,
     max_steps: int = 20_000,
 ) -> Result:
-    """Integrate x' = f(x) over ``duration``, ending exactly there.
+    """Integrate x' = f(x) over ``duration``; the last step ends exactly at its end.
 
-    The right-hand side is not evaluated at the end itself: whether it is defined there is for ``accept`` to say.
+    The right-hand side is not evaluated at the final state: ``accept`` must check whether it is defined there.
 
     Parameters
     ----------
@@ -148,11 +151,11 @@ def integrate(
     scale : tuple of float
         Magnitude of each component below which its error counts as absolute.
     step : float
-        First step to try, as `Result.step` of the interval before gave it; 0 chooses one.
+        First step to try, such as `Result.step` of the previous interval; 0 to have one chosen.
     accept : callable, optional
         Called with each accepted state, which is finite; may raise to stop the integration.
     max_steps : int
-        Accepted and refused steps allowed.
+        Greatest number of steps, accepted and refused.
 
     Raises
     ------
@@ -182,7 +185,7 @@ def integrate(
             error /= tolerance
             if error <= 1.0 and not all(map(isfinite, x_new)):
                 error = float("nan")
-            # the next step begins with the right-hand side at its start; after the last one nobody asks for it
+            # the next step needs the right-hand side at its start; after the last step it is not needed
             if error <= 1.0 and not last:
                 evaluations += 1
                 k_new = f(x_new)
@@ -209,6 +212,6 @@ def integrate(
 
 
 def _first_step(x: Vector, k1: Vector, scale: Vector, duration: float, tolerance: float) -> float:
-    """Return a cautious first step: one hundredth of the time in which the state would change by its own size."""
+    """Return a first step: tolerance^(1/8) times the time in which the state would change by its own magnitude."""
     ratio = max(abs(k) / (s + abs(y)) for k, s, y in zip(k1, scale, x))
     return duration if ratio == 0.0 else min(duration, tolerance ** (1.0 / tableau.ORDER) / ratio)

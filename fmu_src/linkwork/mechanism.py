@@ -1,4 +1,4 @@
-"""The class `Mechanism`, of which each mechanism's folder exports one object, and the records that it consists of."""
+"""The class `Mechanism` and the records that it consists of; the folder of each mechanism exports one object of it."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ State = tuple[float, ...]
 
 
 class Mode(NamedTuple):
-    """A way of driving a freedom: the parameter that chooses it.
+    """The FMI parameter that chooses how a freedom is driven.
 
     Attributes
     ----------
     name : str
-        Of the FMI parameter.
+        Name of the FMI parameter.
     values : tuple of str
-        Its values 0, 1, ... in words.
+        Meaning of its values 0, 1, ... in words.
     arguments : tuple of str
-        What chooses each value where the inputs of a run are given: the channel of that argument, or a flag of that name.
+        For each value the argument of a run that chooses it: the argument of a channel, or the name of a flag.
     default : int
-        Value where none of them is given.
+        Value if none of these arguments is given.
     """
 
     name: str
@@ -47,13 +47,13 @@ class Freedom(NamedTuple):
     coordinate, rate : str
         FMI outputs that are the coordinate and its rate.
     initial : (str, str)
-        Fields of the state at the start that give both.
+        Fields of the initial state with the coordinate and its rate.
     mode : Mode or None
-        How it can be driven, if it can.
+        Choice of how it is driven; None if there is no choice.
     period : float
-        Increase of the coordinate after which the mechanism is in the same configuration; 0 where there is none.
+        Increase of the coordinate after which the mechanism is in the same configuration; 0 if there is none.
     swings : bool
-        Whether nothing drives it, so that it is no crank: a pendulum.
+        Whether it turns but is no crank, because nothing drives it: a pendulum.
     """
 
     coordinate: str
@@ -70,16 +70,16 @@ class Channel(NamedTuple):
     Attributes
     ----------
     name : str
-        Of the FMI input.
+        Name of the FMI input.
     argument : str
-        Its name among the inputs of a run in Python and in case files; of a ``rate`` what messages call it.
+        Its name among the inputs of a run in Python and in case files; for a ``rate`` its name in messages.
     kind : str
-        ``force``, ``command`` (the rate of a freedom, a jump of which is an impulse) or ``rate`` (of change of the command
-        of the same freedom, over a step).
+        ``force``; ``command``, the commanded rate of a freedom, whose jumps are impulses; or ``rate``, the rate of change of
+        the command of the same freedom over a step.
     freedom : int
-        Number of the freedom that it drives; -1 where it drives none directly.
+        Number of the freedom that it drives; -1 if it drives none directly.
     displacement : str
-        Of a force that drives no freedom directly, the output that is the displacement of what it acts on, along it.
+        For a force that drives no freedom directly: the output that is the displacement of its point along the force.
     """
 
     name: str
@@ -90,26 +90,27 @@ class Channel(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """The equations: straight lines of arithmetic on floats; x is the state, u the channels, p the constants, a NamedTuple.
+    """The equations of a mechanism: arithmetic on floats without branches.
 
-    What a mechanism has no use for returns what it was given, or a constant: `jump` and `start` the state, where no rate is
-    commanded; `clearance` 1.0, where the links can always be assembled.
+    x is the state, u the values of the channels, p the constants, a NamedTuple. A function that a mechanism does not need
+    returns the state (`jump` and `start`, if no rate is commanded) or a constant (`clearance` 1.0, if the links can always be
+    assembled).
 
     Attributes
     ----------
     applied : callable
-        ``applied(modes, u, p)``: what acts on the plant, i, from the values of the modes and the channels.
+        ``applied(modes, u, p)``: the applied inputs i of the other functions, from the values of modes and channels.
     derivative : callable
         ``derivative(x, i, p)``: time derivative of the state.
     outputs : callable
         ``outputs(x, i, start_energy, p)``: all real outputs, in the order of the interface.
     clearance : callable
-        ``clearance(x, i, p)``: how far the links are from the limit of assembly, in the measure of `limits.LIMIT_SINE`; where
-        friction is switched on, from where it may jam them, if that is less.
+        ``clearance(x, i, p)``: the distance of the links from the limit of assembly, a sine like `limits.LIMIT_SINE`; with
+        friction switched on, the margin to jamming if that is smaller.
     jump : callable
-        ``jump(x, i, u, p)``: the state after the commanded rates, where they are in force, have jumped to those in u.
+        ``jump(x, i, u, p)``: the state after the commanded rates that are in force have jumped to their values in u.
     start : callable
-        ``start(x, i, p)``: the state with those parts settled that others determine.
+        ``start(x, i, p)``: the initial state x, with the components computed that other components determine.
     energy : callable
         ``energy(x, p)``: mechanical energy (J).
     """
@@ -131,9 +132,9 @@ class Joint(NamedTuple):
     name : str
         Its letter.
     text : str
-        What it is.
+        Description.
     moves : tuple of str
-        FMI parameters, one or two, that change so that the point goes where it is dragged; none where it stays.
+        FMI parameters, one or two, that follow when the point is dragged; empty if it cannot be dragged.
     """
 
     name: str
@@ -153,9 +154,9 @@ class Part(NamedTuple):
         circle about the first point through the second, and its radius to there, which turns).
     joints : tuple of str
     text : str
-        What it is.
+        Description.
     where : str
-        FMI parameter that is not zero where there is such a part; empty where there always is.
+        FMI parameter that must not be zero for the part to be drawn; empty if it is always drawn.
     """
 
     kind: str
@@ -164,12 +165,12 @@ class Part(NamedTuple):
     where: str = ""
 
 
-#: Points by kind of part: as many, or at least as many as a link has.
+#: Number of points of each kind of part; for a link the least number.
 PARTS = {"pivot": 1, "link": 2, "guide": 2, "slider": 3, "spring": 3, "damper": 3, "axis": 2, "gear": 2}
 
 
 class Link(NamedTuple):
-    """A link whose mass follows from its length and its section, where a case gives one.
+    """A link whose mass follows from its length and its cross-section, if a case gives a section.
 
     Attributes
     ----------
@@ -178,8 +179,8 @@ class Link(NamedTuple):
     length, mass, inertia : str
         FMI parameters.
     centre : tuple of str
-        FMI parameters of its centre of mass from its first pin: the distance along the link, and the coordinate across it or
-        the angle from it, if it has one.
+        FMI parameters of its centre of mass from its first pin: the distance along the link and, if there is one, the
+        coordinate across the link or the angle from it.
     about_pin : bool
         Whether the moment of inertia is about the first pin, not about the centre of mass.
     """
@@ -199,13 +200,13 @@ class Drawing(NamedTuple):
     ----------
     joints : tuple of Joint
     positions : callable
-        ``positions(x, i, p)``: x, y and z of every joint (m); a straight line of arithmetic like the equations.
+        ``positions(x, i, p)``: x, y and z of every joint (m), by arithmetic without branches.
     parts : tuple of Part
         From the back to the front.
     paths : tuple of str
         Joints whose paths are drawn.
     planar : bool
-        Whether all moves in the plane z = 0.
+        Whether all points move in the plane z = 0.
     """
 
     joints: tuple[Joint, ...]
@@ -223,14 +224,14 @@ class PublishedSet(NamedTuple):
     parameters, initial : of the mechanism
         Parameters and state at the start.
     drive : mapping of str to float
-        Constant inputs that it is run at, by their arguments, such as ``{"speed": 44.0}``.
+        Constant inputs with which it runs, by argument, such as ``{"speed": 44.0}``.
     source : str
         Where it is printed.
     at_rest : bool
-        Whether it starts at rest but for what ``drive`` commands: where something else drives the mechanism it then starts at
-        rest, unless a case file says otherwise.
+        Whether it starts at rest except for the rate that ``drive`` commands. A run with another drive then starts at rest,
+        unless a case file says otherwise.
     origins : mapping of str to str
-        Where masses come from, in words by FMI parameter, such as "of a bar of 20 x 5 mm"; what is not there is as printed.
+        Origin of masses in words, by FMI parameter, such as "of a bar of 20 x 5 mm"; masses not listed are as printed.
     """
 
     parameters: Any
@@ -242,7 +243,7 @@ class PublishedSet(NamedTuple):
 
     @property
     def crank_speed(self) -> float:
-        """Speed of the one crank (rad/s), ``drive["speed"]``."""
+        """Speed of a single crank (rad/s): ``drive["speed"]``."""
         return self.drive["speed"]
 
 
@@ -255,18 +256,18 @@ class Mechanism:
     Attributes
     ----------
     name : str
-        As case files and messages name it.
+        Name in case files and messages.
     fmu : str
         Name of its FMU.
     title, description : str
     notes : tuple of str
         Paragraphs of the FMU's documentation.
     parameters, initial : type
-        Dataclasses of its parameters, with a method ``constants`` and ``RULES``, and of its state at the start.
+        Dataclass of its parameters, with a method ``constants`` and an attribute ``RULES``, and that of its initial state.
     published : mapping
         `PublishedSet` by name, one at least.
     freedoms : tuple of Freedom
-        Any of them may turn, and any number of them.
+        Degrees of freedom; any number of them may turn.
     channels : tuple of Channel
         In the order of the FMI inputs.
     variables : tuple of Variable
@@ -276,24 +277,24 @@ class Mechanism:
     experiment : tuple of float
         Default experiment: start, stop and step (s), tolerance.
     modules : tuple of modules
-        Those of the equations and of all functions that they call; the last in the package that has ``MECHANISM``.
+        Modules of the equations and of all functions that they call; the last is in the package that has ``MECHANISM``.
     equations : Equations
     check_assembly : callable
-        ``check_assembly(parameters, x)`` raises AssemblyError where the links cannot be joined clear of the limit.
+        ``check_assembly(parameters, x)`` raises AssemblyError if the links cannot be joined with the least clearance.
     error_scale : callable
-        ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute; a
-        straight line of arithmetic like the equations.
+        ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute,
+        by arithmetic without branches.
     unjoined : Unjoined or None
-        What is said there, of which the FMU in C says the same; None where the links can always be joined.
+        Messages of that error, which the FMU in C has too; None if the links can always be joined.
     switch : str
-        Name of the one constant, zero or greater, on which the equations may branch: on whether it is zero. They are traced
-        once for either, so that what is switched off costs nothing. Empty where there is none.
+        Name of the only constant on which the equations may branch: whether it is zero or positive. They are traced once for
+        each case, so that terms that are switched off cost nothing. Empty if there is none.
     links : tuple of Link
-        Those whose masses a section can give.
+        Links whose masses can follow from a cross-section.
     drawing : Drawing or None
-        How it is drawn; None where there is no picture of it.
+        How it is drawn; None if there is no picture.
     cases : mapping
-        Standard cases by name, in the tables of a case file: with them its FMUs are checked. None are needed.
+        Standard cases by name, as tables of a case file, with which its FMUs are checked; may be empty.
     """
 
     name: str
@@ -320,7 +321,7 @@ class Mechanism:
     cases: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __reduce__(self) -> Any:
-        # by its package: a copy would be another mechanism
+        # pickled by the name of its package: a copy would be another mechanism
         package = str(self.modules[-1].__package__)
         if getattr(import_module(package), "MECHANISM", None) is not self:
             raise LinkworkError(f"this {self.name} is not the MECHANISM of {package}: another process cannot import it")
@@ -347,26 +348,26 @@ class Mechanism:
 
     @cached_property
     def switch_place(self) -> int:
-        """Place of the switch among the constants; -1 where there is none."""
+        """Index of the switch among the constants; -1 if there is none."""
         return int(self.constants._fields.index(self.switch)) if self.switch else -1
 
     def switched(self, p: Sequence[float]) -> bool:
-        """Whether the switch is on in constants, or in numbers that begin with them."""
+        """Return whether the switch is on; ``p`` are the constants, or numbers that begin with them."""
         return self.switch_place >= 0 and p[self.switch_place] != 0.0
 
     def limit(self, x: Sequence[float], i: Any, p: Any) -> str:
-        """What the motion comes to where the clearance is small, in words."""
+        """Return in words which limit a motion with a small clearance reaches: of assembly, or jamming by friction."""
         if self.switched(p) and abs(self.equations.clearance(x, i, p._replace(**{self.switch: 0.0}))) >= NEAR_LIMIT:
             return JAMMING
         return ASSEMBLY
 
     def idle(self, p: Any) -> Any:
-        """What acts on the mechanism with constants p where all inputs are zero and the modes are the default ones."""
+        """Return the applied inputs i of the equations for constants p, all inputs zero and all modes at their defaults."""
         modes = tuple(float(mode.default) for mode in self.modes)
         return self.equations.applied(modes, (0.0,) * len(self.channels), p)
 
     def check_state(self, parameters: Any, x: Sequence[float], i: Any, p: Any) -> None:
-        """Make sure that the links can be joined and do not jam, clear of the limit of either.
+        """Check that the links can be joined and do not jam, both with the least clearance.
 
         Raises
         ------
@@ -393,7 +394,7 @@ class Mechanism:
         return next(found, None)
 
     def names(self, role: str, of: str | None = None) -> tuple[str, ...]:
-        """Return the names of the variables that play a role, of a freedom or a joint if one is given."""
+        """Return the names of the variables with a role; ``of`` selects those of one coordinate or joint."""
         return tuple(v.name for v in self.variables if v.role == role and of in (None, v.of))
 
     @cached_property
@@ -407,7 +408,7 @@ class Mechanism:
 
     @cached_property
     def rules(self) -> Rules:
-        """What the parameters must be."""
+        """Rules for the values of the parameters."""
         rules: Rules = self.parameters.RULES  # type: ignore[attr-defined]
         return rules
 
@@ -443,7 +444,7 @@ class Mechanism:
         return {v.name.removeprefix(prefix): v for v in self.variables if v.name.startswith(prefix)}
 
     def commands(self, modes: Mapping[str, int]) -> tuple[int, ...]:
-        """Numbers of the channels that command a rate under ``modes``, values by the name of the mode."""
+        """Return the numbers of the channels that command a rate in these ``modes``, values by name of the mode."""
         return tuple(
             number
             for number, channel in enumerate(self.channels)
@@ -455,7 +456,7 @@ class Mechanism:
         return mode is None or mode.arguments[modes[mode.name]] == channel.argument
 
     def where(self, x: Sequence[float]) -> str:
-        """A configuration in words, by the freedoms' coordinates."""
+        """Describe the configuration of a state in words, by the coordinates of the freedoms."""
         units = {v.name: v.unit for v in self.variables}
         words = []
         for freedom, value in zip(self.freedoms, x):
@@ -465,7 +466,7 @@ class Mechanism:
         return " and ".join(words)
 
     def state(self, initial: Any) -> State:
-        """The state that ``initial`` describes, no work done yet."""
+        """Return the state that ``initial`` describes, with both works zero."""
         coordinates = [float(getattr(initial, freedom.initial[0])) for freedom in self.freedoms]
         rates = [float(getattr(initial, freedom.initial[1])) for freedom in self.freedoms]
         return (*coordinates, *rates, 0.0, 0.0)
@@ -477,10 +478,10 @@ def _load(package: str) -> Mechanism:
 
 
 def crank_scale(length: float, mass: float, inertia: float, crank_speed: float) -> tuple[float, ...]:
-    """`Mechanism.error_scale` of a mechanism of a crank and a second freedom along a line.
+    """Return `Mechanism.error_scale` for a mechanism with a crank and a second freedom along a line.
 
-    Of a crank of that length (m) and moment of inertia (kg.m2), other links of that mass (kg), and a crank speed at the
-    start (rad/s).
+    ``length`` (m) and ``inertia`` (kg.m2) are those of the crank, ``mass`` (kg) is that of the other links, and
+    ``crank_speed`` (rad/s) that at the start.
     """
     speed = max(1.0, abs(crank_speed))
     energy = 0.5 * (inertia + mass * length * length) * speed * speed

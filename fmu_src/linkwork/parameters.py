@@ -36,9 +36,9 @@ class Least(NamedTuple):
     field : str
         Field of the parameter.
     of : callable
-        ``of(parameters)``: that value; a straight line of arithmetic.
+        ``of(parameters)`` returns the bound, by arithmetic without branches.
     requirement : str
-        What would be right, as the end of the sentence "it must ..."; ``%g`` stands for the value.
+        What would be right, as the end of the sentence "it must ..."; ``%g`` is replaced by the bound.
     """
 
     field: str
@@ -47,7 +47,7 @@ class Least(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Rules for the fields of a dataclass of parameters, which must also be finite; its attribute ``RULES``.
+    """Rules for the values of a mechanism's parameters, besides being finite: the attribute ``RULES`` of their dataclass.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Rules(NamedTuple):
     signs : mapping
         Fields that are +1 or -1, and what the sign means, as the end of the sentence "it must be +1 or -1, ...".
     least : tuple of Least
-        Bounds by other parameters.
+        Lower bounds that depend on other parameters.
     """
 
     positive: tuple[str, ...] = ()
@@ -71,8 +71,8 @@ def check_parameters(parameters: Any) -> None:
     Raises
     ------
     ParameterError
-        For the first field that is not as it must be; where all are, for the most extreme one if the constants of the
-        equations are not finite.
+        For the first field that breaks a rule; if none does, but a constant of the equations is not finite, for the field of
+        the most extreme magnitude.
     """
     rules: Rules = parameters.RULES
     for field in fields(parameters):

@@ -1,14 +1,15 @@
-"""Kinematics and forces of planar linkages built of dyads: what the equations of every described linkage consist of.
+"""Kinematics and forces of planar linkages built of dyads: the functions that the equations of described linkages call.
 
-Every vector and every turn carries its velocity coefficients: one column for each freedom, the change with that coordinate,
-and as last column the bias acceleration, which is left when no coordinate accelerates. With coordinates q and rates v the
-velocity is the sum of column times v, the acceleration the sum of column times q'' plus the bias.
+Every vector and every direction has columns: for each freedom its velocity coefficient, the derivative with respect to that
+coordinate; and last its bias acceleration, the acceleration if no coordinate accelerates. With coordinates q and rates v its
+velocity is the sum of column times v, and its acceleration the sum of column times q'' plus the bias.
 
 A dyad is a pair of bodies, joined to each other and each to a body whose motion is known; its two unknowns follow in closed
 form (the groups of the second class of Assur and Artobolevskii). R is a pin, P a slide; the middle letter is the joint
-between the two bodies. The functions are straight lines of arithmetic.
+between the two bodies. The functions are arithmetic without branches.
 
-Throughout u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90 degrees.
+Throughout n is the number of freedoms, v are their rates, u x w is the scalar u_x w_y - u_y w_x, and J turns a vector by +90
+degrees.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .limits import LIMIT_SINE, Unjoined
 
 
 class Vector(NamedTuple):
-    """A place or an arm: components, their rates, and (x, y) of each column."""
+    """A position, or an arm from one point to another: components, their rates, and (x, y) of each column."""
 
     x: float
     y: float
@@ -32,7 +33,7 @@ class Vector(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A direction: its cosine and sine, its angular velocity, and the columns of its angle."""
+    """A direction: cosine and sine of its angle, its angular velocity, and the columns of the angle."""
 
     c: float
     s: float
@@ -41,7 +42,7 @@ class Turn(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """The place of a body: that of its own origin, and its direction."""
+    """The pose of a body: position of its origin, and its direction."""
 
     origin: Vector
     turn: Turn
@@ -56,7 +57,7 @@ class Wrench(NamedTuple):
 
 
 class Mass(NamedTuple):
-    """A body that moves: mass (kg), moment of inertia about the centre of mass (kg.m2), that centre, and the body's place."""
+    """A body that moves: mass (kg), moment of inertia about its centre of mass (kg.m2), position of this centre, and pose."""
 
     mass: float
     inertia: float
@@ -72,32 +73,32 @@ Matrix = tuple[tuple[float, ...], ...]
 
 
 def fixed(x: float, y: float, n: int) -> Vector:
-    """Return a vector that does not change, of a mechanism of n freedoms."""
+    """Return a constant vector."""
     return Vector(x, y, 0.0, 0.0, ((0.0, 0.0),) * (n + 1))
 
 
 def held(c: float, s: float, n: int) -> Turn:
-    """Return a direction that does not change."""
+    """Return a constant direction of cosine c and sine s."""
     return Turn(c, s, 0.0, (0.0,) * (n + 1))
 
 
 def ground(n: int) -> Frame:
-    """Return the place of the ground."""
+    """Return the pose of the ground."""
     return Frame(fixed(0.0, 0.0, n), held(1.0, 0.0, n))
 
 
 def angled(angle: float, share: tuple[float, ...], v: Rates) -> Turn:
-    """Return the direction at an angle that is linear in the coordinates; ``share`` are its derivatives by them."""
+    """Return the direction at an angle that is linear in the coordinates; ``share`` are the derivatives of the angle."""
     return Turn(cos(angle), sin(angle), _dot(share, v), (*share, 0.0))
 
 
 def travelled(distance: float, share: tuple[float, ...], v: Rates) -> Vector:
-    """Return the arm along x of a length that is linear in the coordinates."""
+    """Return an arm along x whose length is linear in the coordinates; ``share`` are the derivatives of the length."""
     return Vector(distance, 0.0, _dot(share, v), 0.0, (*((d, 0.0) for d in share), (0.0, 0.0)))
 
 
 def _dot(columns: tuple[float, ...], v: Rates) -> float:
-    """Return the rate: the sum over the freedoms, not the bias."""
+    """Return the sum over the freedoms of column times rate; a bias at the end of ``columns`` is left out."""
     return sum(g * w for g, w in zip(columns, v))
 
 
@@ -108,20 +109,20 @@ def plus(a: Vector, b: Vector) -> Vector:
 
 
 def minus(a: Vector, b: Vector) -> Vector:
-    """Subtract a vector from another."""
+    """Return the vector a - b."""
     columns = tuple((g[0] - h[0], g[1] - h[1]) for g, h in zip(a.columns, b.columns))
     return Vector(a.x - b.x, a.y - b.y, a.vx - b.vx, a.vy - b.vy, columns)
 
 
 def arm(t: Turn, x: float, y: float) -> Vector:
-    """Return an arm that is fixed in a body of direction ``t``, with components x and y there."""
+    """Return an arm that is fixed in a body of direction ``t``; x and y are its components in the body's axes."""
     rx, ry, ww = t.c * x - t.s * y, t.s * x + t.c * y, t.w * t.w
     *share, bias = ((-ry * g, rx * g) for g in t.columns)
     return Vector(rx, ry, -ry * t.w, rx * t.w, (*share, (bias[0] - rx * ww, bias[1] - ry * ww)))
 
 
 def turned(t: Turn, a: Vector) -> Vector:
-    """Return an arm that moves in a body of direction ``t``; the bias has its centripetal and Coriolis terms."""
+    """Return an arm ``a`` that moves in a body of direction ``t``, in outer axes, with centripetal and Coriolis bias."""
     rx, ry = t.c * a.x - t.s * a.y, t.s * a.x + t.c * a.y
     ux, uy = t.c * a.vx - t.s * a.vy, t.s * a.vx + t.c * a.vy
     *share, bias = (
@@ -133,30 +134,30 @@ def turned(t: Turn, a: Vector) -> Vector:
 
 
 def both(t: Turn, r: Turn) -> Turn:
-    """Return the direction of a body whose direction in another is ``r``, where that other's is ``t``."""
+    """Return the direction of a body that has the direction ``r`` relative to a body of direction ``t``."""
     columns = tuple(g + h for g, h in zip(t.columns, r.columns))
     return Turn(t.c * r.c - t.s * r.s, t.s * r.c + t.c * r.s, t.w + r.w, columns)
 
 
 def inclined(t: Turn, c: float, s: float) -> Turn:
-    """Return a direction at a fixed angle, of cosine c and sine s, from another."""
+    """Return the direction at a fixed angle, of cosine c and sine s, from the direction ``t``."""
     return Turn(t.c * c - t.s * s, t.s * c + t.c * s, t.w, t.columns)
 
 
 def point(f: Frame, x: float, y: float) -> Vector:
-    """Return a point of a body from its own coordinates."""
+    """Return the position of the point of a body that has the coordinates x and y in the body's frame."""
     return plus(f.origin, arm(f.turn, x, y))
 
 
 def within(f: Frame, inner: Frame) -> Frame:
-    """Return the place of a body that is known in the frame of another."""
+    """Return the pose of a body whose pose relative to the body ``f`` is ``inner``."""
     return Frame(plus(f.origin, turned(f.turn, inner.origin)), both(f.turn, inner.turn))
 
 
 def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: float, radius: float) -> Turn:
-    """Return the direction of a gear on ``carrier`` whose rack moves a block along a line from ``start``.
+    """Return the direction of a gear on a body of direction ``carrier``; its rack moves ``block`` along ``line``.
 
-    The angle from the carrier is the distance of the block from ``start``, less ``offset``, by ``radius``.
+    The angle of the gear relative to the carrier is (d - ``offset``)/``radius``; d is the distance of the block from ``start``.
     """
     arm = minus(block, start)
     way = line.c * arm.x + line.s * arm.y
@@ -168,7 +169,7 @@ def rolled(carrier: Turn, line: Turn, start: Vector, block: Vector, offset: floa
 
 
 def hung(pin: Vector, t: Turn, own: Vector) -> Frame:
-    """Return the place of a body of direction ``t`` whose point ``own`` is at ``pin``."""
+    """Return the pose of a body of direction ``t`` whose point ``own``, given in the body's axes, is at ``pin``."""
     return Frame(minus(pin, turned(t, own)), t)
 
 
@@ -176,28 +177,31 @@ def hung(pin: Vector, t: Turn, own: Vector) -> Frame:
 
 
 def _angle(x: float, y: float, a: Vector) -> tuple[float, float]:
-    """Return cosine and sine of the direction in which the arm ``a`` of a body points along (x, y), of the same length."""
+    """Return cosine and sine of the direction of a body whose arm ``a`` lies on (x, y), a vector of the same length."""
     square = a.x * a.x + a.y * a.y
     return (x * a.x + y * a.y) / square, (y * a.x - x * a.y) / square
 
 
 def _spun(w: float, c: float, s: float, a: Vector, x: float, y: float) -> tuple[float, float]:
-    """Return the bias of the arm ``a`` at (x, y) of a body that turns at w, but for that of its angle."""
+    """Return the bias of an arm in a body that turns at w, without the term of the body's angular bias.
+
+    ``a`` is the arm in the body's axes, (x, y) the same arm in outer axes; c and s are those of the body's direction.
+    """
     ux, uy = c * a.vx - s * a.vy, s * a.vx + c * a.vy
     bx, by = a.columns[-1]
     return c * bx - s * by - w * w * x - 2.0 * w * uy, s * bx + c * by - w * w * y + 2.0 * w * ux
 
 
 def _shares(c: float, s: float, a: Vector) -> tuple[tuple[float, float], ...]:
-    """Return the columns of an arm, but the bias, in the axes outside its body."""
+    """Return the columns of an arm, without the bias, turned from its body's axes to outer axes."""
     return tuple((c * g[0] - s * g[1], s * g[0] + c * g[1]) for g in a.columns[:-1])
 
 
 def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Rates) -> tuple[Turn, Turn, float]:
-    """Solve the dyad RRR: body 1 is pinned at p, body 2 at q, and they at each other at the ends of their arms a and b.
+    """Solve the dyad RRR: body 1 is pinned at p, body 2 at q, and the ends of their arms a and b are pinned together at C.
 
-    ``branch`` is the sign of (C - p) x (C - q), C the pin between them. Returns both directions and the sine of the
-    transmission angle, positive in the branch.
+    ``branch`` is the sign of (C - p) x (C - q). Returns the directions of both bodies, and the sine of the transmission angle,
+    positive in this branch.
     """
     dx, dy = q.x - p.x, q.y - p.y
     dd, aa, bb = dx * dx + dy * dy, a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y
@@ -222,7 +226,7 @@ def pin_pin_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Ra
 
 
 def _on_line(o: Vector, t: Turn, b: Vector) -> tuple[float, float, list[tuple[float, float]], tuple[float, float]]:
-    """Return the arm b of a block that stands at the origin of its line: place less that of the line, and columns there."""
+    """Return the arm b of a block that stands at the origin o of its line: x and y; columns and bias of the arm's end."""
     r = turned(t, b)
     *share, bias = ((g[0] + h[0], g[1] + h[1]) for g, h in zip(o.columns, r.columns))
     return r.x, r.y, share, bias
@@ -233,9 +237,9 @@ def pin_pin_slide(
 ) -> tuple[Turn, Vector, float]:
     """Solve the dyad RRP: body 1 is pinned at p, body 2, a block, slides on the line through o of direction t.
 
-    ``a`` and ``b`` are their arms to the pin C between them, ``b`` from the block's origin, which is on the line.
-    ``branch`` is the sign of the component of C - p along the line. Returns the direction of body 1, the position of the
-    block as an arm along the line, and the sine of the angle between body 1 and the normal of the line.
+    ``a`` and ``b`` are the arms of bodies 1 and 2 to the pin C between them, ``b`` from the block's origin, which is on the
+    line. ``branch`` is the sign of the component of C - p along the line. Returns the direction of body 1, the position of the
+    block as an arm along the line, and the sine of the angle between the arm a and the normal of the line.
     """
     x0, y0, share, bias = _on_line(o, t, b)
     fx, fy = o.x + x0 - p.x, o.y + y0 - p.y
@@ -266,9 +270,10 @@ def pin_pin_slide(
 def slide_pin_slide(
     o: Vector, t: Turn, a: Vector, p: Vector, r: Turn, b: Vector, v: Rates
 ) -> tuple[Vector, Vector, float]:
-    """Solve the dyad PRP: blocks on the lines through o along t and through p along r, pinned at the ends of their arms a, b.
+    """Solve the dyad PRP: block 1 slides on the line through o along t, block 2 on the line through p along r.
 
-    Returns their positions as arms along their lines, and the magnitude of the sine of the angle between the lines.
+    The ends of their arms a and b are pinned together. Returns the positions of the blocks as arms along their lines, and the
+    magnitude of the sine of the angle between the lines.
     """
     x1, y1, share1, bias1 = _on_line(o, t, a)
     x2, y2, share2, bias2 = _on_line(p, r, b)
@@ -293,20 +298,20 @@ def slide_pin_slide(
 
 
 def _line_bias(t: Turn, z: float, vz: float) -> tuple[float, float]:
-    """Return the bias of an arm z along a line that turns and along which it grows, but for that of its length."""
+    """Return the bias of an arm along a turning line, of length z with rate vz, without the bias of its length."""
     beta, ww, w2 = z * t.columns[-1], z * t.w * t.w, 2.0 * t.w * vz
     return -t.s * (beta + w2) - t.c * ww, t.c * (beta + w2) - t.s * ww
 
 
 def _slid(z: float, rate: float, share: list[float], bias: float) -> Vector:
-    """Return an arm along x."""
+    """Return an arm of length z along x, from its rate, the columns of its length and their bias."""
     return Vector(z, 0.0, rate, 0.0, (*((g, 0.0) for g in share), (bias, 0.0)))
 
 
 def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: Rates) -> tuple[Turn, Vector, float]:
-    """Solve the dyad RPR: body 1, which holds a line, is pinned at p, body 2, its block, at q.
+    """Solve the dyad RPR: body 1, which has a line, is pinned at p; body 2, a block on this line, is pinned at q.
 
-    ``a`` is the pin p in the axes of the line, from the line's origin; ``b`` the pin q in the block's axes, which are
+    ``a`` is the pin p from the line's origin, in the axes of the line; ``b`` is the pin q in the block's axes, which are
     parallel. ``branch`` is the sign of the component of q - p along the line. Returns the direction of the line, the position
     of the block as an arm along it, and the sine of the angle between the line and the normal of q - p.
     """
@@ -337,11 +342,12 @@ def pin_slide_pin(p: Vector, q: Vector, a: Vector, b: Vector, branch: float, v: 
 def pin_slide_slide(
     p: Vector, o: Vector, t: Turn, r: Turn, a: Vector, b: Vector, v: Rates
 ) -> tuple[Vector, Vector, float]:
-    """Solve the dyad RPP: body 2 slides on the line through o along t, body 1 is pinned at p and slides on body 2, or 2 on it.
+    """Solve the dyad RPP: body 2 slides on the line through o along t; body 1 is pinned at p, and a slide joins it to body 2.
 
-    ``r`` is the direction of the slide between them, ``a`` the pin p in its axes from body 1's end of it, ``b`` the other
-    end, on body 2, in the axes of t from the origin of body 2. Returns the position of body 2 along its line, that of body 1
-    along the slide from the end on body 2, and the magnitude of the sine of the angle between both lines.
+    ``r`` is the direction of this slide. ``a`` is the pin p from the slide's end on body 1, in the axes of r; ``b`` is the
+    slide's end on body 2 from the origin of body 2, in the axes of t. Returns as arms the position of body 2 along its line,
+    and that of body 1 along the slide from the end on body 2; and the magnitude of the sine of the angle between line and
+    slide.
     """
     x1, y1, share1, bias1 = _on_line(o, t, b)
     pin = turned(r, a)
@@ -384,7 +390,7 @@ def mass_matrix(masses: tuple[Mass, ...], n: int) -> Matrix:
 
 
 def generalised_forces(masses: tuple[Mass, ...], wrenches: tuple[Wrench, ...], n: int) -> tuple[float, ...]:
-    """Compute the generalised forces of what acts on the bodies, less those of their bias accelerations."""
+    """Compute the generalised forces of the ``wrenches`` on the bodies, minus those of their bias accelerations."""
     total = [0.0] * n
     for m, f in zip(masses, wrenches):
         origin, h = m.frame.origin, m.frame.turn.columns
@@ -399,7 +405,7 @@ def generalised_forces(masses: tuple[Mass, ...], wrenches: tuple[Wrench, ...], n
 
 
 def accelerations(matrix: Matrix, forces: Rates, held: Rates, given: Rates) -> tuple[float, ...]:
-    """Solve for the accelerations of the freedoms, where ``held`` is 1 for those that are given and 0 for the others."""
+    """Solve for the accelerations of the freedoms; ``held`` is 1 where the acceleration is ``given``, 0 where it is free."""
     n = range(len(forces))
     free = [1.0 - h for h in held]
     rows = tuple(tuple(free[i] * free[j] * matrix[i][j] + (held[i] if i == j else 0.0) for j in n) for i in n)
@@ -415,21 +421,21 @@ def multiplied(matrix: Matrix, values: Rates) -> tuple[float, ...]:
 
 
 class Rubbing(NamedTuple):
-    """Friction of one joint for a force of 1 N in it: forces on the bodies, and power lost (W)."""
+    """Friction in one joint if the joint force is 1 N: wrenches on all bodies, and power lost (W)."""
 
     wrenches: tuple[Wrench, ...]
     lost: float
 
 
 def still(m: Mass) -> Mass:
-    """Return a body without its bias acceleration: what changes its motion and the forces on it changes them alike."""
+    """Return a body without its bias acceleration, with which changes of the joint forces are computed."""
     centre = m.centre._replace(columns=(*m.centre.columns[:-1], (0.0, 0.0)))
     turn = m.frame.turn._replace(columns=(*m.frame.turn.columns[:-1], 0.0))
     return m._replace(centre=centre, frame=m.frame._replace(turn=turn))
 
 
 def rubbed(wrenches: tuple[Wrench, ...], units: tuple[Rubbing, ...], sizes: Rates) -> tuple[Wrench, ...]:
-    """Add the friction in joints with forces of these sizes to what acts on the bodies."""
+    """Add joint friction to the wrenches on the bodies: ``units`` per newton of joint force, times the forces ``sizes`` (N)."""
     return tuple(
         added(f, *(Wrench(size * g.x, size * g.y, size * g.moment) for size, g in zip(sizes, on)))
         for f, *on in zip(wrenches, *(unit.wrenches for unit in units))
@@ -448,7 +454,7 @@ def kinetic_energy(masses: tuple[Mass, ...]) -> float:
 
 
 def force(x: float, y: float, at: Vector) -> Wrench:
-    """Return a force at a place."""
+    """Return the wrench of a force (x, y) at the point ``at``."""
     return Wrench(x, y, at.x * y - at.y * x)
 
 
@@ -458,22 +464,22 @@ def directed(t: Turn, x: float, y: float) -> tuple[float, float]:
 
 
 def torque(moment: float) -> Wrench:
-    """Return a torque."""
+    """Return the wrench of a torque."""
     return Wrench(0.0, 0.0, moment)
 
 
 def added(*wrenches: Wrench) -> Wrench:
-    """Add forces on one body."""
+    """Add wrenches on one body."""
     return Wrench(sum(f.x for f in wrenches), sum(f.y for f in wrenches), sum(f.moment for f in wrenches))
 
 
 def less(f: Wrench, g: Wrench) -> Wrench:
-    """Subtract forces on one body."""
+    """Return f - g for wrenches on one body."""
     return Wrench(f.x - g.x, f.y - g.y, f.moment - g.moment)
 
 
 def needed(m: Mass, accelerations: Rates, applied: Wrench) -> Wrench:
-    """Return the force of its joints on a body that moves: mass times acceleration less what else acts on it."""
+    """Return the wrench that its joints must exert on a body: mass times acceleration minus the wrench ``applied``."""
     q = (*accelerations, 1.0)
     x = m.mass * sum(g[0] * a for g, a in zip(m.centre.columns, q))
     y = m.mass * sum(g[1] * a for g, a in zip(m.centre.columns, q))
@@ -482,12 +488,15 @@ def needed(m: Mass, accelerations: Rates, applied: Wrench) -> Wrench:
 
 
 def moment_about(f: Wrench, at: Vector) -> float:
-    """Return the moment of forces about a place."""
+    """Return the moment of a wrench about the point ``at``."""
     return f.moment - at.x * f.y + at.y * f.x
 
 
 def pin_between_pins(p: Vector, c: Vector, q: Vector, on1: Wrench, on2: Wrench) -> Wrench:
-    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c; their joints must give ``on1`` and ``on2``."""
+    """Return the force of body 2 on body 1 of a dyad RRR in the pin at c.
+
+    ``on1`` and ``on2`` are here and below the wrenches that the joints must exert on bodies 1 and 2.
+    """
     ux, uy, wx, wy = c.x - p.x, c.y - p.y, c.x - q.x, c.y - q.y
     # u x F = m1, w x F = -m2
     m1, m2, cross = moment_about(on1, p), moment_about(on2, q), ux * wy - uy * wx
@@ -528,9 +537,10 @@ def slide_to_block(p: Vector, t: Turn, r: Turn, on1: Wrench, on2: Wrench) -> Wre
 
 
 def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
-    """Return the force of its mate on a gear that is pinned at ``pin``, along the common tangent of both.
+    """Return the tooth force of its mate on a gear that is pinned at ``pin``, along their common tangent.
 
-    ``other`` is the centre of its mate, ``ratio`` the gear's speed by its mate's, both seen from the line of centres.
+    ``other`` is the centre of the mate; ``ratio`` is the speed of the gear divided by that of the mate, both relative to the
+    line of centres; ``on`` is the wrench that its joints must exert on the gear.
     """
     moment = moment_about(on, pin)
     dx, dy = pin.x - other.x, pin.y - other.y
@@ -542,13 +552,13 @@ def mesh(pin: Vector, other: Vector, ratio: float, on: Wrench) -> Wrench:
 def gear_on_rack(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
     """Return the force of a gear pinned at ``pin`` on its rack, which slides along t, at their pitch point.
 
-    The pitch point is at ``radius`` to the right of t from the pin, to the left where it is negative.
+    The pitch point is at the distance ``radius`` to the right of t from the pin, or to the left if ``radius`` is negative.
     """
     return _in_teeth(pin, t, radius, on.x * t.c + on.y * t.s)
 
 
 def rack_on_gear(pin: Vector, t: Turn, radius: float, on: Wrench) -> Wrench:
-    """Return the force of its rack on a gear, as in `gear_on_rack`."""
+    """Return the force of a rack on its gear at their pitch point; the arguments are those of `gear_on_rack`."""
     return _in_teeth(pin, t, radius, moment_about(on, pin) / radius)
 
 
@@ -561,12 +571,12 @@ def _in_teeth(pin: Vector, t: Turn, radius: float, pull: float) -> Wrench:
 
 
 def angle_of(t: Turn) -> float:
-    """Return an angle in (-pi, pi]."""
+    """Return the angle of a direction, in (-pi, pi]."""
     return atan2(t.s, t.c)
 
 
 def angle_between(t: Turn, r: Turn, c: float, s: float) -> float:
-    """Return the angle of r from t less the angle of cosine c and sine s, in (-pi, pi]."""
+    """Return the angle from t to r minus the angle of cosine c and sine s, in (-pi, pi]."""
     x, y = t.c * r.c + t.s * r.s, t.c * r.s - t.s * r.c
     return atan2(y * c - x * s, x * c + y * s)
 
@@ -578,7 +588,7 @@ def transmission(p: Vector, c: Vector, q: Vector) -> float:
 
 
 def position_along(f: Frame, x: float, y: float, t: Turn, block: Frame) -> tuple[float, float]:
-    """Return position and velocity of a block's origin along a line of body f through its point (x, y), of direction t."""
+    """Return position and velocity of a block's origin along the line of body f through its point (x, y), of direction t."""
     start = point(f, x, y)
     dx, dy = block.origin.x - start.x, block.origin.y - start.y
     vx, vy = block.origin.vx - start.vx, block.origin.vy - start.vy
@@ -599,7 +609,7 @@ UNJOINED = Unjoined(
 
 
 def check_clearance(places: Callable[..., Any], x: Sequence[float], p: Any, where: str) -> None:
-    """Make sure that the bodies can be joined, clear of the limit of assembly.
+    """Check that the bodies can be joined in state x with the least clearance; ``where`` describes the state in words.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""A mechanism as a stateful object: the shell around its equations that an FMU holds.
+"""A mechanism as a stateful object around its equations, as an FMU holds it.
 
-Inputs, steps, refused steps, commanded rates that jump, saved states: the same for every `Mechanism`.
+It handles inputs, steps, refused steps, jumps of commanded rates and saved states in the same way for every `Mechanism`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .limits import NEAR_LIMIT
 from .mechanism import Mechanism, Mode
 from .parameters import field_name, fmi_name
 
-#: Loosest and tightest tolerance that a run accepts.
+#: Tightest and loosest tolerance that a run accepts.
 TOLERANCE_RANGE = (1e-13, 1e-2)
 
 
@@ -40,13 +40,13 @@ def mode_requirement(mode: Mode) -> str:
 
 
 class Plant:
-    """A mechanism in motion: state, inputs, and the step that takes it forward in time.
+    """A mechanism in motion: its state, its inputs, and `step`, which advances it in time.
 
     Parameters
     ----------
     mechanism : Mechanism
     parameters, initial
-        Of the mechanism's types. Commanded rates at the start take the place of those of ``initial``.
+        Parameters and initial state, of the mechanism's types. A rate commanded at the start replaces that in ``initial``.
     tolerance : float
         Bound of the local error of a step.
     time : float
@@ -108,7 +108,9 @@ class Plant:
     def of_values(
         cls, mechanism: Mechanism, values: Mapping[str, Any], *, tolerance: float | None = None, time: float = 0.0
     ) -> Plant:
-        """The plant whose parameters, start and inputs are ``values``, by FMI name; ``tolerance`` takes the place of theirs.
+        """Return the plant with the parameters, initial state, inputs and modes in ``values``, by FMI name.
+
+        ``tolerance``, if given, is used instead of ``solver.tolerance`` in ``values``.
 
         Raises
         ------
@@ -132,7 +134,7 @@ class Plant:
         self._commands = self.mechanism.commands(self.modes)
 
     def tune(self, values: Mapping[str, Any]) -> None:
-        """Take other parameters, by FMI name; a spring does no work as its stiffness changes.
+        """Set all parameters, by FMI name; the start energy is shifted by the jump of the energy, so that no work is counted.
 
         Raises
         ------
@@ -147,7 +149,7 @@ class Plant:
         self.start_energy += m.equations.energy(self.state, self._p) - before
 
     def _rate_names(self) -> set[str]:
-        """Return the inputs that are commanded rates, in any mode."""
+        """Return the names of the inputs that command a rate in any mode."""
         return {channel.name for channel in self.mechanism.channels if channel.kind == "command"}
 
     def _start(self, initial: Any) -> Vector:
@@ -172,7 +174,7 @@ class Plant:
         self.mechanism.check_state(self.parameters, self._settled(x), self._applied(), self._p)
 
     def _jumped(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
-        """The state with the commanded rates applied, of those inputs that are in ``commanded``."""
+        """Return the state after the rates have jumped to the values that the inputs in ``commanded`` command."""
         names = self.mechanism.input_names
         if not any(names[number] in commanded for number in self._commands):
             return x
@@ -192,7 +194,7 @@ class Plant:
             return True
 
     def _started_from(self, x: Vector) -> str:
-        """Describe the initial state by the names of the parameters that set it."""
+        """Describe the initial state in words, each value by the name of the parameter or input that sets it."""
         units = {v.name: v.unit for v in self.mechanism.variables}
         source = {self._rate_of(number): self.mechanism.channels[number].name for number in self._commands}
         fields = [freedom.initial[part] for part in (0, 1) for freedom in self.mechanism.freedoms]
@@ -202,7 +204,7 @@ class Plant:
     # Inputs and outputs
 
     def set_input(self, name: str, value: float) -> None:
-        """Set an input by its FMI name; it holds until it is set again. Checked at the next step, not here."""
+        """Set an input by its FMI name until it is set again; `step` and `outputs` check its value, this method does not."""
         if name not in self.inputs:
             raise InputError(f"there is no input {name!r}: the inputs are {', '.join(self.inputs)}")
         self.inputs[name] = value
@@ -215,12 +217,12 @@ class Plant:
                 raise InputError(f"input {name} is {value} at t = {self.time:.9g} s: it must be a finite number")
 
     def outputs(self) -> Any:
-        """All real outputs at the present time under the inputs in force.
+        """Return all real outputs at the present time under the inputs in force.
 
         Raises
         ------
         InputError
-            If an input is not finite, or so large that an output is not.
+            If an input is not finite, or so large that an output is not finite.
         """
         self._check_inputs()
         i = self._applied()
@@ -243,7 +245,7 @@ class Plant:
         Raises
         ------
         StepError
-            If ``step`` is not positive or too short for ``time`` to move, or ``time`` is not where the plant is.
+            If ``step`` is not positive, or too short to change ``time``, or ``time`` is not the plant's time.
         InputError
             If an input is not finite.
         AssemblyError
@@ -257,7 +259,7 @@ class Plant:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it must be greater than zero")
         if time + step == time:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it is lost in the rounding of the time")
-        # what rounding in the master's own sum of steps can make, and no more: a repeated step of a microsecond is refused
+        # as much as rounding in the master's sum of steps can cause, and no more: a repeated step of a microsecond is refused
         slack = min(1e-6 * step, 1e-9) + 8.0 * ulp(max(abs(time), abs(self.time)))
         if abs(time - self.time) > slack:
             way = "backwards" if time < self.time else "over a gap"
@@ -265,7 +267,7 @@ class Plant:
         self._check_inputs()
         i = self._applied()
         derivative, p = self.mechanism.equations.derivative, self._p
-        # a commanded rate that was not set again: the step starts from it all the same, as the contract says
+        # the step starts from every commanded rate, even from one that was not set again, as the contract says
         x = self._jumped(self.state, i, self.inputs)
         last = x
 
@@ -294,7 +296,7 @@ class Plant:
         self._commanded = set()
 
     def _explain(self, error: LinkworkError, time: float, last: Vector) -> LinkworkError:
-        """Add the time of the step to an error and, where it is the cause, the limit of assembly."""
+        """Return an error that adds the start time of the step and, if it is the cause, the limit of assembly near ``last``."""
         if isinstance(error, IntegrationError):
             if self._near_limit(last):
                 limit = self.mechanism.limit(last, self._applied(), self._p)

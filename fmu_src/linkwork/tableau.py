@@ -1,7 +1,7 @@
 """Coefficients of the Runge-Kutta method of order 8 by Dormand and Prince, with its two error estimates and dense output.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., section II.10, method
-DOP853. The numbers are printed there; `tests/plant/test_tableau.py` holds them to the order conditions they must meet.
+DOP853. The numbers are printed there; `tests/plant/test_tableau.py` checks them against the order conditions.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 #: Stages of one step; stage 13 of a step is stage 1 of the next; stages 14 to 16 serve the dense output alone.
 STAGES = 12
 
-#: Order of the method, and of the lower of its two error estimates plus one: the exponent of the step size control.
+#: Order of the method, and of its combined error estimate in the step size, which the step size control uses as exponent.
 ORDER = 8
 
 #: Abscissae of the sixteen stages, as fractions of the step.

@@ -1,4 +1,4 @@
-"""The record of a variable of an FMI interface, constructors of common variables, and the units of interfaces."""
+"""Variables of an FMI interface: their record, their units, and constructors of common variables."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Variable(NamedTuple):
     Attributes
     ----------
     name : str
-        Name in the contract.
+        Name in the FMI interface.
     causality : str
         ``parameter``, ``input``, ``output`` or ``local``.
     unit : str
@@ -82,25 +82,25 @@ class Variable(NamedTuple):
     symbol : str
         Symbol in the thesis, in LaTeX; empty where it has none.
     start : float, int or str
-        Start value; an output's real one follows from the others and is computed where it is needed.
+        Start value; for an output a placeholder, whose true value is computed from the others where it is needed.
     kind : str
         ``Real``, ``Integer`` or ``String``.
     minimum, maximum : float or None
-        Bounds, where they mean something.
+        Bounds, if they have a meaning.
     display : str
-        Unit people think in; empty for the unit itself.
+        Unit in which people read it; empty if it is ``unit``.
     depends : str
-        Of an output: ``state`` (on no input), ``speed`` (on the commanded speeds), or ``all`` inputs.
+        Inputs on which an output depends: ``state`` (none), ``speed`` (the commanded speeds) or ``all``.
     level : str
-        Of an output at the start: what it depends on, ``position``, ``velocity`` or ``all``.
+        Quantities on which the start value of an output depends: ``position``, ``velocity``, ``all`` or ``none``.
     rate_of : str
-        Of an output, the output that it is the time derivative of; empty where it is of none.
+        Output whose time derivative this output is; empty if there is none.
     nominal : float or None
-        A usual magnitude, where the start value is 0 and 1 would be none.
+        Typical magnitude, given if the start value is 0 and 1 is not typical.
     role : str
-        Meaning for the analyses, a key of `ROLES`; empty where they need none.
+        Meaning for the analyses, a key of `ROLES`; empty if they need none.
     of : str
-        What has that role: the coordinate that a spring, a damper or a drive acts along, or the joint of a force.
+        Owner of the role: the coordinate along which a spring, a damper or a drive acts, or the joint of a force.
     """
 
     name: str
@@ -134,7 +134,10 @@ class Variable(NamedTuple):
 def parameter(
     start: Any, name: str, unit: str, description: str, symbol: str = "", role: str = "", of: str = ""
 ) -> Variable:
-    """Return a parameter that starts from its value in ``start``, bounded by its ``RULES``; angles are shown in degrees."""
+    """Return the variable of a parameter; its start value is its field in ``start``, its lower bound follows from ``RULES``.
+
+    Angles are shown in degrees.
+    """
     field = field_name(name)
     minimum = None if field in start.RULES.free_sign else 0.0
     display = "deg" if unit == "rad" else ""
@@ -153,12 +156,12 @@ def parameter(
 
 
 def choice(name: str, description: str, start: int, least: int, greatest: int) -> Variable:
-    """Return a parameter that is a whole number."""
+    """Return a parameter that is a whole number from ``least`` to ``greatest``."""
     return Variable(name, "parameter", "", description, "", start, "Integer", least, greatest)
 
 
 def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
-    """Return the commanded speed of the crank and its rate; ``angle`` is the symbol of its angle."""
+    """Return the inputs of the commanded crank speed and its rate of change; ``angle`` is the symbol of the crank angle."""
     speed = "Crank speed at the start of a step; used where drive.mode is 1"
     rate = "Rate of change of the crank speed over a step; used where drive.mode is 1"
     return (
@@ -168,7 +171,7 @@ def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
 
 
 def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
-    """Return angle, speed and acceleration of the crank; ``angle`` is the symbol of its angle."""
+    """Return the outputs of angle, speed and acceleration of the crank; ``angle`` is the symbol of the crank angle."""
     return (
         output("crank.angle", "rad", "Crank angle, counted on over full turns", angle, *POSITION, display="deg"),
         output("crank.speed", "rad/s", "Crank speed", rf"\dot{angle}", *RATE, display="rpm", rate_of="crank.angle"),
@@ -177,7 +180,7 @@ def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
 
 
 def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Variable, ...]:
-    """Return the energies and their balance; the arguments name in words the sources of each."""
+    """Return the outputs of the energies and their balance; each argument names the sources of one energy in words."""
     balance = "Energy balance: gained plus dissipated less supplied; zero but for error"
     return (
         output("energy.kinetic", "J", "Kinetic energy of all links", "", *RATE, minimum=0.0),
@@ -195,7 +198,7 @@ def output(
     return Variable(name, "output", unit, description, symbol, 0.0, "Real", depends=depends, level=level, **rest)
 
 
-#: Dependencies (``depends``, ``level``) of outputs that follow from the positions, and of those that follow from the rates too.
+#: Dependencies (``depends``, ``level``) of outputs that depend on the positions alone, and on positions and rates.
 POSITION, RATE = ("state", "position"), ("speed", "velocity")
 
 

@@ -1,4 +1,4 @@
-"""What a slave must do because of pythonfmu's wrapper, the library that calls it."""
+"""Work around defects of pythonfmu's wrapper, the library that calls the slave of a Python FMU."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-#: The states of a run: what is allowed in each, FMI 2.0.4 says in 4.2.4; the wrapper passes every call on.
+#: The states of a run. FMI 2.0.4, 4.2.4, says which calls are allowed in each; the wrapper does not check this.
 INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
     "instantiated",
     "in initialisation",
@@ -16,15 +16,16 @@ INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
     "terminated",
 )
 
-#: Libraries of FMUs that `end_library_in_order` has seen to.
+#: Libraries of FMUs that `end_library_in_order` has handled.
 _libraries: set[Path] = set()
 
 
 def end_library_in_order(resources: str, model: str) -> None:
     """Make the wrapper's library release the interpreter when Python ends, not while the process is torn down.
 
-    On Linux the library clears its pointer to the interpreter's state in a destructor that runs after the pointer itself
-    was destroyed: a use after free that now and then aborts a process whose run was good. Cleared before, it is harmless.
+    ``resources`` is the FMU's folder of resources, ``model`` its model identifier. On Linux the library clears its pointer to
+    the interpreter's state in a destructor that runs after the pointer itself was destroyed: a use after free, which sometimes
+    aborts a process after a good run. If the pointer is cleared earlier, nothing happens.
     """
     library = Path(resources).parent / "binaries" / "linux64" / f"{model}.so"
     if not sys.platform.startswith("linux") or library in _libraries or not library.is_file():
@@ -36,21 +37,21 @@ def end_library_in_order(resources: str, model: str) -> None:
 
 
 def keep_namespace(kind: type) -> None:
-    """Keep the names of a slave's module alive.
+    """Keep the namespace of a slave's module alive; ``kind`` is the class of the slave.
 
-    To find the class the wrapper runs its module's source again, at every instantiation, and then gives up a reference to the
-    module's namespace that it only borrowed: without one more each time the namespace dies with all its names.
+    At every instantiation the wrapper runs the module's source again to find the class, and then releases a reference to the
+    module's namespace that it only borrowed. Without one more reference each time, the namespace would be deleted.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(vars(sys.modules[kind.__module__])))
 
 
 def outlive_exception(slave: Any) -> None:
-    """Keep an instance usable over one more exception.
+    """Keep an instance usable after one more exception.
 
-    After one the wrapper gives up its references to instance, class and log, and gives them up again when the master frees the
-    instance; one more reference each, kept in reserve, makes the second time harmless. A slave takes them at its start, for an
-    exception that it cannot catch, since an interrupt from the keyboard may come before the first statement of a method, and
-    again before it raises one when they are used up.
+    After an exception the wrapper releases its references to instance, class and log, and it releases them again when the
+    master frees the instance. One more reference to each, kept in reserve, makes the second release harmless. A slave takes
+    this reserve when it starts, for exceptions that it cannot catch (Ctrl-C may come before the first statement of a method),
+    and again before it raises an exception, if the reserve is used up.
     """
     if not _in_reserve(slave):
         for kept in (slave, type(slave), slave.log_queue):
@@ -58,12 +59,12 @@ def outlive_exception(slave: Any) -> None:
 
 
 def end_in_order(slave: Any) -> None:
-    """Give up the references in reserve at the end of a run; an instance that is freed without one keeps them."""
+    """Release the references in reserve when a run is terminated; an instance that is freed without this keeps them."""
     if _in_reserve(slave):
         for kept in (slave, type(slave), slave.log_queue):
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(kept))
 
 
 def _in_reserve(slave: Any) -> bool:
-    # the log is known to the slave, the wrapper, the reserve and this call
+    # with a reserve the log has four references: of the slave, the wrapper, the reserve and this call
     return sys.getrefcount(slave.log_queue) >= 4

@@ -1,4 +1,4 @@
-"""The five-bar slider of Youssef's thesis: parameters, kinematics, dynamics, published data; `MECHANISM` is all of it."""
+"""The five-bar slider of Youssef's thesis: parameters, kinematics, dynamics, published data; `MECHANISM` combines them."""
 
 from __future__ import annotations
 

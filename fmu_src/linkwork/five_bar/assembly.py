@@ -19,12 +19,12 @@ UNJOINED = Unjoined(
 
 
 def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> None:
-    """Make sure that the links can be joined at a configuration, clear of the limit of assembly.
+    """Check that the links can be joined at a configuration with the least clearance from the limit of assembly.
 
     Raises
     ------
     AssemblyError
-        With the configuration, the distance from crank pin to slider pin, and the range it would have to be in.
+        With the configuration, the distance from crank pin to slider pin, and the range in which it should be.
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, slider_position, p)
@@ -40,6 +40,6 @@ def configuration(crank_angle: float, slider_position: float) -> str:
 
 
 def error_scale(parameters: FiveBarParameters, x: Sequence[float]) -> tuple[float, ...]:
-    """Return for each component of the state the magnitude below which its error counts as absolute, from the initial state."""
+    """Return the magnitude of each state component below which its error is absolute; x is the initial state."""
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
     return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

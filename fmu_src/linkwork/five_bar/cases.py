@@ -1,4 +1,4 @@
-"""Standard cases of the five-bar slider, as case files have them: every way to drive and load it, on Table 3.1."""
+"""Standard cases of the five-bar slider as tables of case files: every way to drive and load the mechanism of Table 3.1."""
 
 from __future__ import annotations
 

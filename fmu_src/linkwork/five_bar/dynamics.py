@@ -6,10 +6,10 @@ With q = (th2, u), w2 = th2' and v = u' the equations of motion are
     m12 w2' + m22 v' + b2 = F2 + Q2       (slider)
 
 where m is the inertia matrix, b the velocity terms, and Q gathers gravity, the load at P, spring, damper and friction.
-At prescribed speed w2' is given and the first equation yields the crank torque T instead: the multiplier of the
+At prescribed speed w2' is given and the first equation yields the crank torque T, which is the multiplier of the
 thesis's third constraint. The state of a run is the six-tuple (th2, u, w2, v, dissipated work, supplied work).
 
-The functions are straight lines of arithmetic on floats, like those of `kinematics`.
+The functions are arithmetic on floats without branches, like those of `kinematics`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ State = tuple[float, float, float, float, float, float]
 class Inputs(NamedTuple):
     """Inputs of the plant at one instant.
 
-    ``speed_drive`` is 1.0 where the crank acceleration is prescribed and 0.0 where the torque is. Torque in N.m,
+    ``speed_drive`` is 1.0 if the crank acceleration is prescribed and 0.0 if the torque is. Torque in N.m,
     acceleration in rad/s2, slider force and load in N.
     """
 
@@ -63,7 +63,7 @@ NO_INPUTS = Inputs(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):
-    """Rates and accelerations that follow from the state and the inputs, and the moments of pin friction on two links (N.m)."""
+    """Speeds and accelerations of the links, crank torque, powers (W), moments of pin friction on coupler and rocker (N.m)."""
 
     w3: float
     w4: float
@@ -89,7 +89,7 @@ class Friction(NamedTuple):
 
 
 class Reactions(NamedTuple):
-    """Pin forces (N): ground on crank (A), crank on coupler (B), rocker on coupler (C), slider on rocker (D), guide."""
+    """Forces (N): ground on crank (A), crank on coupler (B), rocker on coupler (C), slider on rocker (D), guide on slider."""
 
     ax: float
     ay: float
@@ -191,7 +191,7 @@ def applied_forces(
 
 
 def accelerations(m: Inertia, r1: float, r2: float, speed_drive: float, acceleration: float) -> tuple[float, float]:
-    """Compute the accelerations of crank and slider from generalised forces, or for a prescribed crank acceleration."""
+    """Compute the accelerations of crank and slider from the generalised forces r1, r2, or for a given crank acceleration."""
     free = 1.0 - speed_drive
     e2 = speed_drive * acceleration + free * (m.m22 * r1 - m.m12 * r2) / (m.m11 * m.m22 - m.m12 * m.m12)
     return e2, (r2 - m.m12 * e2) / m.m22
@@ -229,7 +229,7 @@ def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
 
 
 class Rubbing(NamedTuple):
-    """Friction of one contact for a force of 1 N in it, and by how much that changes the forces in all contacts."""
+    """Friction in one contact if its force is 1 N, and the changes of all joint forces that this friction causes."""
 
     friction: Friction
     response: Reactions
@@ -254,7 +254,7 @@ def unit_friction(
         change = Motion(0.0, 0.0, e2, a, e3, e4, 0.0, 0.0, 0.0, f.coupler, f.rocker)
         return Rubbing(f, reactions(g, AT_REST, change, NO_INPUTS, weightless))
 
-    # the moment on the coupler at B and C, on the rocker at C (turned round) and D: on the other link it is the opposite
+    # the moments on the coupler at B and C, and on the rocker at C (the opposite one) and D
     return (
         rubbing(Friction(-ra, 0.0, 0.0, 0.0, ra * w2)),
         rubbing(Friction(-rb * (k.k32 - 1.0), -rb * k.k3u, -rb, 0.0, rb * (w3 - w2))),
@@ -294,7 +294,7 @@ def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
     w2 = x[2]
     e2 = m.crank_acceleration
     a = m.slider_acceleration
-    # acceleration less gravity of B and of D, and mass times that of the centres of mass of coupler and rocker
+    # acceleration minus gravity of B and of D, and mass times the same for the centres of mass of coupler and rocker
     bx = -p.l2 * (g.s2 * e2 + g.c2 * w2 * w2) - p.gx
     by = p.l2 * (g.c2 * e2 - g.s2 * w2 * w2) - p.gy
     rx3 = p.mx3 * g.c3 - p.my3 * g.s3
@@ -344,7 +344,7 @@ def kinetic_energy(m: Inertia, w2: float, v: float) -> float:
 
 
 def potential_energy(g: Position, u: float, p: Constants) -> float:
-    """Compute the energy of the spring and of gravity (J), the latter zero with every centre of mass at A."""
+    """Compute the potential energy of spring and gravity (J); that of gravity is zero with every centre of mass at A."""
     x = (
         p.mx2 * g.c2
         - p.my2 * g.s2
@@ -378,8 +378,8 @@ def mechanical_energy(x: State, p: Constants) -> float:
 def jump_speed(x: State, speed: float, p: Constants) -> State:
     """Return the state after a jump of the commanded crank speed to ``speed``.
 
-    The jump is an impulse on the crank. The slider's generalised momentum m12 w2 + m22 v has no impulse of its own and is
-    conserved; the work of the crank's impulse is the change of kinetic energy.
+    The jump is an impulse on the crank. No impulse acts along the slider's freedom, so that its generalised momentum
+    m12 w2 + m22 v is conserved; the work of the crank's impulse is the change of kinetic energy.
     """
     g = position(x[0], x[1], p)
     m = inertia(g, coefficients(g, p), p)
@@ -389,7 +389,7 @@ def jump_speed(x: State, speed: float, p: Constants) -> State:
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """Return the state after a jump of the commanded speed, if it is in force, to its value in the channels ``u``."""
+    """Return the state after the commanded speed, if it is in force, has jumped to its value in the channels ``u``."""
     return jump_speed(x, (1.0 - i.speed_drive) * x[2] + i.speed_drive * u[1], p)
 
 
@@ -406,7 +406,7 @@ def started(x: State, i: Inputs, p: Constants) -> State:
 
 
 def clearance(x: State, i: Inputs, p: Constants) -> float:
-    """Compute the sine of the transmission angle, negative beyond assembly, or the smaller margin to jamming."""
+    """Compute the sine of the transmission angle, or the margin to jamming by friction if that is smaller."""
     g = position(x[0], x[1], p)
     sine = p.branch * g.s43
     if not p.rough:
@@ -419,7 +419,7 @@ def clearance(x: State, i: Inputs, p: Constants) -> float:
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     """Compute all real outputs of the FMI contract at state ``x`` under the inputs ``i``.
 
-    ``start_energy`` is the mechanical energy at the start of the run, against which the balance is kept.
+    ``start_energy`` is the mechanical energy at the start of the run (J), from which the energy balance counts.
     """
     th2, u, w2, v, dissipated, supplied = x
     g = position(th2, u, p)

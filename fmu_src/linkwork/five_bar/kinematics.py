@@ -4,8 +4,8 @@ The freedoms are the crank angle ``th2`` and the slider position ``u``. Every an
 the ground link; ``c4, s4`` belong to the direction from the slider pin D to the coupler-rocker pin C, so that the rocker
 angle here is the thesis's theta4 + alpha.
 
-The functions are straight lines of arithmetic on floats: no branches on the state, no NumPy, no I/O. The same code runs
-as it is inside the FMU, compiled under Numba, and traced with CasADi symbols.
+The functions are arithmetic on floats: no branches on the state, no NumPy, no I/O. The same code runs as it is inside the
+FMU, compiled under Numba, and traced with CasADi symbols.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .parameters import Constants
 
 
 class Position(NamedTuple):
-    """Directions of the moving links: cosines and sines, and those of rocker angle minus coupler angle."""
+    """Cosines and sines of the angles of crank (2), coupler (3) and rocker (4), and of rocker minus coupler angle (43)."""
 
     c2: float
     s2: float
@@ -52,7 +52,7 @@ def assembly_square(th2: float, u: float, p: Constants) -> float:
 
 
 def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
-    """Return the distance from crank pin to slider pin, and the least and greatest that coupler and rocker span (m)."""
+    """Return the distance from crank pin to slider pin, and its least and greatest value that coupler and rocker allow (m)."""
     dx, dy = p.l1 + x[1] * p.ca - p.l2 * cos(x[0]), x[1] * p.sa - p.l2 * sin(x[0])
     return sqrt(dx * dx + dy * dy), fabs(p.l3 - p.l4), p.l3 + p.l4
 
@@ -60,8 +60,8 @@ def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
 def position(th2: float, u: float, p: Constants) -> Position:
     """Solve loop closure (2.1) as the intersection of two circles about B and D.
 
-    ``p.branch`` is the sign of sin(th4 - th3) and stays with the motion: the "+ root" of the thesis's KINE does not, it
-    changes assembly once B passes D.
+    ``p.branch`` is the sign of sin(th4 - th3) and stays the same in a motion. The "+ root" of the thesis's KINE does not: it
+    changes the assembly once B passes D.
 
     Raises
     ------
@@ -76,10 +76,9 @@ def position(th2: float, u: float, p: Constants) -> Position:
 
 
 def joined(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, branch: float) -> Position:
-    """Intersect the circles of coupler and rocker about B and D, for the vector (dx, dy) from B to D.
+    """Return the position with C at the intersection of the circles about B and D, for the vector (dx, dy) from B to D.
 
-    ``c2, s2`` are passed through. What moves D and what measures the crank's direction is left to the caller: the slider
-    in `position`, anything in the synthesis of linkages.
+    The crank's direction ``c2, s2`` is passed through. The caller decides what moves D: in `position` it is the slider.
     """
     d2 = dx * dx + dy * dy
     a = 0.5 * (d2 + l3 * l3 - l4 * l4)
@@ -107,7 +106,7 @@ def coefficients(g: Position, p: Constants) -> Coefficients:
 
 
 def centripetal(g: Position, w2: float, w3: float, w4: float, p: Constants) -> tuple[float, float]:
-    """Accelerations of coupler and rocker left when w2' = u'' = 0 (rad/s2): loop closure differentiated twice."""
+    """Compute the accelerations of coupler and rocker for w2' = u'' = 0 (rad/s2): loop closure differentiated twice."""
     a2 = p.l2 * w2 * w2
     a3 = p.l3 * w3 * w3
     a4 = p.l4 * w4 * w4
@@ -120,8 +119,8 @@ def centripetal(g: Position, w2: float, w3: float, w4: float, p: Constants) -> t
 def link_angles(g: Position, p: Constants) -> tuple[float, float]:
     """Return the absolute angles of the coupler B -> C and the rocker D -> C (the thesis's theta4 + alpha), in (-2 pi, 2 pi).
 
-    They are the direction of the line B -> D, and the angles of the triangle B, D, C, which lie between 0 and pi. Both change
-    continuously unless that line comes to point against the ground link: where B passes behind D.
+    They are sums of the direction of the line B -> D and angles of the triangle B, D, C, which are at most pi in magnitude.
+    Both change continuously unless the line B -> D comes to point opposite to the ground link, where B passes behind D.
     """
     dx = p.l3 * g.c3 - p.l4 * g.c4
     dy = p.l3 * g.s3 - p.l4 * g.s4
@@ -159,7 +158,7 @@ def assembly_margin(th2: float, u: float, p: Constants) -> tuple[float, float]:
 
 
 def closure_residual(th2: float, th3: float, th4: float, u: float, p: Constants) -> float:
-    """Length by which the loop (2.1) fails to close at the given angles (m)."""
+    """Compute the length by which the loop (2.1) fails to close at the given angles (m)."""
     x = p.l2 * cos(th2) + p.l3 * cos(th3) - p.l4 * cos(th4) - p.l1 - u * p.ca
     y = p.l2 * sin(th2) + p.l3 * sin(th3) - p.l4 * sin(th4) - u * p.sa
     return sqrt(x * x + y * y)

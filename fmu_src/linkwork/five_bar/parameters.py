@@ -14,7 +14,8 @@ class Constants(NamedTuple):
 
     ``mx3, my3`` are m3 times the components of the centre of mass along and across the coupler, and so on; ``i2b`` is
     I_A + m3 l2^2, ``i3b`` the coupler's moment of inertia about B, ``i4d`` the rocker's about D; ``gx, gy`` gravity;
-    ``ca, sa`` the guide's direction; ``rough`` is zero where ``mug`` and ``ra`` to ``rd`` are, the friction by contact forces.
+    ``ca, sa`` the guide's direction; ``rough`` is the sum of ``mug`` and ``ra`` to ``rd``, zero without friction by contact
+    forces.
     """
 
     l1: float
@@ -55,7 +56,7 @@ class Constants(NamedTuple):
 
 
 def _crank_inertia_of_mass(p: FiveBarParameters) -> float:
-    # the digits that a printed moment of inertia may lack
+    # with an allowance for the rounding of a printed moment of inertia
     return p.crank_mass * p.crank_cog_distance * p.crank_cog_distance * (1.0 - 1e-12)
 
 
@@ -103,7 +104,7 @@ class FiveBarParameters(CheckedParameters):
     ------
     ParameterError
         If a value is not finite or has the wrong sign, if ``assembly_branch`` is neither +1 nor -1, if the crank's
-        inertia about A is less than its mass requires, or if nothing moves with the slider.
+        inertia about A is less than its mass requires, or if neither rocker nor slider has a mass.
     """
 
     RULES: ClassVar[Rules] = _RULES
@@ -198,7 +199,7 @@ class FiveBarParameters(CheckedParameters):
 class InitialState(CheckedState):
     """Initial state of a run: rad, rad/s, m, m/s.
 
-    With the speed prescribed the commanded speed at the start takes the place of ``crank_speed``.
+    In speed drive the commanded speed at the start replaces ``crank_speed``.
 
     Raises
     ------

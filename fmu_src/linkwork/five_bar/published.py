@@ -1,6 +1,6 @@
 """Published parameter sets (Youssef, Tables 3.1, 8.1, 8.2 and appendix 1), converted from cgs to SI.
 
-`SETS` maps a name to a `PublishedSet`: the mechanism, the speed it is run at, and where it is printed.
+`SETS` maps a name to a `PublishedSet`: the mechanism, the speed at which it runs, and where it is printed.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def _from_cgs(
         coupler_mass=masses_g[0] / GRAM_PER_KG,
         rocker_mass=masses_g[1] / GRAM_PER_KG,
         slider_mass=masses_g[2] / GRAM_PER_KG,
-        # Table 3.1 gives I_A = 12500 g.cm2; the rigs' is not printed and assumed to be the same. At constant speed nothing
-        # but the kinetic energy depends on it
+        # Table 3.1 gives I_A = 12500 g.cm2; that of the rigs is not printed and is assumed to be the same. At constant speed
+        # only the kinetic energy depends on it
         crank_inertia=12500 / G_CM2_PER_KG_M2,
         coupler_inertia=inertias_g_cm2[0] / G_CM2_PER_KG_M2,
         rocker_inertia=inertias_g_cm2[1] / G_CM2_PER_KG_M2,
@@ -102,8 +102,9 @@ def chapter_4(inertia_ratio: float, omega_c: float = 0.0) -> FiveBarParameters:
     """Return the horizontal mechanism of chapters IV and V.
 
     The coupler has no mass, the rocker's centre of mass is on the slider pin D, l3 = l4 = l1, sigma2 = l2/l4 = 0.05,
-    p45 = m4/(m4 + m5) = 0.2, k/(m4 + m5) = 1000 1/s2. Lengths and masses are free: 0.3 m and m4 + m5 = 1 kg are chosen, and
-    no dimensionless result depends on them; nor does any of the slider's on the crank's inertia at constant speed.
+    p45 = m4/(m4 + m5) = 0.2, k/(m4 + m5) = 1000 1/s2. The thesis leaves lengths and masses free: l1 = 0.3 m and m4 + m5 = 1 kg
+    are chosen, and no dimensionless result depends on them. At constant speed the slider's motion does not depend on the
+    crank's inertia.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The generalised slider-crank of Rahman: parameters, kinematics, dynamics, published data; `MECHANISM` is all of it."""
+"""The generalised slider-crank of Rahman: parameters, kinematics, dynamics, published data; `MECHANISM` combines them."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ UNJOINED = Unjoined(
 
 
 def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift: float) -> None:
-    """Make sure that the rod reaches the guide at a configuration, clear of the limit of assembly.
+    """Check that the rod reaches the guide at a configuration with the least clearance from the limit of assembly.
 
     Parameters
     ----------
@@ -43,6 +43,6 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
 
 
 def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
-    """Return for each component of the state the magnitude below which its error counts as absolute, from the initial state."""
+    """Return the magnitude of each state component below which its error is absolute; x is the initial state."""
     mass = parameters.crank_mass + parameters.rod_mass + parameters.slider_mass
     return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

@@ -5,15 +5,15 @@ With q = (theta1, S1), w = theta1' and v = S1' the equations of motion are
     m11 w' + m12 v' + b1 = T + Q1        (crank)
     m12 w' + m22 v' + b2 = F + Q2        (axial shift)
 
-where b are the velocity terms and Q gathers gravity, the slider's load, springs, dampers and friction. Where the crank
-speed or the shift is prescribed its acceleration is given, and its equation yields the torque T or the axial force F
-that this takes. The state of a run is the six-tuple (theta1, S1, w, v, dissipated work, supplied work).
+where b are the velocity terms and Q gathers gravity, the slider's load, springs, dampers and friction. If the crank
+speed or the shift is prescribed, its acceleration is given, and its equation yields the required torque T or axial force
+F. The state of a run is the six-tuple (theta1, S1, w, v, dissipated work, supplied work).
 
-A rigid rod without spin is, in its motion and in the forces at its ends, the same as the three masses m22, m23, m33 of
-`parameters.Constants` that act on the accelerations of its ends: each of its points moves as a fixed mean of them, and the
-transverse moment of inertia adds to m33 what its centre of mass does not account for.
+A rigid rod without spin has the same motion and the same forces at its ends as the masses m22, m23, m33 of
+`parameters.Constants`, which multiply the accelerations of its ends: each of its points moves as a fixed weighted mean of the
+ends, and the transverse moment of inertia I adds I/a2^2 to m22 and m33 and -I/a2^2 to m23.
 
-The functions are straight lines of arithmetic on floats, like those of `kinematics`.
+The functions are arithmetic on floats without branches, like those of `kinematics`.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ State = tuple[float, float, float, float, float, float]
 class Inputs(NamedTuple):
     """Inputs of the plant at one instant.
 
-    ``speed_drive`` is 1.0 where the crank acceleration is prescribed and 0.0 where the torque is; ``shift_drive`` is 1.0
-    where the axial acceleration is prescribed and 0.0 where the axial force is; ``groove`` is 1.0 where a groove in the
-    shaft makes the shift of eq 28, and then ``shift_drive`` is 0.0. Torque in N.m, accelerations in rad/s2 and m/s2, forces
+    ``speed_drive`` is 1.0 if the crank acceleration is prescribed and 0.0 if the torque is; ``shift_drive`` is 1.0 if the
+    axial acceleration is prescribed and 0.0 if the axial force is; ``groove`` is 1.0 if a groove in the shaft makes the
+    shift of eq 28, and then ``shift_drive`` is 0.0. Torque in N.m, accelerations in rad/s2 and m/s2, forces
     in N; the load acts on the slider in the direction in which its position increases.
     """
 
@@ -74,9 +74,10 @@ class Inertia(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Accelerations, drive torque and axial force, and powers, that follow from the state and the inputs.
+    """Accelerations, slider velocity, torque, axial forces and powers that follow from the state and the inputs.
 
-    ``torque`` is that of the drive on the shaft, ``force`` that of what drives or holds the shift.
+    ``torque`` is the torque of the drive on the shaft, ``force`` the axial force that drives or holds the shift, of which a
+    groove exerts ``groove_force``.
     """
 
     crank_acceleration: float
@@ -93,11 +94,11 @@ class Motion(NamedTuple):
 class Reactions(NamedTuple):
     """Forces and moments in the joints (N, N.m), by their components in the ground frame.
 
-    ``bearing`` is the force of the bearing on the crank, without axial component, ``axial`` what drives, holds and springs
-    the crank along its axis; ``bearing_moment`` is about the origin O of the ground frame, the torques of drive and groove
-    included; ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the rod; ``guide`` is
-    the force of the guide on the slider, friction, spring and load apart, and ``guide_moment`` its moment about the
-    slider pin.
+    ``bearing`` is the force of the bearing on the crank, without axial component; ``axial`` is the whole axial force on the
+    crank, of drive, groove, spring and damper; ``bearing_moment`` is about the origin O of the ground frame and includes the
+    torques of drive and groove; ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the
+    rod; ``guide`` is the force of the guide on the slider, without friction, spring and load, and ``guide_moment`` its moment
+    about the slider pin.
     """
 
     bearing: Vector
@@ -169,7 +170,7 @@ def grooved(x: State, in_groove: float, p: Constants) -> State:
 
 
 def inertia(q: Position, k: Coefficients, p: Constants) -> Inertia:
-    """Compute the inertia matrix, with the rod as masses at its ends; m23 couples the pins' velocities."""
+    """Compute the inertia matrix, with the rod as masses at its ends; m23 couples the velocities of its two pins."""
     # direction of the guide times the velocities of the crank pin for w = 1 and for v = 1
     along = -p.a1 * q.c * p.sa
     m4 = p.m33 + p.m3
@@ -236,7 +237,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
     determinant = a11 * a22 - a12 * a21
     e = (c1 * a22 - a12 * c2) / determinant
     a = (a11 * c2 - a21 * c1) / determinant
-    # what holds the shift beyond the given force, and what the speed takes beyond the given torque
+    # the force that holds the shift in addition to the given one; below, the same for the torque
     hold = (1.0 - shifting) * (m.m12 * e + m.m22 * a - r2)
     groove_force = i.groove * hold
     torque = i.torque + i.speed_drive * (m.m11 * e + m.m12 * a - r1 + pitch * hold)
@@ -250,7 +251,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
         force,
         groove_force,
         resistance(v4, p.mu, p.fc) * v4 + p.mux * v * v,
-        # the groove's force works along the shaft what its torque takes from the turning
+        # the groove adds no power: its force along the shaft gives what its torque takes
         torque * w + (force - groove_force) * v + i.load * v4,
     )
 
@@ -272,7 +273,7 @@ def reactions(q: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
     along = guide(p)
     a2 = crank_pin_acceleration(q, w, e, m.shift_acceleration, p)
     a3 = scale(m.slider_acceleration, along)
-    # what the rod's pins must supply for its motion, up to a pull along the rod
+    # the forces that the rod's pins must exert for its motion, except for a pull along the rod
     front = p.m2 * p.share
     q2 = subtract(add(scale(p.m22, a2), scale(p.m23, a3)), scale(p.m2 - front, g))
     q3 = subtract(add(scale(p.m23, a2), scale(p.m33, a3)), scale(front, g))
@@ -312,7 +313,7 @@ def kinetic_energy(m: Inertia, w: float, v: float) -> float:
 
 
 def potential_energy(q: Position, s1: float, p: Constants) -> float:
-    """Compute the energy of the springs and of gravity (J), the latter zero with every centre of mass at O."""
+    """Compute the potential energy of springs and gravity (J); that of gravity is zero with every centre of mass at O."""
     front = p.m2 * p.share
     rear = p.m2 - front
     slider = from_guide_frame(Vector(p.mx4, p.my4, p.mz4), p)
@@ -332,10 +333,10 @@ def mechanical_energy(x: State, p: Constants) -> float:
 
 
 def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
-    """Return the state after a jump of the commanded speeds, for the freedoms that they drive.
+    """Return the state after the commanded speeds that are in force have jumped to their values in the channels ``u``.
 
-    A jump is an impulse on the freedom that is driven. The other's generalised momentum has no impulse of its own and is
-    conserved; a groove takes the shift along. The work of the impulses is the change of kinetic energy.
+    A jump is an impulse on the driven freedom. No impulse acts along the other freedom, so that its generalised momentum is
+    conserved, unless a groove couples it to the crank. The work of the impulses is the change of kinetic energy.
     """
     speed, shift_velocity = u[1], u[4]
     x = grooved(x, i.groove, p)
@@ -355,7 +356,7 @@ def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
 def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
     """Return the inputs of the plant from drive.mode, axial.mode and the channels in the order of the FMI inputs.
 
-    ``axial.mode`` is 0 where the axial force is given, 1 where the axial speed is, 2 where a groove makes the shift.
+    ``axial.mode`` is 0 if the axial force is given, 1 if the axial speed is given, 2 if a groove makes the shift.
     """
     drive, axial = modes
     torque, _, acceleration, force, _, rate, load = u
@@ -389,7 +390,7 @@ def clearance(x: State, i: Inputs, p: Constants) -> float:
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     """Compute all real outputs of the FMI interface at state ``x`` under the inputs ``i``.
 
-    ``start_energy`` is the mechanical energy at the start of the run, against which the balance is kept.
+    ``start_energy`` is the mechanical energy at the start of the run (J), from which the energy balance counts.
     """
     x = grooved(x, i.groove, p)
     th, s1, w, v, dissipated, supplied = x

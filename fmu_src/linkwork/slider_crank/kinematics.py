@@ -1,11 +1,11 @@
 """Kinematics of the generalised slider-crank in closed form (Rahman, chapter II, solved without iteration).
 
 The freedoms are the crank angle ``th`` and the axial shift ``s1``. With the crank pin P2 = (a1 c, a1 s, S1) and the slider
-pin P3 = (-a4, 0, 0) - S4 k4, k4 = (0, sin alpha4, cos alpha4), the rod's length a2 = |P3 - P2| gives S4 as the sum of the
-foot of P2 on the guide and the distance h between them.
+pin P3 = (-a4, 0, 0) - S4 k4, k4 = (0, sin alpha4, cos alpha4), the rod's length a2 = |P3 - P2| gives S4: the position of the
+foot of P2 on the guide plus the distance h of P3 from that foot.
 
-The functions are straight lines of arithmetic on floats: no branches on the state, no NumPy, no I/O. The same code runs
-as it is inside the FMU, compiled under Numba, and on dual numbers and arrays (`analysis.numerics.tracing`).
+The functions are arithmetic on floats: no branches on the state, no NumPy, no I/O. The same code runs as it is inside the
+FMU, compiled under Numba, and on dual numbers and arrays (`analysis.numerics.tracing`).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from .vectors import Vector, cross, dot, scale
 
 
 class Position(NamedTuple):
-    """A configuration: cosine and sine of the crank angle, the crank pin's coordinates across the guide, slider position.
+    """A configuration: cosine and sine of the crank angle, positions of the pins relative to the guide (m).
 
-    ``f, g`` are those of P2 from the guide along i and j of frame 4; ``h`` is how far the slider pin is beyond their foot
-    along the guide, ``s4`` the slider position.
+    ``f, g`` are the coordinates of the crank pin from the guide along i and j of frame 4; ``h`` is the distance of the slider
+    pin from the crank pin's foot on the guide, ``s4`` the slider position.
     """
 
     c: float
@@ -34,7 +34,7 @@ class Position(NamedTuple):
 
 
 class Groove(NamedTuple):
-    """Shift imposed by a groove (m), and its first and second derivatives by the crank angle (m/rad, m/rad2)."""
+    """Shift imposed by a groove (m), and its first and second derivatives with respect to the crank angle (m/rad, m/rad2)."""
 
     shift: float
     pitch: float
@@ -59,7 +59,7 @@ def assembly_square(th: float, s1: float, p: Constants) -> float:
 
 
 def apart(x: Sequence[float], p: Constants) -> tuple[float, float, float]:
-    """Return the distance of the crank pin from the guide, the rod's length, and by how much that is too short (m)."""
+    """Return the distance of the crank pin from the guide, the rod's length, and by how much the rod is too short (m)."""
     distance = sqrt(p.a2 * p.a2 - assembly_square(x[0], x[1], p))
     return distance, p.a2, distance - p.a2
 
@@ -120,8 +120,8 @@ def crank_pin_acceleration(q: Position, w: float, e: float, a: float, p: Constan
 
 def centripetal(q: Position, k: Coefficients, w: float, v: float, p: Constants) -> float:
     """Compute the slider acceleration for theta1'' = S1'' = 0 (m/s2): loop closure differentiated twice."""
-    # r.r'' + r'.r' = 0 with the rod's vector r and its rate r' = -S4' k4 - v2; component by component, since every step of
-    # a run asks for it many times
+    # r.r'' + r'.r' = 0 with the rod's vector r and its rate r' = -S4' k4 - v2; component by component for speed, since every
+    # step of a run calls this many times
     slide = k.kth * w + k.ks * v
     rate_x = p.a1 * q.s * w
     rate_y = -slide * p.sa - p.a1 * q.c * w
@@ -131,7 +131,7 @@ def centripetal(q: Position, k: Coefficients, w: float, v: float, p: Constants) 
 
 
 def groove(th: float, p: Constants) -> Groove:
-    """Compute the shift imposed by the groove and its first two derivatives by crank angle: S1 = SS1 sin(alpha theta1), eq 28.
+    """Compute the shift S1 = SS1 sin(alpha theta1) of the groove, eq 28, and its first two derivatives by crank angle.
 
     Eq 28a prints S1 for SS1.
     """
@@ -169,7 +169,7 @@ def to_crank_frame(a: Vector, q: Position) -> Vector:
 
 
 def to_rod_frame(a: Vector, q: Position, p: Constants) -> Vector:
-    """Components in frame 3, fixed to the rod's line, of a vector given in the ground frame.
+    """Return the components in frame 3, fixed to the rod's line, of a vector in the ground frame.
 
     i is along the rod from crank pin to slider pin, j perpendicular to it and to the crank axis.
 

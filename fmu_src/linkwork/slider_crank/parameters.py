@@ -19,7 +19,7 @@ class Constants(NamedTuple):
 
     ``ca, sa`` are cosine and sine of the twist alpha4. ``m22, m23, m33`` are the rod's masses at its ends: its kinetic
     energy is half of m22 v2.v2 + 2 m23 v2.v3 + m33 v3.v3, with v2, v3 the velocities of crank pin and slider pin;
-    ``share`` is the distance of its centre of mass from the crank pin as a share of its length.
+    ``share`` is the distance of its centre of mass from the crank pin divided by its length.
     ``iz`` is the crank's moment of inertia about its axis, ``pxz, pyz`` its products of inertia, ``mx1, my1, mz1`` its mass
     times the coordinates of its centre of mass in frame 2; ``mx4, my4, mz4`` the slider's from the slider pin in frame 4.
     """
@@ -61,7 +61,7 @@ class Constants(NamedTuple):
 
 
 def _crank_inertia_of_mass(p: SliderCrankParameters) -> float:
-    # the digits that a printed moment of inertia may lack
+    # with an allowance for the rounding of a printed moment of inertia
     return p.crank_mass * (p.crank_cog_x * p.crank_cog_x + p.crank_cog_y * p.crank_cog_y) * (1.0 - 1e-12)
 
 
@@ -107,13 +107,13 @@ class SliderCrankParameters(CheckedParameters):
 
     The crank's centre of mass is given in frame 2 and its inertia about the axes of that frame: ``crank_inertia`` about the
     axis of rotation, Steiner's share included, and the products of inertia, the integrals of x z and y z over its mass. The
-    rod's mass is symmetric about the line of its joints: only then is its spin about that line, which two ball joints leave
-    free, idle (it is taken as none, the rod's moment of inertia about the line is of no effect). ``rod_inertia`` is that
-    about a transverse axis through the centre of mass, ``rod_cog_distance`` is measured from the crank pin. The slider's
-    centre of mass is given in frame 4 from the slider pin.
+    rod's mass must be symmetric about the line of its joints. Only then its spin about that line, which two ball joints leave
+    free, has no effect; the spin is taken as zero, and the rod's moment of inertia about the line is not needed.
+    ``rod_inertia`` is about a transverse axis through the centre of mass, ``rod_cog_distance`` is measured from the crank pin.
+    The slider's centre of mass is given in frame 4 from the slider pin.
 
-    ``groove_amplitude`` and ``groove_ratio`` are SS1 and alpha of eq 28, S1 = SS1 sin(alpha theta1), where a groove in the
-    crank shaft makes the shift.
+    ``groove_amplitude`` and ``groove_ratio`` are SS1 and alpha of eq 28, S1 = SS1 sin(alpha theta1), the shift that a groove in
+    the crank shaft makes.
 
     Raises
     ------
@@ -202,8 +202,8 @@ class SliderCrankParameters(CheckedParameters):
 class InitialState(CheckedState):
     """Initial state of a run: rad, rad/s, m, m/s.
 
-    A commanded speed at the start takes the place of ``crank_speed``, a commanded axial speed that of ``shift_velocity``;
-    a groove determines shift and velocity.
+    A commanded crank speed at the start replaces ``crank_speed``, a commanded axial speed replaces ``shift_velocity``; a groove
+    determines shift and axial velocity.
 
     Raises
     ------

@@ -14,25 +14,25 @@ class Vector(NamedTuple):
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """Return a + b."""
     return Vector(a.x + b.x, a.y + b.y, a.z + b.z)
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """a - b."""
+    """Return a - b."""
     return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 def scale(factor: float, a: Vector) -> Vector:
-    """factor a."""
+    """Return factor times a."""
     return Vector(factor * a.x, factor * a.y, factor * a.z)
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """a . b."""
+    """Return a . b."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
+    """Return a x b."""
     return Vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
