@@ -1,7 +1,7 @@
 """Plots and animations: the only package that draws.
 
-``figures.plot(result)`` and ``figures.animate(result, path)`` draw any result that has a picture. The names are those of
-``__init__.pyi``; each is imported from its module when it is first used.
+``figures.plot(result)`` and ``figures.animate(result, path)`` draw any result that has a picture. ``__init__.pyi`` lists
+the public names; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Writing animations."""
+"""Write animations as GIF files."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .style import Figure
 
 
 def check_frames(frames: int) -> None:
-    """Make sure that there are frames enough to move; raises InputError if there are not."""
+    """Raise InputError if an animation has fewer than two frames."""
     if frames < 2:
         raise InputError(f"an animation in {frames} frames: there must be at least 2")
 
 
 @contextmanager
 def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tuple[Path, Callable[[], None]]]:
-    """Write a GIF: the context gives its path, and a function that adds the figure as it then is.
+    """Write a GIF: the context yields its path, and a function that adds the current state of the figure as a frame.
 
-    A command that may not write over the file writes one beside it. The figure is laid out once, for the first picture: its
-    panels must not move from picture to picture.
+    If the command may not overwrite the file, the GIF gets another name beside it. The figure is laid out once, for the first
+    frame, so that its panels do not move between frames.
     """
     path = free_path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Bode, pole and zero plots of linear systems, from python-control's data."""
+"""Bode diagrams and pole-zero maps of linear systems, from python-control's data."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ def plot_bode(
     margins: bool = False,
     title: str = "",
 ) -> Figure:
-    """Plot magnitude and phase of systems with one input and one output over each other.
+    """Plot magnitude and phase of several systems, with one input and one output each, in one Bode diagram.
 
     Parameters
     ----------
     systems : mapping
-        What the legend calls it to a linear system of python-control.
+        Linear systems of python-control, by their names in the legend.
     unit : str
-        Of the output over the input; the magnitude is not in decibels.
+        Unit of output/input; the magnitude is not in decibels.
     frequencies : array_like, shape (n,), optional
-        rad/s; by default python-control's choice for all of them.
+        rad/s; by default python-control chooses them for all systems together.
     margins : bool
-        Of systems that are open loops: mark gain and phase margins, and state them in the legend.
+        Whether to mark gain and phase margins and state them in the legend; the systems must be open loops.
     title : str
     """
     responses = control.frequency_response(list(systems.values()), frequencies)
@@ -56,11 +56,11 @@ def plot_bode(
             # python-control squeezes the axes of one input and one output away
             value = np.asarray(response.frdata)[0, 0]
             phase = np.degrees(np.unwrap(np.angle(value)))
-            # from the branch in which the first value is within half a turn
+            # shifted by whole turns so that the first value is within half a turn
             phase -= 360.0 * round(phase[0] / 360.0)
             words = label
             if margins:
-                found = _Margins.of(system)
+                found = _Margins.of_loop(system)
                 words = ": ".join(text for text in (label, found.report()) if text)
                 _mark_margins(above, below, found, response.omega, phase, look["color"])
             above.loglog(response.omega, np.abs(value), label=words or None, **look)
@@ -80,15 +80,19 @@ def plot_bode(
 
 
 class _Margins(NamedTuple):
-    """Margins of an open loop, as pairs (margin, frequency in rad/s): factors on the gain, and angles in deg."""
+    """Stability margins of an open loop.
+
+    ``gains`` has pairs (gain factor, frequency in rad/s): the nearest below 1 and the nearest above 1, as far as there are any;
+    ``phase`` is (phase margin in deg, frequency); ``stable`` says whether the closed loop is stable without changes.
+    """
 
     gains: tuple[tuple[float, float], ...] = ()
     phase: tuple[float, float] | None = None
     stable: bool = True
 
     @classmethod
-    def of(cls, system: Any) -> _Margins:
-        """Return the least gain factors up and down and the least angle at which a stable closed loop becomes unstable."""
+    def of_loop(cls, system: Any) -> _Margins:
+        """Find the nearest gain factors and the smallest change of phase with which the closed loop becomes unstable."""
         poles = control.feedback(system, 1).poles()
         if not np.all(np.abs(poles) < 1.0 if system.isdtime(strict=True) else poles.real < 0.0):
             return cls(stable=False)
@@ -130,7 +134,7 @@ def plot_linear_model(
 ) -> Figure:
     """Plot magnitude and phase of a linear model from one input to one output, by FMI names; see `plot_bode`.
 
-    By default from the force on the last free freedom to the last free coordinate.
+    By default the input is the force on the last free coordinate, and the output is that coordinate.
     """
     units = {v.name: v.unit for v in model.mechanism.variables}
     source = model.force_channel()[0] if input is None else input
@@ -139,17 +143,17 @@ def plot_linear_model(
     return plot_bode({"": model.to_state_space((target,), (source,))}, unit=f"{units[target]}/{per}", **options)
 
 
-def _of(label: str, what: str) -> str:
+def _legend_entry(label: str, what: str) -> str:
     return f"{label}: {what}" if label else what
 
 
 def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
-    """Plot poles (crosses) and zeros (circles) of systems, in the complex plane with one scale on both axes.
+    """Plot poles (crosses) and zeros (circles) of systems in the complex plane, with one scale on both axes.
 
     Parameters
     ----------
     systems : mapping
-        What the legend calls it to a linear system of python-control.
+        Linear systems of python-control, by their names in the legend.
     """
     with styled():
         figure = Figure(figsize=(6.4, 5.0))
@@ -159,13 +163,17 @@ def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
         for number, (label, system) in enumerate(systems.items()):
             points = control.pole_zero_map(system)
             colour = COLOURS[number % len(COLOURS)]
-            # rings about each other where systems have one place in common
+            # systems with a common pole or zero show rings of different sizes there
             size = DOT * (1.0 + 0.5 * number)
             look: dict[str, Any] = {"linestyle": "none", "color": colour, "zorder": 3, "markersize": size}
             poles, zeros = np.asarray(points.poles), np.asarray(points.zeros)
-            axis.plot(poles.real, poles.imag, marker="x", label=_of(label, "poles"), markeredgewidth=LINE, **look)
+            axis.plot(
+                poles.real, poles.imag, marker="x", label=_legend_entry(label, "poles"), markeredgewidth=LINE, **look
+            )
             if len(zeros):
-                axis.plot(zeros.real, zeros.imag, marker="o", fillstyle="none", label=_of(label, "zeros"), **look)
+                axis.plot(
+                    zeros.real, zeros.imag, marker="o", fillstyle="none", label=_legend_entry(label, "zeros"), **look
+                )
         axis.set_xlabel("real part [1/s]")
         axis.set_ylabel("imaginary part [rad/s]")
         axis.set_aspect("equal", adjustable="datalim")

@@ -1,6 +1,6 @@
-"""Curves over time, speed or anything else, in panels: what a picture has, and how Matplotlib draws it.
+"""Describe pictures of curves in panels, and draw them with Matplotlib.
 
-A `Picture` is a description: `draw` makes a figure of it, `html.to_page` a page with values under the pointer.
+A `Picture` is a description: `draw` makes a figure of it, `html.to_html` a page with values under the pointer.
 """
 
 from __future__ import annotations
@@ -44,10 +44,12 @@ _Arguments = ParamSpec("_Arguments")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One line of a panel: points (n,), what the legend calls it, and how it looks where that is not left to the panel.
+    """One curve of a panel.
 
-    A marker between dollars, such as "$2$", is the letters themselves; without ``cut`` a marker is whole at the edge of the
-    axes. What ``hover`` has by its name with unit, each of length n, is beside x and y under the pointer.
+    ``x`` and ``y`` are points (n,) in the units of the axes, ``label`` is the entry of the legend, ``order`` the drawing order
+    (Matplotlib's zorder); a look that is None is chosen by the panel. A marker between dollars, such as "$2$", is drawn as
+    these letters. With ``cut`` markers are cut at the edge of the axes. ``hover`` has arrays (n,), by name with unit, that a
+    page shows under the pointer beside x and y.
     """
 
     x: ArrayLike
@@ -65,7 +67,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shade:
-    """A range along x, shaded over the whole height; ranges with one label look alike, by their number in `style.SHADES`."""
+    """A range along x, shaded over the whole height; ``number`` selects colour and hatching from `style.SHADES`."""
 
     low: float
     high: float
@@ -75,7 +77,7 @@ class Shade:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label:
-    """A text at a point, put where it covers nothing."""
+    """A text with a line to a point; the text is moved to a place where it covers as little as possible."""
 
     x: float
     y: float
@@ -84,7 +86,7 @@ class Label:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrow:
-    """An arrow along y."""
+    """A vertical arrow at x, from ``begin`` to ``end`` along y."""
 
     x: float
     begin: float
@@ -102,20 +104,20 @@ class Panel:
     curves : sequence of Curve
         Drawn in the order of `COLOURS`.
     verticals : mapping
-        Dotted vertical lines: name to place along x. The names are put where they cover no curve.
+        Places along x of dotted vertical lines, by name; the names are written where they cover as little as possible.
     dashed : sequence of float
         Places along x of dashed lines without a name.
     legend : str, optional
-        Heading of the legend; there is one if any curve has a label.
+        Heading of the legend, which is drawn if any curve has a label.
     legend_at : str
-        Where it goes, in Matplotlib's words, or "outside", to the right of the axes, or "above" them.
+        Place of the legend: one of Matplotlib's, or "outside" (to the right of the axes), or "above" (above the axes).
     x_range, y_range : (float, float), optional
     logarithmic : str
         Axes on a logarithmic scale: "", "x", "y" or "xy".
     equal : bool
-        One length on both axes.
+        Whether both axes have one scale.
     filled : sequence of sequence of ndarray, shape (n, 2)
-        Areas to shade, each the closed boundaries it has; holes are kept free.
+        Areas to shade, each as the list of its closed boundaries; clockwise ones are holes.
     x_ticks : sequence of float, optional
     shades : sequence of Shade
     labels : sequence of Label
@@ -143,13 +145,13 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """What a picture has: `draw` makes a figure of it.
+    """Description of a picture, from which `draw` makes a figure.
 
     Attributes
     ----------
     parts : sequence of Panel or HeatMap
     title : str
-        Above all of it; a figure of the thesis by its number.
+        Title of the figure; for a figure of the thesis its number.
     columns : int
         Parts side by side.
     size : (float, float)
@@ -157,7 +159,7 @@ class Picture:
     notes : sequence of str
         Sentences at the foot.
     heights : sequence of float
-        Of the rows, relative to the height of a part; none for rows of one height. They have one x axis then.
+        Heights of the rows relative to ``size``; the rows then share one x axis. Empty for rows of equal height.
     """
 
     parts: Sequence[Any]
@@ -182,7 +184,7 @@ def plot_curves(
     ----------
     panels : sequence of Panel
     title : str
-        Above all of it; a figure of the thesis by its number.
+        Title of the figure; for a figure of the thesis its number.
     columns : int
         Panels side by side.
     size : (float, float)
@@ -194,7 +196,10 @@ def plot_curves(
 
 
 def pictured(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
-    """Register what describes the picture of a kind of result, by its first argument, and return what plots it."""
+    """Register a function that returns the picture of a result, and return a function that draws this picture as a figure.
+
+    Both are registered by the type of their first argument, with `dispatch.picture` and `dispatch.plot`.
+    """
 
     @wraps(of)
     def plotted(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> Figure:
@@ -229,7 +234,7 @@ def draw(picture: Picture) -> Figure:
 
 
 def resize(figure: Figure, width: float, height: float) -> Figure:
-    """Lay a figure that was drawn out anew at another size (inches)."""
+    """Change the size of a drawn figure (inches) and lay it out again."""
     with styled():
         figure.set_layout_engine("constrained")
         figure.set_size_inches(width, height)
@@ -239,7 +244,7 @@ def resize(figure: Figure, width: float, height: float) -> Figure:
 
 @singledispatch
 def draw_part(part: Any, figure: Figure, axis: Axes) -> None:
-    """Draw a part of a picture on axes of its own; each kind of part registers how."""
+    """Draw a part of a picture on the given axes; a function is registered for each kind of part."""
     raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
 
 
@@ -249,7 +254,7 @@ def _(panel: Panel, figure: Figure, axis: Axes) -> None:
 
 
 def _name_few_decades(axis: Axis) -> None:
-    """Write ticks at 1, 2 and 5 as plain numbers where a logarithmic axis has less than two decades."""
+    """Put plain numbers at 1, 2 and 5 times powers of ten if a logarithmic axis covers less than two decades."""
     low, high = axis.get_view_interval()
     if 0.0 < low < high < 100.0 * low:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -259,7 +264,7 @@ def _name_few_decades(axis: Axis) -> None:
 
 def draw_panel(axis: Axes, panel: Panel) -> None:
     for boundaries in panel.filled:
-        # boundaries that run clockwise are holes in the others
+        # clockwise boundaries are holes in the other ones
         outline = Outline.make_compound_path(
             *(Outline(np.vstack([ring, ring[:1]]), closed=True) for ring in boundaries)
         )
@@ -306,7 +311,7 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
 
 
 def shades_by_label(panel: Panel) -> list[tuple[str, int, list[Shade]]]:
-    """Return the shades of a panel by entry of the legend: label, look, ranges."""
+    """Return the shades of a panel grouped by label and number: a list of (label, number, shades)."""
     kinds = dict.fromkeys((shade.label, shade.number) for shade in panel.shades)
     return [(*kind, [shade for shade in panel.shades if (shade.label, shade.number) == kind]) for kind in kinds]
 
@@ -325,7 +330,7 @@ def _draw_curve(axis: Axes, curve: Curve, colour: str) -> None:
         linewidth=curve.width,
         markeredgewidth=0.3 if letters else THIN if curve.hollow else LINE,
         zorder=curve.order or (3 if curve.marker else 2),
-        # letters on a line are read on a ground of their own
+        # letters on a line have a white outline, so that they can be read
         clip_on=curve.cut,
         path_effects=[withStroke(linewidth=3.0, foreground="white")] if letters else None,
     )

@@ -1,4 +1,4 @@
-"""A free decay: the record, its turning points and the envelope that fits them."""
+"""Plot a free decay: the record, its turning points and the fitted envelope."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def plot_decay(
     ----------
     decay : Decay
     record : (array_like, array_like), optional
-        Times (s) and positions that it was found from.
+        Times (s) and positions from which the decay was found.
     unit : str
-        Of the positions.
+        Unit of the positions.
     title : str
     """
     curves = [] if record is None else [Curve(x=record[0], y=record[1], label="record", colour=COLOURS[0])]

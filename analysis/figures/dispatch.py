@@ -6,8 +6,8 @@ The module that draws a kind of result registers its function::
     def plot_outputs(run: Trajectory, names: Sequence[str] = ..., *, title: str = "") -> Figure:
         ...
 
-and keeps the function's own name for those who want its signature; users call ``figures.plot(run, title="a run")``. The
-modules that draw are imported when a result comes that nothing imported so far can draw.
+Users call ``figures.plot(run, title="a run")``; the registered function keeps its own name, under which its signature is
+documented. Modules that draw are imported one after another until one of them can draw the result.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from linkwork.errors import LinkworkError
 from ..mechanisms import MECHANISMS as REGISTRY
 from ..run import Trajectory
 
-#: The modules that register what they draw, those that import fastest first.
+#: The modules that register functions for results, in order of import time.
 MODULES = (
     "runs",
     "linkage",
@@ -44,14 +44,14 @@ MODULES = (
     "scheme",
     "systems",
 )
-#: Those that register the picture of a mechanism.
+#: The modules that register functions for `draw_mechanism`.
 MECHANISMS = ("linkage", "slider_crank_picture")
-#: Samples of a path.
+#: Greatest number of samples over which the path of a point is drawn.
 _TRACED = 20_000
 
 
 class DrawingError(LinkworkError, TypeError):
-    """There is no picture of this type of result; ``kind`` is the type."""
+    """Error for a result whose type has no picture; ``kind`` is the type."""
 
     def __init__(self, kind: type, picture: str) -> None:
         self.kind = kind
@@ -59,7 +59,10 @@ class DrawingError(LinkworkError, TypeError):
 
 
 def _find(pictures: Any, kind: type, modules: Sequence[str] = MODULES) -> Callable[..., Any] | None:
-    """Return the function that draws results of a type from the first module that has one; None if there is none."""
+    """Return the function registered for a type of result; None if there is none.
+
+    ``pictures`` is a single-dispatch function such as `plot`; ``modules`` are imported until one registers the type.
+    """
     nothing = pictures.dispatch(object)
     for module in modules:
         import_module(f".{module}", __package__)
@@ -69,7 +72,7 @@ def _find(pictures: Any, kind: type, modules: Sequence[str] = MODULES) -> Callab
     return None
 
 
-def _registered(pictures: Any, result: object, name: str) -> Callable[..., Any]:
+def _registered_function(pictures: Any, result: object, name: str) -> Callable[..., Any]:
     function = _find(pictures, type(result))
     if function is None:
         raise DrawingError(type(result), name)
@@ -85,33 +88,33 @@ def plot(result: Any, *details: Any, **options: Any) -> Figure:
     result : object
         What an analysis returned.
     *details, **options
-        What the picture of this type takes, such as ``title``: the function registered for the type
-        (``plot.dispatch(type(result))``) documents them.
+        Arguments of the function registered for this type, such as ``title``; ``plot.dispatch(type(result))`` documents
+        them.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Not shown and not written: `analysis.files` saves it.
+        It is not shown and not written to a file; `analysis.files` saves it.
 
     Raises
     ------
     DrawingError
-        If nothing draws this type.
+        If this type has no picture.
     """
-    figure: Figure = _registered(plot, result, "plot")(result, *details, **options)
+    figure: Figure = _registered_function(plot, result, "plot")(result, *details, **options)
     return figure
 
 
 @singledispatch
 def picture(result: Any, *details: Any, **options: Any) -> Any:
-    """Describe the picture of a result: the panels, curves and marks that `plot` draws and `to_html` writes.
+    """Return the description of a result's picture: panels, curves and marks that `plot` draws and `to_html` writes.
 
     Parameters
     ----------
     result : object
         A response, a branch, a chart, basins.
     *details, **options
-        Those of `plot`.
+        As for `plot`.
 
     Returns
     -------
@@ -120,9 +123,9 @@ def picture(result: Any, *details: Any, **options: Any) -> Any:
     Raises
     ------
     DrawingError
-        If the picture of this type has no description, or there is none.
+        If this type has no picture, or its picture has no description.
     """
-    return _registered(picture, result, "picture to be described")(result, *details, **options)
+    return _registered_function(picture, result, "picture to be described")(result, *details, **options)
 
 
 @singledispatch
@@ -132,49 +135,49 @@ def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Pat
     Parameters
     ----------
     result : object
-        What moves: a solution of the synthesis, a mechanism.
+        A solution of the synthesis, or a mechanism.
     path : str or Path
-        The file to write; folders that are missing are made.
+        The file to write; missing folders are made.
     *details, **options
-        What the animation of this type takes, such as ``frames``: see ``animate.dispatch(type(result))``.
+        Arguments of the function registered for this type, such as ``frames``: see ``animate.dispatch(type(result))``.
 
     Raises
     ------
     DrawingError
-        If nothing animates this type.
+        If this type has no animation.
     """
-    written: Path = _registered(animate, result, "animation")(result, path, *details, **options)
+    written: Path = _registered_function(animate, result, "animation")(result, path, *details, **options)
     return written
 
 
 @singledispatch
 def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
-    """Draw a mechanism on axes as it is at the start of a run, with the paths of its points over the run.
+    """Draw a mechanism at the start of a run, with the paths of its points over the run.
 
     Returns
     -------
     str
-        What is drawn, for a caption.
+        Caption of the drawing.
 
     Raises
     ------
     DrawingError
         If there is no picture of this mechanism: see `has_picture`.
     """
-    if not _from_drawing(parameters):
+    if not _has_planar_drawing(parameters):
         raise DrawingError(type(parameters), "picture")
     caption: str = import_module(".scheme", __package__).draw_run(parameters, axis, run)
     return caption
 
 
-def _from_drawing(parameters: object) -> bool:
-    """Return whether parameters are of a mechanism that says how it is drawn, in the plane."""
+def _has_planar_drawing(parameters: object) -> bool:
+    """Return whether the mechanism of these parameters has a planar `Drawing`."""
     kind = next((m for m in REGISTRY.values() if isinstance(parameters, m.parameters)), None)
     return kind is not None and kind.drawing is not None and kind.drawing.planar
 
 
 def last_samples(run: Trajectory) -> tuple[slice, str]:
-    """Return the samples over which paths of a run are drawn, in words too: of a long run the last ones."""
+    """Return the samples of a run over which paths are drawn (of a long run only the last ones), and words for them."""
     if len(run) <= _TRACED:
         return slice(None), "over the run"
     return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"
@@ -182,4 +185,4 @@ def last_samples(run: Trajectory) -> tuple[slice, str]:
 
 def has_picture(parameters: object) -> bool:
     """Return whether `draw_mechanism` draws the mechanism of these parameters."""
-    return _find(draw_mechanism, type(parameters), MECHANISMS) is not None or _from_drawing(parameters)
+    return _find(draw_mechanism, type(parameters), MECHANISMS) is not None or _has_planar_drawing(parameters)

@@ -1,4 +1,4 @@
-"""Pictures of rigid-body guidance in closed form: the poses, every dyad and every four-bar, or the curves of four poses.
+"""Plot rigid-body guidance in closed form: the poses with every dyad and four-bar, or the Burmester curves of four poses.
 
 Lengths are shown in mm, angles in degrees.
 """
@@ -36,17 +36,17 @@ from .style import (
 )
 
 MM_PER_METRE = 1e3
-#: Arms of the mark of a pose, as a share of the poses' size.
+#: Length of the long arm that marks a pose, relative to the size of the poses.
 ARM = 0.09
-#: The least length of an arm beside curves, as a share of the view.
+#: Least length of this arm beside curves, relative to the width of the view.
 _ARM_IN_VIEW = 0.045
-#: Of a four-bar, what is in view: so many times the poses' size about them.
+#: Width of the view about the poses, relative to their size.
 VIEW = 2.2
 
 
 @plot.register
 def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
-    """Plot the poses with every dyad, and beside them every four-bar with its defects."""
+    """Plot the poses, every dyad through them, and below each four-bar of two dyads with its defects."""
     count = len(found.solutions)
     columns = 3
     rows = ceil(count / columns)
@@ -84,7 +84,10 @@ def plot_guidance(found: Guidance, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_guidance_map(found: GuidanceMap, *, title: str = "") -> Figure:
-    """Plot the poses with the curves of pivots and points and the best linkage, and how good each pivot of a crank can be."""
+    """Plot the curves of fixed pivots and body points with the best linkage, and beside them the quality of each crank pivot.
+
+    The quality is the largest least transmission angle that any rocker gives with this crank.
+    """
     with styled():
         figure = Figure(figsize=(10.4, 5.4))
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -130,13 +133,13 @@ def _parts(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _poses(found: Guidance | GuidanceMap) -> tuple[NDArray[np.complex128], NDArray[np.float64], float]:
-    """Return places (mm), directions (rad) and the size of the poses (mm)."""
+    """Return positions of the poses (complex, mm), their angles (rad), and the diagonal of the box about them (mm)."""
     points = MM_PER_METRE * np.asarray(found.task.points)
     return points @ np.array([1.0, 1j]), np.asarray(found.task.angle), float(np.hypot(*np.ptp(points, axis=0)))
 
 
 def _view(found: GuidanceMap) -> tuple[complex, complex]:
-    """Return opposite corners of a square that holds the poses, what is near them, and the best linkage."""
+    """Return two opposite corners (complex, mm) of a square that contains the poses with a margin, and the best linkage."""
     places, _, size = _poses(found)
     middle = complex(np.mean(places))
     held = [middle - 0.5 * VIEW * size * (1 + 1j), middle + 0.5 * VIEW * size * (1 + 1j)]
@@ -151,7 +154,7 @@ def _view(found: GuidanceMap) -> tuple[complex, complex]:
 
 
 def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = False, arm: float = 0.0) -> None:
-    """Draw each pose as a mark with a long arm along the body, of this length (mm) or more, and a short one across."""
+    """Draw each pose as an angle: a long arm along the body, at least ``arm`` mm long, and a short arm across."""
     places, angles, size = _poses(found)
     for number, (place, angle) in enumerate(zip(places, angles), start=1):
         along = max(arm, ARM * size) * np.exp(1j * angle)
@@ -163,16 +166,16 @@ def _draw_poses(axis: Axes, found: Guidance | GuidanceMap, *, numbered: bool = F
 
 
 def _pins(solution: Solution) -> dict[str, complex]:
-    """Return the pins in the first pose (mm)."""
+    """Return the pins of a four-bar in the first pose, by name (complex, mm)."""
     assert solution.evaluation.rotation is not None
     pins = solution.linkage.pins(float(solution.evaluation.rotation[0]))
     return {name: MM_PER_METRE * complex(*place) for name, place in pins.items()}
 
 
 def _draw_links(axis: Axes, solution: Solution, dyads: Sequence[Dyad] = (), *, named: bool = False) -> None:
-    """Draw the links in the first pose; crank and rocker in the colours of the ``dyads`` that they are, the crank thick.
+    """Draw the links in the first pose, the crank thick.
 
-    With ``named`` the legend has them.
+    With ``dyads`` crank and rocker have the colours of their dyads; with ``named`` they have entries in the legend.
     """
     names = ("crank", "rocker", "body with its point, pose 1", "fixed pivots") if named else (None,) * 4
     pins = _pins(solution)

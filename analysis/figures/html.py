@@ -1,6 +1,6 @@
-"""Pictures as pages of HTML with values under the pointer, by Plotly, from the descriptions that Matplotlib draws.
+"""Write pictures as HTML pages that show values under the pointer, with Plotly.
 
-A page holds all that it needs, Plotly's script too: it loads nothing, and opens without a network.
+A page contains Plotly's script and all data, so that it opens without a network.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from .curves import Curve, Panel, Picture, shades_by_label
 from .dispatch import picture
 from .style import COLOURS, LINE, MARKED, SHADE, SHADES
 
-#: Pixels to the inch, height of the title, margins left and right of a panel, width of the legend, and gap below a panel.
+#: Pixels per inch; in pixels: height of the title, margins left and right of a panel, width of the legend, gap below a panel.
 _PIXELS, _TITLE, _LEFT, _RIGHT, _LEGEND, _GAP = 105, 50, 85, 85, 300, 55
 #: Height of a label above its point, and of a line of text (pixels); share of the axis within which labels are stacked.
 _ABOVE, _LINE_HEIGHT, _CLOSE = 35, 15, 0.08
-#: Samples of a scale of colours.
+#: Number of colours by which a colour scale is described.
 _COLOURS = 65
 #: Plotly's names of Matplotlib's lines and markers.
 _DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
@@ -50,31 +50,31 @@ def to_html(result: Any, *details: Any, **options: Any) -> str:
     result : object
         A response, a branch, a stability chart, basins; or a `Picture`.
     *details, **options
-        Those of `plot`.
+        As for `plot`.
 
     Returns
     -------
     str
-        A page of some 5 MB that loads nothing from anywhere.
+        The page, of some 5 MB.
 
     Raises
     ------
     MissingLibraryError
         If Plotly is not installed.
     DrawingError
-        If the picture of this type has no description, or there is none.
+        If this type has no picture, or its picture has no description.
     """
     require("plotly")
     from plotly.offline import get_plotlyjs
 
     described = result if isinstance(result, Picture) else picture(result, *details, **options)
-    # within a script "</" would end it
+    # "</" would end the script
     figure = json.dumps(to_plotly(described), allow_nan=False).replace("</", "<\\/")
     return _PAGE.format(title=escape(described.title), script=get_plotlyjs(), figure=figure)
 
 
 def to_plotly(picture: Picture) -> dict[str, Any]:
-    """Return a picture in Plotly's form: traces with their values, and the layout."""
+    """Return a picture as Plotly's dictionary of traces (``data``), ``layout`` and ``config``."""
     columns = picture.columns
     heights = list(picture.heights) or [1.0] * ceil(len(picture.parts) / columns)
     figure = _Figure(picture, heights)
@@ -87,7 +87,7 @@ def to_plotly(picture: Picture) -> dict[str, Any]:
 
 
 class _Figure:
-    """Traces and layout as they are put together."""
+    """Plotly's traces and layout of a picture, to which `_Axes` adds; ``heights`` are relative heights of the rows."""
 
     def __init__(self, picture: Picture, heights: Sequence[float]) -> None:
         self.columns, self.shared = picture.columns, bool(picture.heights)
@@ -122,14 +122,14 @@ class _Figure:
 
 
 class _Axes:
-    """A pair of axes: what is added to them."""
+    """One pair of axes of a figure, with methods that add traces, shapes and arrows to it."""
 
     def __init__(self, figure: _Figure, number: int) -> None:
         row, column = divmod(number, figure.columns)
         self.figure, self.number = figure, number
         self.suffix = str(number + 1) if number else ""
         top = figure.height - sum(figure.rows[:row])
-        # in parts of the whole
+        # as shares of the figure's height
         self.bottom, self.top = (top - figure.rows[row] + _GAP) / figure.height, top / figure.height
         whole = figure.width * figure.columns
         across = [(column * figure.width + _LEFT) / whole, ((column + 1) * figure.width - _RIGHT) / whole]
@@ -140,21 +140,21 @@ class _Axes:
             self.x["matches"] = "x"
         figure.layout |= {f"xaxis{self.suffix}": self.x, f"yaxis{self.suffix}": self.y}
 
-    def trace(self, **trace: Any) -> None:
+    def add_trace(self, **trace: Any) -> None:
         """Add a trace."""
         self.figure.traces.append(trace | {"xaxis": f"x{self.suffix}", "yaxis": f"y{self.suffix}"})
 
-    def legend(self, title: str) -> dict[str, Any]:
-        """Return the group of the legend for a title."""
+    def legend_group(self, title: str) -> dict[str, Any]:
+        """Return the entries of a trace that put it into the legend group of these axes, under a title."""
         return {"legendgroup": str(self.number), "legendgrouptitle": {"text": _line(title)}}
 
-    def over(self, low: float, high: float, **shape: Any) -> None:
-        """Add a shape over the whole height, between two places."""
+    def add_shape(self, low: float, high: float, **shape: Any) -> None:
+        """Add a shape over the whole height of the axes, from ``low`` to ``high`` along x."""
         box = {"x0": low, "x1": high, "y0": 0, "y1": 1, "xref": f"x{self.suffix}", "yref": f"y{self.suffix} domain"}
         self.figure.layout["shapes"].append(box | shape)
 
-    def note(self, x: float, y: float, text: str = "", **look: Any) -> None:
-        """Add an arrow to a point, from a text or from another place along y."""
+    def add_arrow(self, x: float, y: float, text: str = "", **look: Any) -> None:
+        """Add an arrow to the point (x, y); ``look`` says where it starts: at a text, or at another y."""
         references = {"xref": f"x{self.suffix}", "yref": f"y{self.suffix}"}
         if "ayref" in look:
             look |= {"axref": references["xref"], "ayref": references["yref"]}
@@ -170,7 +170,7 @@ def _panel(part: Any) -> Panel:
 
 
 def _line(text: str) -> str:
-    """Return a label of several lines on one line."""
+    """Return a label on one line, escaped for HTML."""
     return escape(text.replace("\n", " "))
 
 
@@ -178,14 +178,14 @@ def _hex(colour: Any) -> str:
     return str(to_hex(colour))
 
 
-def _values(values: ArrayLike) -> list[Any]:
-    """Return values to full precision, with None for NaN."""
+def _json_values(values: ArrayLike) -> list[Any]:
+    """Return values as a list for JSON, with None for those that are not finite."""
     listed = np.atleast_1d(np.asarray(values)).tolist()
     return [None if isinstance(value, float) and not isfinite(value) else value for value in listed]
 
 
-def _template(title: str, names: Iterable[str], hover: Mapping[str, Any]) -> str:
-    """Return the template of the text under the pointer."""
+def _hover_template(title: str, names: Iterable[str], hover: Mapping[str, Any]) -> str:
+    """Return Plotly's template of the text under the pointer: x and y by ``names``, then the values of ``hover``."""
     lines = [f"{_line(name)}: %{{{axis}:.10g}}" for name, axis in zip(names, "xy")]
     lines += [f"{_line(name)}: %{{customdata[{n}]}}" for n, name in enumerate(hover)]
     head = [f"<b>{_line(title)}</b>"] if title else []
@@ -194,24 +194,24 @@ def _template(title: str, names: Iterable[str], hover: Mapping[str, Any]) -> str
 
 @singledispatch
 def _add_part(part: Any, axes: _Axes) -> None:
-    """Add a part of a picture to a figure; each kind of part registers how."""
+    """Add a part of a picture to axes; a function is registered for each kind of part."""
     raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
 
 
 @_add_part.register
 def _(panel: Panel, axes: _Axes) -> None:
-    legend = axes.legend(panel.legend or panel.title or panel.y_label)
+    legend = axes.legend_group(panel.legend or panel.title or panel.y_label)
     for boundaries in panel.filled:
         ring = np.vstack([np.vstack([r, r[:1], [[np.nan] * 2]]) for r in boundaries])
         look = {"fill": "toself", "fillcolor": SHADE, "opacity": 0.22, "mode": "none", "hoverinfo": "skip"}
-        axes.trace(type="scatter", x=_values(ring[:, 0]), y=_values(ring[:, 1]), showlegend=False, **look)
+        axes.add_trace(type="scatter", x=_json_values(ring[:, 0]), y=_json_values(ring[:, 1]), showlegend=False, **look)
     for number, curve in enumerate(panel.curves):
         trace = _trace(curve, _hex(curve.colour or COLOURS[number % len(COLOURS)]), panel)
         if trace["mode"] == "text" and trace["showlegend"]:
             # Plotly's own key of a text is "Aa": a line takes its place
-            axes.trace(**trace | {"x": [None], "y": [None], "mode": "lines"}, **legend)
+            axes.add_trace(**trace | {"x": [None], "y": [None], "mode": "lines"}, **legend)
             trace["showlegend"] = False
-        axes.trace(**trace, **legend)
+        axes.add_trace(**trace, **legend)
     for name, number, those in shades_by_label(panel):
         for n, shade in enumerate(those):
             look = {
@@ -222,27 +222,27 @@ def _(panel: Panel, axes: _Axes) -> None:
                 "layer": "below",
             }
             entry = {"showlegend": True, "name": escape(name)} | legend if name and not n else {}
-            axes.over(shade.low, shade.high, **look, **entry)
+            axes.add_shape(shade.low, shade.high, **look, **entry)
     logarithmic = {axis: axis in panel.logarithmic for axis in "xy"}
 
     def at(axis: str, value: float) -> float:
-        """Return a place on an axis in the form of annotations and ranges."""
+        """Return a value as Plotly's annotations and ranges take it: its logarithm on a logarithmic axis."""
         return log10(value) if logarithmic[axis] else value
 
     for arrow in panel.arrows:
         x, begin, end = at("x", arrow.x), at("y", arrow.begin), at("y", arrow.end)
-        axes.note(x, end, ax=x, ay=begin, ayref="y", arrowhead=2, arrowwidth=1.5)
+        axes.add_arrow(x, end, ax=x, ay=begin, ayref="y", arrowhead=2, arrowwidth=1.5)
     along = [float(x) for curve in panel.curves for x in np.ravel(curve.x) if isfinite(x)]
     close = _CLOSE * (max(along) - min(along)) if along else 0.0
     for label in panel.labels:
-        # the higher of two near ones has its text above the other's
+        # of two labels near each other the higher one has its text above the other's
         level = sum(bool(abs(other.x - label.x) < close and other.y < label.y) for other in panel.labels)
         text_at = {"ax": 45, "ay": -_ABOVE - _LINE_HEIGHT * level}
-        axes.note(at("x", label.x), at("y", label.y), label.text, **text_at, arrowhead=0, arrowwidth=1)
+        axes.add_arrow(at("x", label.x), at("y", label.y), label.text, **text_at, arrowhead=0, arrowwidth=1)
     for text, place in (panel.verticals or {}).items():
-        axes.over(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
+        axes.add_shape(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
     for place in panel.dashed:
-        axes.over(place, place, type="line", line={"dash": "dash", "width": 1})
+        axes.add_shape(place, place, type="line", line={"dash": "dash", "width": 1})
     for axis, of, span in (("x", axes.x, panel.x_range), ("y", axes.y, panel.y_range)):
         of |= {"type": "log", "exponentformat": "power", "dtick": 1} if logarithmic[axis] else {}
         of |= {"range": [at(axis, v) for v in span]} if span is not None else {}
@@ -254,25 +254,25 @@ def _(panel: Panel, axes: _Axes) -> None:
 
 
 def _trace(curve: Curve, colour: str, panel: Panel) -> dict[str, Any]:
-    """Return a curve in Plotly's form; one without points is an entry of the legend."""
+    """Return a curve as a trace of Plotly; a curve without points gives only an entry of the legend."""
     x, y = (np.atleast_1d(np.asarray(v, dtype=float)) for v in (curve.x, curve.y))
-    # of what is left out one point is enough for the gap
+    # one point without a value is enough for a gap
     finite = np.isfinite(y)
     kept = finite | np.insert(finite[:-1], 0, False) if len(y) else finite
     letters = curve.marker.strip("$") if curve.marker.startswith("$") else ""
     has = {"lines": curve.line, "text": letters, "markers": curve.marker and not letters}
     trace: dict[str, Any] = {
         "type": "scatter",
-        "x": _values(x[kept]) or [None],
-        "y": _values(y[kept]) or [None],
+        "x": _json_values(x[kept]) or [None],
+        "y": _json_values(y[kept]) or [None],
         "mode": "+".join(word for word, there in has.items() if there),
         "name": escape(curve.label),
         "showlegend": bool(curve.label),
         "line": {"color": colour, "width": 1.5 * (curve.width or LINE), "dash": _DASHES.get(curve.line, "longdash")},
-        "hovertemplate": _template(curve.label, (panel.x_label, panel.y_label), curve.hover),
+        "hovertemplate": _hover_template(curve.label, (panel.x_label, panel.y_label), curve.hover),
     }
     if curve.hover and kept.any():
-        trace["customdata"] = list(zip(*(_values(np.asarray(v)[kept]) for v in curve.hover.values())))
+        trace["customdata"] = list(zip(*(_json_values(np.asarray(v)[kept]) for v in curve.hover.values())))
     if letters:
         trace |= {"text": [letters] * len(trace["x"]), "textfont": {"color": colour, "size": 13}}
     elif curve.marker:
@@ -285,30 +285,30 @@ def _trace(curve: Curve, colour: str, panel: Panel) -> dict[str, Any]:
 def _(part: HeatMap, axes: _Axes) -> None:
     values = np.ma.filled(np.ma.masked_invalid(part.values), np.nan)
     hover = part.hover or {part.label: values}
-    columns = [[_values(row) for row in np.asarray(v)] for v in hover.values()]
+    columns = [[_json_values(row) for row in np.asarray(v)] for v in hover.values()]
     place = {"x": axes.x["domain"][1] + 0.005, "y": axes.bottom, "yanchor": "bottom", "len": axes.top - axes.bottom}
-    axes.trace(
+    axes.add_trace(
         type="heatmap",
-        x=_values(part.x),
-        y=_values(part.y),
-        z=[_values(row) for row in values],
+        x=_json_values(part.x),
+        y=_json_values(part.y),
+        z=[_json_values(row) for row in values],
         customdata=[list(zip(*rows)) for rows in zip(*columns)],
-        hovertemplate=_template("", (part.panel.x_label, part.panel.y_label), hover),
+        hovertemplate=_hover_template("", (part.panel.x_label, part.panel.y_label), hover),
         showscale=not part.classes,
-        # within the margin of its own chart
+        # the colour scale is in the margin of its own chart
         colorbar=place | {"thickness": 12, "title": {"text": escape(part.label), "side": "right"}},
-        **_scale(part),
+        **_colour_scale(part),
     )
     for colour, _, name in keys_of(part):
         key = {"symbol": "square", "size": 12, "color": _hex(colour), "line": {"width": 1, "color": _hex(MARKED)}}
-        legend = axes.legend(part.panel.title or part.label)
-        axes.trace(type="scatter", x=[None], y=[None], mode="markers", marker=key, name=escape(name), **legend)
+        legend = axes.legend_group(part.panel.title or part.label)
+        axes.add_trace(type="scatter", x=[None], y=[None], mode="markers", marker=key, name=escape(name), **legend)
     _add_part(part.panel, axes)
     axes.x["showgrid"] = axes.y["showgrid"] = False
 
 
-def _scale(part: HeatMap) -> dict[str, Any]:
-    """Return Matplotlib's colours of a map with the range of its values."""
+def _colour_scale(part: HeatMap) -> dict[str, Any]:
+    """Return Plotly's colour scale and range of values for a map, with Matplotlib's colours."""
     norm, colours = colours_of(part)
     low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     if part.classes:

@@ -1,4 +1,4 @@
-"""Pictures of the five-bar: a still and an animation."""
+"""Draw the five-bar: a picture at one configuration, and an animation."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ from .style import (
     write_title,
 )
 
-#: Angle (deg) from the ground link at which the letter of the crank angle stands clear of a crank that lies on it.
+#: Least angle (deg) between the letter of the crank angle and the ground link, so that the crank does not cover it.
 _LEAST_TURN = 32.0
-#: Samples of a run by which its picture is framed.
+#: Number of samples of a run that must fit in its picture.
 _FRAMED = 200
 
 
 @dataclass(frozen=True, slots=True)
 class _Pins:
-    """Places of the pins (cm) and the angles of crank and guide (rad) at one configuration."""
+    """Positions of the pins (cm), crank angle (rad) and slider position u (cm) at one configuration."""
 
     b: NDArray[np.float64]
     c: NDArray[np.float64]
@@ -85,7 +85,7 @@ def _pins(parameters: FiveBarParameters, crank_angle: float, slider_position: fl
 
 
 class _Scene:
-    """A mechanism to be drawn at one configuration or several, in one frame that holds them all. Lengths in cm."""
+    """A mechanism to be drawn at several configurations, with axis limits that contain all of them; lengths in cm."""
 
     def __init__(self, parameters: FiveBarParameters, configurations: Sequence[_Pins], letter: float = LETTER) -> None:
         self.parameters, self.letter = parameters, letter
@@ -97,7 +97,7 @@ class _Scene:
         self.zero = np.array([CM_PER_METRE * k.l1, 0.0])
         self.least = min(0.0, *(q.u for q in configurations))
         self.most = max(0.0, *(q.u for q in configurations))
-        #: Where spring and damper are held, from the slider's zero, if there are any.
+        #: Whether there is a spring and a damper, and the position of the wall that holds them, from the slider's zero.
         self.sprung = k.k > 0.0
         self.damped = k.mu > 0.0
         self.wall = self.most + 8.0 * self.unit
@@ -105,17 +105,17 @@ class _Scene:
         end = self.wall + 1.0 * self.unit if held else self.most + 3.5 * self.unit
         rail = self.least - 3.0 * self.unit, self.wall if held else self.most + 3.0 * self.unit
         #: The ends of the guide, below the slider.
-        self.rail = self.at(rail[0], -self.unit), self.at(rail[1], -self.unit)
+        self.rail = self.point(rail[0], -self.unit), self.point(rail[1], -self.unit)
         corners = [
-            self.at(s, n) for s in (self.least - 3.5 * self.unit, end) for n in (-3.2 * self.unit, 1.7 * self.unit)
+            self.point(s, n) for s in (self.least - 3.5 * self.unit, end) for n in (-3.2 * self.unit, 1.7 * self.unit)
         ]
         reach = CM_PER_METRE * k.l2
         crank = [np.array([x, y]) for x in (-reach, reach) for y in (-reach, reach)]
         points = np.array(crank + corners + [point for q in configurations for point in (q.b, q.c, q.d, q.p)])
         self.low, self.high = points.min(axis=0) - 1.4 * self.unit, points.max(axis=0) + 1.4 * self.unit
 
-    def at(self, s: float, n: float) -> NDArray[np.float64]:
-        """Return the point at s along the guide from the slider's zero and n to its left."""
+    def point(self, s: float, n: float) -> NDArray[np.float64]:
+        """Return the point at a distance s along the guide from the slider's zero, and n to the left of the guide (cm)."""
         return self.zero + s * self.along + n * self.left
 
     def prepare(self, axis: Axes) -> None:
@@ -162,13 +162,13 @@ class _Scene:
         self._line(axis, self.rail, zorder=1)
         self._hatch(axis, *self.rail, count=max(4, round((end - self.least) / unit * 1.6)))
         if self.sprung or self.damped:
-            wall = self.at(end, -unit), self.at(end, 1.5 * unit)
+            wall = self.point(end, -unit), self.point(end, 1.5 * unit)
             self._line(axis, wall)
             self._hatch(axis, *wall, count=5)
 
     def _slider(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
-        block = [self.at(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        block = [self.point(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         axis.add_patch(Polygon(block, facecolor=BLOCK, edgecolor=SLIDER, linewidth=LINE, zorder=4))
         start, end = q.u + 1.5 * unit, self.wall
         side = 0.55 * unit if self.sprung and self.damped else 0.0
@@ -176,15 +176,15 @@ class _Scene:
             share = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 15)[1:-1], [0.88, 1.0]])
             swing = np.zeros(len(share))
             swing[2:-2] = 0.38 * unit * (-1.0) ** np.arange(len(share) - 4)
-            spring = [self.at(start + s * (end - start), side + w) for s, w in zip(share, swing)]
+            spring = [self.point(start + s * (end - start), side + w) for s, w in zip(share, swing)]
             self._line(axis, spring, color=SLIDER, linewidth=LINE, zorder=3)
         if self.damped:
             middle, width, deep = 0.5 * (start + end), 0.32 * unit, 1.6 * unit
             cup = ((-0.5, 1), (0.5, 1), (0.5, -1), (-0.5, -1))
-            self._line(axis, [self.at(middle + s * deep, w * width - side) for s, w in cup], color=SLIDER, zorder=3)
-            self._line(axis, [self.at(middle + 0.5 * deep, -side), self.at(end, -side)], color=SLIDER, zorder=3)
-            self._line(axis, [self.at(start, -side), self.at(middle, -side)], color=SLIDER, zorder=3)
-            piston = [self.at(middle, w * width - side) for w in (-0.8, 0.8)]
+            self._line(axis, [self.point(middle + s * deep, w * width - side) for s, w in cup], color=SLIDER, zorder=3)
+            self._line(axis, [self.point(middle + 0.5 * deep, -side), self.point(end, -side)], color=SLIDER, zorder=3)
+            self._line(axis, [self.point(start, -side), self.point(middle, -side)], color=SLIDER, zorder=3)
+            piston = [self.point(middle, w * width - side) for w in (-0.8, 0.8)]
             self._line(axis, piston, color=SLIDER, linewidth=BOLD, zorder=3)
 
     def _links(self, axis: Axes, q: _Pins) -> None:
@@ -220,7 +220,7 @@ class _Scene:
             half = np.radians(max(0.5 * turn, _LEAST_TURN))
             taken.append((radius + 0.95 * unit) * np.array([cos(half), sin(half)]))
             self._write(axis, taken[0], r"$\theta_2$")
-        # each pin's letter goes where it has most room
+        # each pin's letter goes to the place with most room
         centre = (q.b + q.c + q.d) / 3.0
         a = np.zeros(2)
         foot = np.array([0.0, -2.0 * unit])
@@ -228,7 +228,7 @@ class _Scene:
         lines = MultiLineString([*links, (a, foot), (a, self.zero), self.rail])
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
         for name, pin in pins.items():
-            # where several places have as much room, outside the loop
+            # of places with equal room one outside the loop is preferred
             outwards = 0.1 * (pin - centre) / max(hypot(*(pin - centre)), 1e-9)
             best = roomiest(pin, 1.15 * unit, [lines], (*taken, *pins.values()), outwards)
             self._write(axis, best, name)
@@ -236,12 +236,12 @@ class _Scene:
         # the slider position
         level = -2.35 * unit
         for s in {0.0, q.u}:
-            self._line(axis, [self.at(s, -1.75 * unit), self.at(s, level - 0.4 * unit)], linewidth=HAIR)
+            self._line(axis, [self.point(s, -1.75 * unit), self.point(s, level - 0.4 * unit)], linewidth=HAIR)
         if abs(q.u) > 1.2 * unit:
             arrow = {"arrowstyle": "-|>", "color": GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": HAIR}
-            axis.annotate("", tuple(self.at(q.u, level)), tuple(self.at(0.0, level)), arrowprops=arrow)
+            axis.annotate("", tuple(self.point(q.u, level)), tuple(self.point(0.0, level)), arrowprops=arrow)
         slope = (np.degrees(self.parameters.slider_guide_angle) + 90.0) % 180.0 - 90.0
-        place = self.at(0.5 * q.u, level - 1.05 * unit)
+        place = self.point(0.5 * q.u, level - 1.05 * unit)
         self._write(
             axis,
             place,
@@ -265,7 +265,7 @@ def draw_linkage(
     title: str = "",
     trace: ArrayLike | None = None,
 ) -> Figure:
-    """Draw the mechanism at one configuration: links, pins, guide, spring and damper, coupler point, the two freedoms.
+    """Draw the five-bar at one configuration: links, pins, guide, spring, damper, coupler point, crank angle, slider position.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def draw_linkage(
         rad, m.
     title : str
     trace : array_like, shape (n, 2), optional
-        A path of P to draw too (m), such as an arc of `analysis.youssef.coupler_curve`.
+        A path of the coupler point P (m), such as an arc of `analysis.youssef.coupler_curve`.
 
     Raises
     ------
@@ -297,7 +297,7 @@ def draw_linkage(
 
 @draw_mechanism.register
 def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -> str:
-    """Draw the linkage at its start with the path of P, or of C if P coincides with it."""
+    """Draw a five-bar at the start of a run with the path of P, or of C if P coincides with B; return the caption."""
     shown = np.linspace(0, len(run) - 1, min(len(run), _FRAMED)).astype(int)
     configurations = [_pins(parameters, run["crank.angle"][i], run["slider.position"][i]) for i in shown]
     if parameters.coupler_point_distance:
@@ -331,9 +331,9 @@ def animate_linkage(
     trajectory : Trajectory
         At least two samples; the frames are its samples nearest to evenly spaced times.
     path : str or Path
-        Of the GIF.
+        Path of the GIF.
     frames : int
-        Pictures in it, at most one per sample.
+        Number of frames, at most one per sample.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Places marked along x, points with a text, and the letters of pins: where nothing else is drawn."""
+"""Place names of vertical lines, texts of points, and letters of pins where they cover as little as possible."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from numpy.typing import NDArray
 
 from .style import HAIR, MARK, MARKED, TINY, Figure
 
-#: How marks are known among other texts, and their lines among others; likewise texts of points.
+#: Matplotlib's gid of the names of vertical lines and of these lines, and of the texts of points.
 _GID, _LABEL = "mark", "label"
-#: Heights in a panel at which the top of a name may be, the first the best; points that it keeps from its line and the rest.
+#: Heights of a panel (0 to 1) for the top of a name, the best first; clearance (points) from its line and other things.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
 FloatArray: TypeAlias = NDArray[np.float64]
 _Side: TypeAlias = Literal["left", "right"]
 _SIDES: tuple[_Side, _Side] = ("right", "left")
-#: Distances (points) from its point at which a text may be, the first the best, and directions there.
+#: Distances (points) of a text from its point, the best first; and directions (rad) in which it may be.
 _DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
 _DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 90.0, 70.0, 110.0, -90.0, -70.0, -110.0])
-#: Largest share of an axis that a legend may add to it.
+#: Largest share of the lengthened axis that may be added as room for a legend.
 _ROOM = 0.45
-#: From this share on, every other number of the axis is left out.
+#: If the added share is at least this, every other number of the axis is left out.
 _CLOSE = 0.3
-#: How much a line that crosses a text, or another text, counts beside a text that covers a curve.
+#: Weight of a line that crosses a text, or of a text on another, relative to a text that covers a curve.
 _CROSSED = 3
-#: Directions from a pin in which its letter may stand.
+#: Directions (rad) from a pin in which its letter may stand.
 _ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
 
 
 def mark_place(axis: Axes, place: float, text: str) -> None:
-    """Draw a dotted line across a panel with its name, which `place_marks` moves to a free place."""
+    """Draw a vertical dotted line at ``place`` along x with a name, which `place_marks` moves to a free place."""
     axis.axvline(place, gid=_GID, **MARK)
     axis.annotate(
         text,
@@ -56,7 +56,7 @@ def mark_place(axis: Axes, place: float, text: str) -> None:
 
 
 def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
-    """Write a text about a point with a line to it; `place_marks` moves the text to a free place."""
+    """Write a text beside a point and a line from it to the point; `place_marks` moves the text to a free place."""
     axis.annotate(
         text,
         place,
@@ -73,9 +73,10 @@ def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """What is on axes that letters must not cover, in pixels: edges, legend, lines of marks, curves; it is laid out.
+    """Things on laid-out axes that texts must not cover, in pixels.
 
-    A curve is its path, the size of its markers and whether it has a line. The arrows are those without letters.
+    Edges of the axes, legend, positions of vertical lines (``marks``), curves as (path, size of the markers, whether it has a
+    line), and arrows without a text.
     """
 
     inside: Bbox
@@ -85,7 +86,7 @@ class _Scene:
     arrows: Sequence[Path]
 
     @classmethod
-    def of(cls, axis: Axes) -> _Scene:
+    def of_axes(cls, axis: Axes) -> _Scene:
         legend = axis.get_legend()
         marks = [line for line in axis.lines if line.get_gid() == _GID]
         curves = [
@@ -107,8 +108,8 @@ class _Scene:
             [Path(to_pixels([text.xyann, text.xy])) for text in bare],
         )
 
-    def covered(self, box: Bbox, others: Sequence[Bbox]) -> int:
-        """Count the curves, markers, names and edges of the axes that a box covers."""
+    def count_covered(self, box: Bbox, others: Sequence[Bbox]) -> int:
+        """Return the weighted number of curves, lines, texts (``others``), arrows and edges of the axes that a box covers."""
         inside = self.inside
         count = _CROSSED * sum(box.overlaps(other) for other in others)
         count += 10 * (box.x0 < inside.x0 or box.x1 > inside.x1 or box.y0 < inside.y0 or box.y1 > inside.y1 + _GAP)
@@ -116,28 +117,28 @@ class _Scene:
             count += box.overlaps(self.legend)
         count += sum(box.x0 < place < box.x1 for place in self.marks)
         count += sum(arrow.intersects_bbox(box, filled=False) for arrow in self.arrows)
-        return int(count) + self.hidden(box)
+        return int(count) + self.count_hidden_curves(box)
 
-    def hidden(self, box: Bbox) -> int:
-        """Count the curves and the rows of markers that a box covers."""
+    def count_hidden_curves(self, box: Bbox) -> int:
+        """Count the curves that a box covers; lines and markers of a curve count separately."""
         count = 0
         for path, marker, line in self.curves:
             if marker:
-                # the size in points is a little more than half of it in pixels
+                # the marker size in points is a little more than half of its size in pixels
                 count += bool(box.padded(marker).count_contains(path.vertices))
             if line:
                 count += bool(path.intersects_bbox(box, filled=False))
         return count
 
-    def crossed(self, leader: Path, others: Sequence[Bbox]) -> int:
-        """Count the names and arrows that the line from a point to its text crosses."""
+    def count_crossed(self, leader: Path, others: Sequence[Bbox]) -> int:
+        """Count the texts (``others``) and arrows that a line from a point to its text crosses."""
         return sum(leader.intersects_bbox(other, filled=True) for other in others) + sum(
             leader.intersects_path(arrow, filled=False) for arrow in self.arrows
         )
 
 
 def settle(figure: Figure) -> Figure:
-    """Give legends room, leave out ticks that touch, and place the marks; the figure must be laid out."""
+    """Make room for legends, thin out ticks that touch, and place the texts of marks; the figure must be laid out."""
     for axis in figure.axes:
         _thin_ticks(axis)
         _make_room(axis)
@@ -145,7 +146,7 @@ def settle(figure: Figure) -> Figure:
 
 
 def _thin_ticks(axis: Axes) -> None:
-    """Leave out every other one of ticks that were chosen, while their numbers touch."""
+    """Leave out every other tick of fixed ticks until their numbers do not touch."""
     while isinstance(axis.xaxis.get_major_locator(), FixedLocator) and len(axis.get_xticks()) > 3:
         boxes = [label.get_window_extent() for label in axis.get_xticklabels() if label.get_text()]
         if all(right.x0 - left.x1 > _GAP for left, right in pairwise(boxes)):
@@ -155,12 +156,12 @@ def _thin_ticks(axis: Axes) -> None:
 
 
 def _make_room(axis: Axes) -> None:
-    """Extend an axis upwards by the height of a legend that would cover curves wherever it is."""
+    """Extend the y axis upwards by the height of the legend if it covers curves and the extension helps."""
     legend = axis.get_legend()
     if legend is None or axis.get_aspect() != "auto":
         return
     box, inside = legend.get_window_extent(), axis.get_window_extent()
-    hidden = _Scene.of(axis).hidden(box)
+    hidden = _Scene.of_axes(axis).count_hidden_curves(box)
     share = (box.height + 2.0 * _GAP) / inside.height
     if not hidden or not inside.overlaps(box) or box.y0 > inside.y1 - _GAP or share > _ROOM:
         return
@@ -169,26 +170,26 @@ def _make_room(axis: Axes) -> None:
     ticks = axis.get_yticks()
     axis.set_ylim(before[0], float(scale.inverted().transform(low + (high - low) / (1.0 - share))))
     legend.set_loc("best")
-    if _Scene.of(axis).hidden(legend.get_window_extent()) >= hidden:
+    if _Scene.of_axes(axis).count_hidden_curves(legend.get_window_extent()) >= hidden:
         axis.set_ylim(before)
     else:
-        # the room has no numbers, which would be wider than those that were laid out
+        # no numbers in the added room: they might be wider than the layout allows
         kept = [tick for tick in ticks if before[0] <= tick <= before[1]]
         zero = min(range(len(kept)), key=lambda n: abs(kept[n]), default=0)
         axis.set_yticks(kept if share < _CLOSE else kept[zero % 2 :: 2])
 
 
 def place_marks(figure: Figure) -> Figure:
-    """Move the texts of marks and points to places where they cover least; the figure must be laid out."""
+    """Move the texts of vertical lines and points to places where they cover least; the figure must be laid out."""
     for axis in figure.axes:
         texts = [text for text in axis.texts if isinstance(text, Annotation)]
         moved = [(text, _MOVES[gid]) for gid in _MOVES for text in texts if text.get_gid() == gid]
         if not moved:
             continue
-        scene = _Scene.of(axis)
+        scene = _Scene.of_axes(axis)
         placed: dict[Annotation, Bbox] = {}
         leaders: dict[Annotation, Path] = {}
-        # the first may have to make way for those after it
+        # twice, as the first texts may have to make way for later ones
         for text, (move, first, second) in 2 * moved:
             placed.pop(text, None)
             leaders.pop(text, None)
@@ -206,17 +207,22 @@ def _place(
     others: Sequence[Bbox],
     leaders: Sequence[Path],
 ) -> Bbox:
-    """Put letters at the first of the places where they and their leader cover least, and return the box that they take."""
+    """Move a text to the first of the places where it and its leader cover least, and return its box there.
+
+    ``move`` moves it to a place and returns its box; ``others`` and ``leaders`` are boxes and leaders already placed.
+    """
     least: tuple[int, tuple[float, Any]] | None = None
     for place in places:
         box = move(text, *place).padded(_GAP)
-        covered = scene.covered(box, others)
+        covered = scene.count_covered(box, others)
         if least is not None and covered >= least[0]:
             continue
         crossed = sum(leader.intersects_bbox(box, filled=False) for leader in leaders)
         if text.get_gid() == _LABEL:
             own = _leader(text, box)
-            crossed += scene.crossed(own, others) + sum(own.intersects_path(other, filled=False) for other in leaders)
+            crossed += scene.count_crossed(own, others) + sum(
+                own.intersects_path(other, filled=False) for other in leaders
+            )
         covered += _CROSSED * crossed
         if least is None or covered < least[0]:
             least = covered, place
@@ -226,26 +232,26 @@ def _place(
     return move(text, *least[1])
 
 
-def _slide(mark: Annotation, top: float, side: _Side) -> Bbox:
-    """Move a name to a height and a side of its line, and return the box that it takes there."""
+def _move_name(mark: Annotation, top: float, side: _Side) -> Bbox:
+    """Move a name to a height (0 to 1) and a side of its vertical line, and return its box there."""
     mark.xy = (mark.xy[0], top)
     mark.set_horizontalalignment(side)
     mark.set_position((-_GAP if side == "right" else _GAP, -3.0))
     return mark.get_window_extent()
 
 
-def _turn(label: Annotation, distance: float, direction: float) -> Bbox:
-    """Move the text of a point to a distance and direction from it, and return the box that it takes there."""
+def _move_label(label: Annotation, distance: float, direction: float) -> Bbox:
+    """Move the text of a point to a distance (points) and direction (rad) from the point, and return its box there."""
     label.set_position((distance * np.cos(direction), distance * np.sin(direction)))
     across = np.cos(direction)
     label.set_horizontalalignment("center" if abs(across) < 0.1 else "left" if across > 0.0 else "right")
     label.get_window_extent()
-    # without the line to the point, which may cross what it likes
+    # the box without the line to the point
     return Text.get_window_extent(label)
 
 
 def _leader(label: Annotation, box: Bbox) -> Path:
-    """Return the line from the point of a text to the nearest place of its box, begun a little off the point."""
+    """Return the line from near the point of a text to the nearest place of the box of the text."""
     point = label.axes.transData.transform(label.xy)  # type: ignore[union-attr]
     end = np.clip(point, (box.x0, box.y0), (box.x1, box.y1))
     return Path([point + 0.1 * (end - point), end])
@@ -254,10 +260,10 @@ def _leader(label: Annotation, box: Bbox) -> Path:
 def roomiest(
     pin: FloatArray, reach: float, drawn: Sequence[object], marks: Sequence[FloatArray], away: FloatArray | None = None
 ) -> FloatArray:
-    """Return the place at a distance from a pin where a letter is farthest from the given shapes.
+    """Return the position of a letter, at a distance ``reach`` from a pin, that is farthest from other shapes.
 
-    Pins and other letters, ``marks``, count as nearer than they are. Of places with as much room that in the direction ``away``
-    is taken, whose length is how much that counts.
+    ``drawn`` are Shapely geometries. Distances from pins and other letters (``marks``) are multiplied by 0.6. Of positions with
+    equal room the one in the direction ``away`` is preferred; the longer this vector, the greater its weight.
     """
     import shapely
 
@@ -271,8 +277,8 @@ def roomiest(
     return best
 
 
-#: How letters of each kind move, and over which places, those nearest first.
+#: For each kind of text: the function that moves it, and the two lists of places, the best first.
 _MOVES: dict[str | None, tuple[Callable[[Annotation, float, Any], Bbox], Sequence[float], Sequence[Any]]] = {
-    _GID: (_slide, _TOPS.tolist(), _SIDES),
-    _LABEL: (_turn, _DISTANCES, _DIRECTIONS.tolist()),
+    _GID: (_move_name, _TOPS.tolist(), _SIDES),
+    _LABEL: (_move_label, _DISTANCES, _DIRECTIONS.tolist()),
 }

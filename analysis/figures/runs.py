@@ -1,4 +1,4 @@
-"""Runs over time: one with its mechanism beside, and two over each other. Units are those that people think in."""
+"""Plot runs over time in display units: one run beside a picture of its mechanism, or two runs for comparison."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ from .style import (
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-#: Share of the largest value, or of the unit where that is more, by which what is constant may vary.
+#: Greatest variation of a curve that counts as constant, relative to its largest value or to 1, if that is greater.
 _STILL = 1e-9
-#: Share of the largest value by which two runs differ in nothing but rounding.
+#: Greatest difference of two runs that counts as rounding, relative to the largest value.
 _ROUNDING = 1e-12
-#: Inches: width of a panel beside the mechanism's picture, of a panel alone, and its height.
+#: Inches: width of a panel beside a picture of the mechanism, width without one, and height of a panel.
 _BESIDE, _WIDTH, _HEIGHT = 5.3, 6.4, 1.55
-#: Oscillations in a panel beyond which it would be a block of colour, parts of the band drawn instead, and what is said of it.
+#: If a curve has more oscillations than this, a band is drawn instead; greatest number of its parts; note about it.
 _FAST, _BANDS = 120, 200
 BANDS = "Band: range of an oscillation that is too fast to be drawn; its line is the mean."
-#: What stands for the picture of the mechanism among the numbers of panels.
+#: Number of the picture of the mechanism among the numbers of panels.
 _DRAWN = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rows:
-    """What a panel of a run shows: its name, its unit, and its curves by what the legend calls them."""
+    """Content of a panel of a run: name, unit, and curves in that unit by their names in the legend."""
 
     name: str
     unit: str
@@ -68,7 +68,7 @@ def plot_outputs(
     columns: int = 1,
     title: str = "",
 ) -> Figure:
-    """Plot a run: outputs over time, and the mechanism as it starts with the path of its coupler point.
+    """Plot a run: outputs over time, and the mechanism at the start with the paths of its points.
 
     Lengths are in mm, angles in degrees and speeds in rpm, by the units of the mechanism's table of variables.
 
@@ -76,8 +76,8 @@ def plot_outputs(
     ----------
     run : Trajectory
     names : sequence of str, optional
-        Outputs, a panel each and no mechanism. By default what moves, what drives, and the magnitudes of the joint forces, of
-        what the run has; what is constant is left out, and stated at the foot.
+        Outputs to plot, one panel each, without the mechanism. By default coordinates, drives and magnitudes of the joint
+        forces are plotted; constant outputs are left out and stated at the foot.
     columns : int
         Panels side by side.
     title : str
@@ -85,16 +85,16 @@ def plot_outputs(
     table, picture = _variables(run), False
     notes: list[str] = []
     if names is None:
-        panels, notes = _moving(_telling(run, table))
+        panels, notes = _without_constants(_default_rows(run, table))
         picture = run.parameters is not None and len(run) > 0 and has_picture(run.parameters)
     else:
-        panels = [_output(run, table, name) for name in names]
+        panels = [_output_row(run, table, name) for name in names]
     if run.status:
         notes.append(f"The run ended early: {run.message}.")
     elif run.message:
         notes.append(f"Note: {run.message}.")
     with styled():
-        grid = _with_picture(len(panels)) if picture else _in_columns(len(panels), columns)
+        grid = _picture_grid(len(panels)) if picture else _column_grid(len(panels), columns)
         width, height = (2 * _BESIDE, 1.15 * _HEIGHT) if picture else (_WIDTH * columns, _HEIGHT)
         figure = Figure(figsize=(width, 1.0 + height * len(grid)))
         cells = figure.add_gridspec(*grid.shape)
@@ -125,14 +125,14 @@ def plot_outputs(
         return finish(figure)
 
 
-def _in_columns(count: int, columns: int) -> NDArray[np.int64]:
-    """Return the numbers of panels row by row; greater ones where there is none."""
+def _column_grid(count: int, columns: int) -> NDArray[np.int64]:
+    """Return the grid of panel numbers row by row, shape (rows, columns); cells without a panel have greater numbers."""
     rows = ceil(count / columns)
     return np.arange(rows * columns).reshape(rows, columns)
 
 
-def _with_picture(count: int) -> NDArray[np.int64]:
-    """Return the numbers of panels in two columns, the left one with the picture of the mechanism above its panels."""
+def _picture_grid(count: int) -> NDArray[np.int64]:
+    """Return the grid of panel numbers in two columns; the picture of the mechanism is at the top of the left one."""
     rows = max(2, ceil((count + 2) / 2))
     right = [min(n, count - 1) for n in range(rows)]
     below = list(range(rows, count))
@@ -153,7 +153,7 @@ def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
 
 
 def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: str = "", line: Any = "-") -> None:
-    """Draw a curve over time; of an oscillation too fast to be seen as one, the band that it fills and its mean."""
+    """Draw a curve over time; if it oscillates too fast to be drawn, draw the band of its values and its mean."""
     if not is_fast(values):
         axis.plot(time, values, line, label=label or None)
         return
@@ -162,22 +162,22 @@ def draw_over_time(axis: Axes, time: FloatArray, values: FloatArray, *, label: s
     ends = np.array([(values[part].min(), values[part].max()) for part in parts])
     (drawn,) = axis.plot(middle, [_smooth_mean(values[part]) for part in parts], line, label=label or None)
     colour = drawn.get_color()
-    # with edges bands are told apart that lie over each other
+    # edges tell overlapping bands apart
     axis.fill_between(middle, *ends.T, facecolor=(colour, 0.15), edgecolor=(colour, 0.6), linewidth=HAIR)
 
 
 def _smooth_mean(values: FloatArray) -> float:
-    """Return the mean of a part, weighted so that it matters little where in an oscillation the part ends."""
+    """Return a weighted mean of values that hardly depends on the phase at which an oscillation is cut off."""
     return float(np.average(values, weights=np.hanning(len(values) + 2)[1:-1]))
 
 
 def is_fast(values: FloatArray) -> bool:
-    """Return whether a curve oscillates so often that a panel shows a block."""
+    """Return whether a curve oscillates so often that a panel would show a block of colour."""
     return _oscillations(values) > _FAST
 
 
 def _oscillations(values: FloatArray) -> int:
-    """Count how often a curve goes up and down by a level, of which its range has twenty."""
+    """Count the oscillations of a curve whose height is at least about a twentieth of its range."""
     size = float(np.ptp(values)) if len(values) else 0.0
     if not size > 0.0:
         return 0
@@ -186,63 +186,63 @@ def _oscillations(values: FloatArray) -> int:
 
 
 def _mechanism(run: Trajectory) -> Mechanism:
-    """Return the mechanism of a run, or the one with most outputs in common."""
+    """Return the mechanism of a run; if the run has no parameters, the one with most outputs in common."""
     if run.parameters is not None:
         return mechanism_of(run.parameters)
     return max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
 
 
 def _variables(run: Trajectory) -> dict[str, Variable]:
-    """Return the variables of a run's outputs, of any mechanism."""
+    """Return the variables of a run's outputs by name; outputs of other mechanisms are included."""
     mechanisms = (*MECHANISMS.values(), _mechanism(run))
     return {v.name: v for m in mechanisms for v in m.variables if v.name in run.names}
 
 
 def display_unit(variable: Variable) -> tuple[str, float]:
-    """Return the display unit, and the factor from SI to it."""
+    """Return the display unit of a variable, and the factor from SI to this unit."""
     displays = dict(UNITS[variable.unit].displays)
     unit = variable.display or next(iter(displays), variable.unit)
     return unit, displays.get(unit, 1.0)
 
 
-def _output(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
-    values = run[name]  # an unknown name is refused there
+def _output_row(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
+    values = run[name]  # raises an error for an unknown name
     unit, factor = display_unit(table[name])
     return _Rows(name=spoken(name), unit=unit, curves={"": factor * values})
 
 
-def _telling(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
-    """Return the outputs drawn by default: coordinates except the crank's, its speed, drives, transmission angle, forces."""
+def _default_rows(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
+    """Return the default panels: coordinates except the crank's, crank speed, drives, transmission angle, joint forces."""
     mechanism = _mechanism(run)
     first, *others = mechanism.freedoms
     moving = [freedom.coordinate for freedom in others or (first,)]
     driven, angles = mechanism.names("drive"), mechanism.names("transmission")
     wanted = dict.fromkeys(("slider.position", *moving, first.rate, *driven, *angles))
-    panels = [_output(run, table, name) for name in wanted if name in run.names]
+    panels = [_output_row(run, table, name) for name in wanted if name in run.names]
     forces = _magnitudes(run)
     if forces:
         what = "pin forces" if all(name.startswith("pin ") for name in forces) else "joint forces"
         panels.append(_Rows(name=what, unit="N", curves={name.removeprefix("pin "): f for name, f in forces.items()}))
-    return panels or [_output(run, table, name) for name in run.names[:4]]
+    return panels or [_output_row(run, table, name) for name in run.names[:4]]
 
 
 def _magnitudes(run: Trajectory) -> dict[str, FloatArray]:
-    """Return the magnitudes of the forces in the joints."""
+    """Return the magnitudes of the joint forces (N) over time, by the names of the joints."""
     return {
         joint.replace(".", " ").replace("_", " "): np.sqrt(sum(run[name] ** 2 for name in names))
         for joint, names in _mechanism(run).joints.items()
     }
 
 
-def _moving(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]:
-    """Return the panels without constant outputs, and the sentence that states these."""
+def _without_constants(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]:
+    """Return the panels without their constant curves, and a list with the sentence that states the constant values."""
     kept, still = [], []
     for panel in panels:
-        curves = {name: values for name, values in panel.curves.items() if not _constant(values)}
+        curves = {name: values for name, values in panel.curves.items() if not _is_constant(values)}
         # "pin force A" of the panel "pin forces"
         names = {name: f"{panel.name.removesuffix('s')} {name}" if name else panel.name for name in panel.curves}
         still += [
-            f"{names[name]} {_value(values)} {panel.unit}"
+            f"{names[name]} {_constant_text(values)} {panel.unit}"
             for name, values in panel.curves.items()
             if name not in curves
         ]
@@ -253,12 +253,12 @@ def _moving(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]:
     return kept, [f"Constant, not drawn: {', '.join(still)}."] if still else []
 
 
-def _constant(values: FloatArray) -> bool:
+def _is_constant(values: FloatArray) -> bool:
     return len(values) == 0 or bool(np.ptp(values) <= _STILL * max(1.0, float(np.abs(values).max())))
 
 
-def _value(values: FloatArray) -> str:
-    """Return the text of a constant value; below the resolution it is zero."""
+def _constant_text(values: FloatArray) -> str:
+    """Return the mean of a constant curve as text; values below the resolution give "0"."""
     mean = float(values.mean()) if len(values) else 0.0
     return f"{mean:.4g}" if abs(mean) > _STILL else "0"
 
@@ -271,16 +271,16 @@ def plot_comparison(
     title: str = "",
     labels: tuple[str, str] = ("first", "second"),
 ) -> Figure:
-    """Plot outputs of two runs over each other, and the second less the first beside them, a row each.
+    """Plot outputs of two runs in one row each, and beside them the second run minus the first.
 
-    A difference that is no more than rounding is written instead, at the foot if none is more.
+    If a difference is only rounding, it is stated in words; if all are, they are stated at the foot.
 
     Parameters
     ----------
     first, second : Trajectory
-        With the same samples, as far as both go.
+        Runs with the same sampling times; samples after the end of the shorter run are ignored.
     names : sequence of str
-        Outputs.
+        Outputs to plot.
     title : str
     labels : (str, str)
         Names of the runs.
@@ -289,7 +289,7 @@ def plot_comparison(
     time, table = first.time[:n], _variables(first)
     units = [display_unit(table[name]) for name in names]
     pairs = [(factor * first[name][:n], factor * second[name][:n]) for name, (_, factor) in zip(names, units)]
-    said = [_rounding(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
+    said = [_rounding_text(a, b, unit) for (a, b), (unit, _) in zip(pairs, units)]
     beside = not all(said)
     with styled():
         figure = Figure(figsize=(9.6 if beside else 7.2, 0.9 + 1.8 * len(names)))
@@ -314,8 +314,8 @@ def plot_comparison(
         return finish(figure)
 
 
-def _rounding(a: FloatArray, b: FloatArray, unit: str) -> str:
-    """Return the largest difference with its unit if it is rounding, 0 if there is none, otherwise nothing."""
+def _rounding_text(a: FloatArray, b: FloatArray, unit: str) -> str:
+    """Return the largest difference as text if it is only rounding, "0" if there is none; otherwise an empty text."""
     largest = float(np.abs(b - a).max(initial=0.0))
     if largest > _ROUNDING * float(np.abs(a).max(initial=0.0)):
         return ""

@@ -1,4 +1,4 @@
-"""The picture of any planar mechanism from its `Drawing`: links, bearings, guides, springs, and the paths of its points."""
+"""Draw any planar mechanism from its `Drawing`: links, bearings, guides, springs, and the paths of its points."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ from .style import (
 
 Array = NDArray[np.float64]
 _SIDE = 5.0
-#: Configurations along a path.
+#: Number of configurations along a path.
 _TRACED = 240
 
 
 def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[str, Array]:
-    """Return the places of the drawing's joints in mm by name, (n, 2), at coordinates of the freedoms (n, freedoms).
+    """Return the positions (mm) of a drawing's joints by name, shape (n, 2), for ``coordinates`` of shape (n, freedoms).
 
-    Where the bodies cannot be joined they are NaN, a gap in a path.
+    They are NaN at configurations at which the mechanism cannot be assembled.
     """
     drawing = mechanism.drawing
     assert drawing is not None
@@ -64,7 +64,7 @@ def places(mechanism: Mechanism, parameters: Any, coordinates: Array) -> dict[st
 
 
 def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array], *, letters: bool = True) -> None:
-    """Draw a mechanism at the first of some configurations, and the paths of its points over all of them."""
+    """Draw a mechanism at the first configuration, and the paths of its points over the others; ``at`` is from `places`."""
     drawing = mechanism.drawing
     assert drawing is not None
     now = {name: path[0] for name, path in at.items()}
@@ -91,7 +91,7 @@ def draw(axis: Axes, mechanism: Mechanism, parameters: Any, at: dict[str, Array]
 
 
 def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
-    """Write the names of pins where no line that is drawn covers them."""
+    """Write the name of each pin beside it, where it is farthest from lines, pins and other names."""
     from shapely import LineString
 
     curves = [np.asarray(line.get_xydata()) for line in axis.lines]
@@ -109,13 +109,15 @@ def _write_letters(axis: Axes, pins: dict[str, Array], unit: float) -> None:
 
 
 def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, colours: Any) -> None:
-    """Draw a part through its joints; ``unit`` is the size of symbols."""
+    """Draw a part; ``through`` are the positions of its joints (mm), ``unit`` the size of symbols (mm)."""
     first, last = through[0], through[-1]
     if part.kind == "link":
         colour = next(colours)
         if len(through) > 2:
             axis.add_patch(
-                Polygon(_around(through), facecolor=colour, alpha=0.15, edgecolor=colour, linewidth=THIN, zorder=3)
+                Polygon(
+                    _sorted_by_angle(through), facecolor=colour, alpha=0.15, edgecolor=colour, linewidth=THIN, zorder=3
+                )
             )
         axis.plot(*np.array(through).T, color=colour, linewidth=2.0 * LINE, solid_capstyle="round", zorder=4)
     elif part.kind == "pivot":
@@ -125,7 +127,7 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
         style = "-." if part.kind == "guide" else ":"
         axis.plot(*np.array([first, last]).T, color="0.6", linewidth=HAIR, linestyle=style, zorder=1)
     elif part.kind == "gear":
-        # the radius to the second point, and the circle from there
+        # the radius to the second point, and the circle through it
         turns = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73)) * complex(*(last - first))
         rim = first + np.column_stack([turns.real, turns.imag])
         axis.plot(*np.vstack([first, rim]).T, color="0.5", linewidth=THIN, zorder=2)
@@ -142,15 +144,15 @@ def _draw_part(axis: Axes, part: Part, through: Sequence[Array], unit: float, co
             axis.plot(*coil.T, color="0.5", linewidth=THIN, zorder=2)
 
 
-def _around(points: Sequence[Array]) -> Array:
-    """Return points in the order of their angles about their middle."""
+def _sorted_by_angle(points: Sequence[Array]) -> Array:
+    """Return points sorted by their angles about their mean."""
     array = np.array(points)
     spread = array - array.mean(axis=0)
     return array[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))]
 
 
 def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
-    """Draw a mechanism as `dispatch.draw_mechanism` does."""
+    """Draw a mechanism at the start of a run with the paths of its points, and return the caption."""
     mechanism = mechanism_of(parameters)
     samples, words = last_samples(run)
     names = [freedom.coordinate for freedom in mechanism.freedoms]
@@ -163,8 +165,8 @@ def draw_run(parameters: Any, axis: Axes, run: Trajectory) -> str:
     return f"{mechanism.title} at the start; paths of {', '.join(drawing.paths)} {words}"
 
 
-def _swept(mechanism: Mechanism, found: Reach) -> Array:
-    """Return coordinates from the start on through the range of the first freedom, the others at their start."""
+def _swept_coordinates(mechanism: Mechanism, found: Reach) -> Array:
+    """Return coordinates (n, freedoms): the start, then the range of the first freedom with the others at their start."""
     known = mechanism.first_set
     rows = np.tile(mechanism.state(known.initial)[: len(mechanism.freedoms)], (_TRACED + 1, 1))
     rows[1:, 0] = np.linspace(found.low, found.high, _TRACED)
@@ -179,21 +181,24 @@ def plot_scheme(mechanism: Mechanism, *, title: str = "") -> Figure:
         figure = Figure(figsize=(1.3 * _SIDE, _SIDE))
         axis = figure.add_subplot()
         draw(
-            axis, mechanism, known.parameters, places(mechanism, known.parameters, _swept(mechanism, reach(mechanism)))
+            axis,
+            mechanism,
+            known.parameters,
+            places(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism))),
         )
         write_title(figure, title or mechanism.title)
         return finish(figure)
 
 
 def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: str = "") -> Figure:
-    """Draw several planar mechanisms, each with the paths of its points through the range of its first freedom."""
+    """Draw several planar mechanisms at their start, with the paths of their points through the range of the first freedom."""
     rows = -(-len(mechanisms) // columns)
     with styled():
         figure = Figure(figsize=(0.5 * _SIDE * columns, 0.5 * _SIDE * rows))
         for number, mechanism in enumerate(mechanisms):
             axis = figure.add_subplot(rows, columns, number + 1)
             known = mechanism.first_set
-            at = places(mechanism, known.parameters, _swept(mechanism, reach(mechanism)))
+            at = places(mechanism, known.parameters, _swept_coordinates(mechanism, reach(mechanism)))
             draw(axis, mechanism, known.parameters, at, letters=False)
             axis.set_axis_off()
             axis.set_title(mechanism.name, fontsize=SMALL)
@@ -203,7 +208,7 @@ def plot_schemes(mechanisms: Sequence[Mechanism], *, columns: int = 4, title: st
 
 @animate.register
 def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, title: str = "") -> Path:
-    """Write an animation (GIF) of a planar mechanism through the range of its first freedom, forth and back if it cannot turn.
+    """Write an animation (GIF) of a planar mechanism over the range of its first freedom, back and forth if it cannot turn.
 
     Raises
     ------
@@ -213,7 +218,7 @@ def animate_scheme(mechanism: Mechanism, path: str | Path, *, frames: int = 60, 
     check_frames(frames)
     known = mechanism.first_set
     found = reach(mechanism)
-    swept = _swept(mechanism, found)[1:]
+    swept = _swept_coordinates(mechanism, found)[1:]
     at = places(mechanism, known.parameters, swept)
     order = np.linspace(0, len(swept) - 1, frames).astype(int)
     if not found.turns:

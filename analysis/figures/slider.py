@@ -1,4 +1,4 @@
-"""Pictures of the slider's motion: position, force and power over the turn, and how well the motion is tracked."""
+"""Plot slider motions: position, force and power over a crank turn, and the errors of tracking."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .dispatch import plot
 
 @plot.register
 def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
-    """Plot slider position, force, power and pin forces over the turn."""
+    """Plot slider position, control force and power, crank torque, transmission angle and pin forces over a crank turn."""
     x = np.degrees(np.abs(drive.crank_angle))
     parts = [
         ("slider position [mm]", [Curve(x=x, y=1e3 * drive.states[:, 1])]),
@@ -33,7 +33,7 @@ def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_tracking(run: TrackingResult, *, title: str = "") -> Figure:
-    """Plot the errors of slider and coupler point, and the slider force, over the time of the run."""
+    """Plot the errors of slider and coupler point and the control force over time; curves that are zero are left out."""
     time = run.loop.time
     rows = (
         ("slider error [mm]", 1e3 * run.error),

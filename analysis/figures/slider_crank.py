@@ -1,4 +1,4 @@
-"""The slider-crank's forces over the turn, and what tolerances do to it, as figures for a design review."""
+"""Plot the forces of the slider-crank over a turn, and the effect of tolerances, for a design review."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from .style import BOLD, COLOURS, HAIR, LINE, MARK, PLAIN, SMALL, THIN, finish, 
 FloatArray = NDArray[np.float64]
 
 _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
-#: Greatest and middle departures over the turn: where their ratio is above this, the axis is cut at a multiple of the latter.
+#: If greatest/median error over the turn is above the first number, the axis is cut at the second number times the median.
 _PEAK, _CUT = 12.0, 4.0
-#: Difference of shares to first and second order below which the latter are not drawn.
+#: If the shares to second order differ by less than this from those to first order, they are not drawn.
 _SAME_SHARE = 0.02
-#: Share of the largest value of its unit below which a curve is zero.
+#: A curve is zero below this share of the largest value with the same unit.
 _ZERO = 1e-12
-#: Letters in a line of the foot.
+#: Letters in a line of the notes at the foot.
 _LETTERS = 140
 
 
 @plot.register
 def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: str = "") -> Figure:
-    """Plot motion, torque and joint forces over the crank angle, by components in a frame.
+    """Plot slider position, torque and the components of the joint forces in a frame over the crank angle.
 
-    Curves leave their axes towards poles and limits of assembly, and have gaps where there is no mechanism. Dead centres and
-    limits are dashed lines, named at the foot; so is what is zero or constant throughout, which has no panel.
+    Curves are cut off near poles and limits of assembly, and have gaps where the mechanism cannot be assembled. Dead centres
+    and limits are dashed lines, named at the foot. Quantities that are zero or constant are stated there too, without a panel.
 
     Parameters
     ----------
     turn : ForceTurn
     frame : int
-        1 ground, 2 crank, 3 rod, 4 guide.
+        Number of the frame: 1 ground, 2 crank, 3 rod, 4 guide.
     units : str
         One of `analysis.slider_crank.UNITS`. With "SI" lengths are shown in mm.
     title : str
@@ -52,7 +52,7 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
     Raises
     ------
     InputError
-        If there are no such frame or units.
+        If the frame or the units do not exist.
     """
     contents: list[tuple[str, str, Mapping[str, Any]]] = [
         ("slider position S4", "m", {"": turn.slider_position}),
@@ -64,15 +64,15 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
         components = {f"{axis}{frame}": values for axis, values in zip("ijk", turn.vector(name, frame).T)}
         contents.append((joint.words, joint.unit, components))
     known = shown_units(units)
-    # zero but for rounding: against the largest of the same unit
+    # zero but for rounding, relative to the largest value with the same unit
     sizes = {name: _largest(curves.values()) for name, _, curves in contents}
     scales = {si: max(sizes[name] for name, other, _ in contents if other == si) for _, si, _ in contents}
     zero = [name for name, si, _ in contents if sizes[name] <= _ZERO * scales[si]]
-    still = {name: _constant(curves, *known[si]) for name, si, curves in contents if name not in zero}
+    still = {name: _constant_text(curves, *known[si]) for name, si, curves in contents if name not in zero}
     panels = [
         _force_panel(turn, name, si, *known[si], curves) for name, si, curves in contents if still.get(name) == ""
     ]
-    notes = [f"Dashed: {', '.join(_marks(turn))}."] if _marks(turn) else []
+    notes = [f"Dashed: {', '.join(_marked_angles(turn))}."] if _marked_angles(turn) else []
     said = [f"{name} {value}" for name, value in still.items() if value]
     notes += [f"Constant, not drawn: {'; '.join(said)}."] if said else []
     notes += [f"Zero throughout, not drawn: {'; '.join(zero)}."] if zero else []
@@ -80,26 +80,26 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
 
 
 def _largest(curves: Iterable[Any]) -> float:
-    """Return the largest magnitude of curves where they are determined."""
+    """Return the largest magnitude of curves, masked values and NaN ignored."""
     return max(float(np.nanmax(np.abs(np.ma.filled(values, np.nan)), initial=0.0)) for values in curves)
 
 
-def _constant(curves: Mapping[str, Any], unit: str, one: float) -> str:
-    """Return the value of a single curve that is constant but for rounding, in a unit of the value ``one`` in SI."""
+def _constant_text(curves: Mapping[str, Any], unit: str, one: float) -> str:
+    """Return a single constant curve's value as text in a unit, which is ``one`` in SI; empty if there is no such curve."""
     values = np.concatenate([np.array(np.ma.filled(given, np.nan)) for given in curves.values()])
     values = values[np.isfinite(values)]
     constant = len(curves) == 1 and len(values) and np.ptp(values) <= _ZERO * np.abs(values).max()
     return f"{values[0] / one:.4g} {unit}" if constant else ""
 
 
-def _marks(turn: ForceTurn) -> dict[str, float]:
+def _marked_angles(turn: ForceTurn) -> dict[str, float]:
     """Return the crank angles (deg) of dead centres and limits of assembly by name."""
     marks = {f"dead centre {np.degrees(d.crank_angle):.1f}°": np.degrees(d.crank_angle) for d in turn.dead_centres}
     return marks | {f"limit of assembly {np.degrees(end):.1f}°": np.degrees(end) for end in turn.limits}
 
 
 def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, components: Mapping[str, Any]) -> Panel:
-    """Plot curves over the turn by label, in a unit of the value ``one`` in SI."""
+    """Return a panel of curves over the turn, given in SI by label, in a unit that is ``one`` in SI."""
     angle = np.degrees(turn.angle)
     grows = si != "m"
     poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()
@@ -107,9 +107,11 @@ def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, co
     for label, given in components.items():
         values = np.array(np.ma.filled(given, np.nan)) / one
         inside.append(values[np.isfinite(values) & (turn.clear() | (not grows))])
-        # from one side of a pole to the other a curve changes its sign
+        # a gap at each pole, where a curve changes its sign
         values[[int(np.argmin(np.abs(turn.angle - place.crank_angle))) for place in poles]] = np.nan
-        curves.append(Curve(x=_broken(angle, turn.breaks, angle), y=_broken(values, turn.breaks), label=label))
+        curves.append(
+            Curve(x=_with_breaks(angle, turn.breaks, angle), y=_with_breaks(values, turn.breaks), label=label)
+        )
     limits = None
     if np.concatenate(inside).size:
         low, high = float(np.concatenate(inside).min()), float(np.concatenate(inside).max())
@@ -119,7 +121,7 @@ def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, co
         x_label="crank angle [deg]",
         y_label=f"[{unit}]",
         curves=curves,
-        dashed=list(_marks(turn).values()),
+        dashed=list(_marked_angles(turn).values()),
         title=title,
         y_range=limits,
         x_ticks=[60.0 * n for n in range(7)],
@@ -136,19 +138,19 @@ def plot_tolerances(
     units: str = "SI",
     title: str = "",
 ) -> Figure:
-    """Plot the band of errors over the turn, the samples at one angle, and which tolerance contributes how much there.
+    """Plot the errors by tolerances over the turn, and at one crank angle the samples and the share of each tolerance.
 
-    Above, the linear estimate (filled to three standard deviations, dashed the worst case of the signs) and percentiles of the
-    samples; below, the histogram of the samples beside the normal distribution of the linear estimate, and shares in the
-    variance. The foot says what a reader must know of it: samples that cannot be assembled, where the estimate is off.
+    Above, the linear estimate (three standard deviations filled, worst case dashed) and percentiles of the samples. Below, the
+    histogram of the samples with the normal distribution of the linear estimate, and the shares of the tolerances in the
+    variance. Notes at the foot state samples that cannot be assembled, and where the linear estimate is wrong.
 
     Parameters
     ----------
     found : MonteCarlo
     quantity : str
-        One that was sampled.
+        Name of a sampled quantity.
     angle : float
-        Crank angle (rad) of histogram and shares; the nearest there is.
+        Crank angle (rad) of histogram and shares; the nearest sampled angle is used.
     units : str
         One of `analysis.slider_crank.UNITS`. With "SI" lengths are shown in mm.
     title : str
@@ -158,7 +160,7 @@ def plot_tolerances(
     ParameterError
         If the quantity was not sampled.
     InputError
-        If it is not determined at that angle, if there are fewer than two angles, or if there are no such units.
+        If the quantity is not determined at that angle, there are fewer than two angles, or the units do not exist.
     """
     turn = found.turn
     if len(turn) < 2:
@@ -190,10 +192,10 @@ def plot_tolerances(
 def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float) -> None:
     turn, spread, linear = found.turn, found.spreads[quantity], found.estimates[quantity]
     angle = np.degrees(turn.angle)
-    whole = _broken(angle, turn.breaks, angle)
+    whole = _with_breaks(angle, turn.breaks, angle)
 
     def curve(values: Any) -> FloatArray:
-        return _broken(np.ma.filled(values, np.nan) / one, turn.breaks)
+        return _with_breaks(np.ma.filled(values, np.nan) / one, turn.breaks)
 
     three = curve(3.0 * linear.deviation)
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
@@ -214,7 +216,7 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     axis.axvline(angle[at], color=MARK["color"], linewidth=THIN, linestyle="-.")
     for pole in found.poles(quantity):
         axis.axvline(np.degrees(pole), color=MARK["color"], linewidth=THIN, linestyle=":")
-    # of what is not NaN, if anything
+    # the largest that is not NaN, if any
     departures = [low, lower, upper, high, linear.worst]
     reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / one
     middle = float(np.nanmedian(reach))
@@ -227,8 +229,8 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
 
 
-def _broken(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
-    """Return values (n,) with one more after each of the numbers: NaN, or the next of ``fill`` (n,)."""
+def _with_breaks(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
+    """Return values (n,) with one value inserted after each index of ``breaks``: NaN, or the next value of ``fill`` (n,)."""
     after = np.array(breaks, dtype=int) + 1
     return np.insert(values, after, np.nan if fill is None else fill[after])
 
@@ -243,7 +245,7 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     deviation, of_samples, second = (
         float(np.ma.filled(x[at], np.nan)) / one for x in (linear.deviation, spread.deviation, linear.second_deviation)
     )
-    # narrower than a bin it is a line
+    # a distribution narrower than a bin is drawn as a line
     if deviation > width:
         fine = np.linspace(edges[0], edges[-1], 400)
         curve = [_normal_share(x - 0.5 * width, x + 0.5 * width, deviation) for x in fine]
@@ -255,13 +257,13 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     elif isfinite(deviation):
         axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=BOLD, label="linear estimate: no spread")
     sigmas = {"of the samples": of_samples, "linear": deviation, "to second order": second}
-    lines = [f"$\\sigma$ {what} {_figure(x)} {unit}" for what, x in sigmas.items() if isfinite(x)]
+    lines = [f"$\\sigma$ {what} {_number_text(x)} {unit}" for what, x in sigmas.items() if isfinite(x)]
     axis.set_ylabel("share of the samples")
     axis.yaxis.set_major_formatter(PercentFormatter(1.0))
     axis.set_xlim(edges[0], edges[-1])
     axis.set_ylim(0.0, 1.5 * float(share.max()))
     axis.set_title(
-        f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_figure(nominal / one, 6)} {unit}; "
+        f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_number_text(nominal / one, 6)} {unit}; "
         f"{spread.counts[at].sum() / found.samples:.1%} of the samples",
         fontsize=PLAIN,
     )
@@ -276,7 +278,7 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
     order = np.argsort(both[:, 1] if second else both[:, 0], kind="stable")
     shares = both[order]
     names = [found.tolerances[i].name for i in order]
-    # the second order is drawn where it says something else
+    # the second order is drawn if it differs from the first
     second = second and not (linear and np.abs(shares[:, 1] - shares[:, 0]).max() < _SAME_SHARE)
     orders = [(0, _LINEAR, "linear")] * linear + [(1, _SECOND, "to second order")] * second
     axis.set_title("share in the variance" + ", linear" * (not second))
@@ -304,10 +306,10 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
 
 
 def _normal_share(low: float, high: float, deviation: float) -> float:
-    """Return the share of a normal distribution of mean zero between two values."""
+    """Return the probability that a normal variable of mean zero lies between two values."""
     return 0.5 * (erf(high / (deviation * sqrt(2.0))) - erf(low / (deviation * sqrt(2.0))))
 
 
-def _figure(value: float, digits: int = 3) -> str:
-    """Return a number as text, with rounding errors as 0."""
+def _number_text(value: float, digits: int = 3) -> str:
+    """Return a number as text to some digits; rounding errors give "0"."""
     return f"{value:.{digits}g}" if abs(value) > 1e-12 else "0"

@@ -1,11 +1,11 @@
-"""Pictures of the generalised slider-crank: in space, moving, and its range of assembly.
+"""Draw the generalised slider-crank: a picture in space, an animation, and its range of assembly.
 
-The mechanism is seen in orthographic projection with the common normal of crank axis and guide upright. Solids are faces
-that are painted from back to front; centre lines, paths and frames are lines under or over them. Letters are put where there
-is room for them, so that they can be read for any dimensions.
+The projection is orthographic, with the common normal of crank axis and guide upright. Solids are painted face by face from
+back to front; centre lines, paths and frames are lines under or over them. Texts are put where there is room for them, so
+that they can be read for any dimensions.
 
-Matplotlib's mplot3d would paint the faces as well, if all are in one collection, but it leaves wide margins round its cube:
-to fill the sheet, and to place letters, points must be projected here all the same, and that is all the projection there is.
+Matplotlib's mplot3d could paint the faces too, but it leaves wide margins, and points must be projected here anyway to fill
+the sheet and to place the texts.
 """
 
 from __future__ import annotations
@@ -57,20 +57,20 @@ from .style import (
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-#: A metre in the units that pictures come in.
+#: Number of units in a metre, for each unit of a picture.
 UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0, "in": 1.0 / INCH}
-#: Elevation and azimuth (deg) in which shift, offset and twist are all seen, the slider to the right of the crank.
+#: Elevation and azimuth (deg) from which shift, offset and twist are visible, with the slider to the right of the crank.
 VIEW = (22.0, -112.0)
 #: Crank angles of a full turn at which paths and curves are computed.
 _POINTS = 361
-#: How far inside its ends a range is drawn (rad): at the ends the square root may be of a negative number by rounding.
+#: Distance of the first and last drawn angle from the ends of a range (rad): rounding could make a square root negative there.
 _INSET = 1e-6
 _DEAD, _LIMIT, _SHIFT, _TWIST = COLOURS[2], "#B07700", "#A0527F", "#2478A8"
 
 
 @dataclass(frozen=True, slots=True)
 class _Pose:
-    """Where the joints are at one configuration, in the picture's unit; the angle in rad."""
+    """Crank angle (rad), slider position and positions of the joints at one configuration, in the picture's unit."""
 
     angle: float
     slide: float
@@ -92,7 +92,7 @@ def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor:
 
 
 def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
-    """Return the joints at the requested configuration.
+    """Return the pose at a crank angle (rad) and a shift (m), with lengths multiplied by ``factor``.
 
     Raises AssemblyError if the rod does not reach the guide there; InputError if angle or shift are not finite.
     """
@@ -104,7 +104,7 @@ def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float,
 
 
 def _angles(part: Range, law: PeriodicShift) -> FloatArray:
-    """Return crank angles over a range, clear of its ends if it has any."""
+    """Return crank angles (rad) over a range of assembly, slightly inside its ends unless it is a full turn."""
     inset = min(_INSET, 0.25 * (part.high - part.low)) if not part.full(law.span) else 0.0
     count = max(9, ceil(_POINTS * (part.high - part.low) / (2.0 * pi)))
     return np.linspace(part.low + inset, part.high - inset, count)
@@ -117,7 +117,7 @@ def _factor(unit: str) -> float:
 
 
 class _Part:
-    """A range of assembly: poses along it, those at its dead centres, and those at its ends where it has any."""
+    """A range of assembly: poses along it, at its dead centres, and at its limits if the crank cannot turn fully."""
 
     def __init__(self, parameters: SliderCrankParameters, part: Range, law: PeriodicShift, factor: float) -> None:
         self.angles = _angles(part, law)
@@ -129,12 +129,12 @@ class _Part:
 
     @property
     def marks(self) -> tuple[tuple[Sequence[_Pose], str, str, str], ...]:
-        """Places that are marked, what they are called, their colour and marker."""
+        """Marked poses, as (poses, name, colour, marker): dead centres and limits of assembly."""
         return (self.dead, "dead centre", _DEAD, "D"), (self.limits, "limit", _LIMIT, "s")
 
 
 class _Track(NamedTuple):
-    """What a run goes through, drawn like a `_Part`."""
+    """Poses of a run and the paths of its pins, drawn like a `_Part`."""
 
     poses: Sequence[_Pose]
     crank_pins: FloatArray
@@ -147,7 +147,7 @@ def _parts(parameters: SliderCrankParameters, law: PeriodicShift, factor: float)
 
 
 class _Label(NamedTuple):
-    """A text that is to stand near a point in space."""
+    """A text to be placed near a point in space."""
 
     point: FloatArray
     text: str
@@ -156,7 +156,7 @@ class _Label(NamedTuple):
 
 
 class _Scene:
-    """The mechanism in space with the paths of its pins, to be drawn at one configuration or many. Lengths in ``unit``."""
+    """The mechanism in space with the paths of its pins, drawn at one configuration after another. Lengths in ``unit``."""
 
     def __init__(
         self,
@@ -171,7 +171,7 @@ class _Scene:
         p = parameters.constants()
         self.a1, self.a2, self.a4 = factor * p.a1, factor * p.a2, factor * p.a4
         self.parts = parts
-        #: Length by which joints, supports and letters are drawn.
+        #: Length that scales joints, supports and distances of texts.
         self.size = (self.a1 + self.a2 + abs(self.a4)) / 26.0
         #: Rows: i, j, k of frame 4.
         self.frame4 = np.array([kinematics.from_guide_frame(Vector(*row), p) for row in np.eye(3)])
@@ -181,7 +181,7 @@ class _Scene:
         self.most = max(pose.slide for pose in everywhere)
         self.low_shift = float(min(0.0, *(pose.centre[2] for pose in everywhere)))
         self.high_shift = float(max(0.0, *(pose.centre[2] for pose in everywhere)))
-        #: The slider stands on the side of its pin that is away from the crank.
+        #: Sign along i of frame 4: the slider is on the side of its pin that is away from the crank.
         self.side = -1.0 if self.a4 >= 0.0 else 1.0
         rise, turn = radians(view[0]), radians(view[1])
         towards = np.array([sin(rise), cos(rise) * cos(turn), cos(rise) * sin(turn)])
@@ -189,12 +189,12 @@ class _Scene:
         #: Rows: right and up on the page, and towards the eye, in the ground frame.
         self.view = np.array([right, np.cross(towards, right), towards])
         self.low, self.high = self._extent()
-        #: Points (n, 2) and lines (2, n) on the page that letters should keep clear of.
+        #: Points (n, 2) and lines (2, n) on the page that texts must not cover.
         self.covered = np.empty((0, 2))
         self.lines: list[FloatArray] = []
 
     def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
-        """Return the point at a slider position, off the guide by x and y of frame 4."""
+        """Return the point at a slider position, displaced from the guide by x and y in frame 4 (ground frame, shape (3,))."""
         return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
 
     def page(self, points: ArrayLike) -> FloatArray:
@@ -237,7 +237,7 @@ class _Scene:
         default: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 4, "solid_capstyle": "round"}
         shown = self.page(points).T
         axis.plot(*shown, **default | look)
-        # some thirty pieces of a curve will do for the letters
+        # about thirty points of a curve are enough to keep texts away
         self.lines.append(shown[:, :: max(1, shown.shape[1] // 30)])
 
     def _solids(self, axis: Axes, pose: _Pose) -> None:
@@ -250,7 +250,7 @@ class _Scene:
         # along the guide as the slider position increases, across, and away from the crank
         guide = np.array([-self.frame4[2], np.cross(s * self.frame4[0], -self.frame4[2]), s * self.frame4[0]])
         start, end = self._rail
-        # the crank is cut where the ball is, so that the ball lies in a fork
+        # the crank ends before the ball, so that the ball seems to lie in a fork
         solids: list[tuple[FloatArray, str]] = [
             (tube(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
             (tube(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
@@ -277,7 +277,7 @@ class _Scene:
         self._line(axis, ring + pose.centre, color="0.6", linewidth=THIN, linestyle=":", zorder=1)
 
     def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
-        """Draw the paths of the pins, and crank and rod in thin lines at dead centres and limits of assembly."""
+        """Draw the paths of the pins; mark dead centres and limits. With ``letters`` crank and rod there are drawn as well."""
         for part in self.parts:
             self._line(axis, part.crank_pins, color=TRACE, linewidth=BOLD, zorder=2)
             self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
@@ -299,7 +299,7 @@ class _Scene:
         if not letters:
             return
         if self.a4 != 0.0:
-            # the direction of the crank axis once more, at the guide
+            # the direction of the crank axis, repeated at the guide
             along = self.foot + np.array([0.0, 0.0, 2.6 * u])
             self._line(axis, [self.foot, along], color="0.4", linewidth=HAIR, linestyle="--")
         t = np.linspace(0.0, self.parameters.guide_twist, 121)
@@ -372,11 +372,10 @@ def plot_mechanism(
     view: tuple[float, float] = VIEW,
     title: str = "",
 ) -> Figure:
-    """Draw the mechanism in space at one configuration.
+    """Draw the generalised slider-crank in space at one configuration, in orthographic projection.
 
-    Besides the links, their dimensions and frames 1 and 4 there are the paths of the pins, crank and rod in thin lines at the
-    dead centres, and where the crank cannot turn fully at the limits of assembly. All directions have one scale, the
-    projection is orthographic.
+    The drawing has the links with their dimensions, frames 1 and 4, the paths of the pins, and, as thin lines, crank and rod at
+    the dead centres and at the limits of assembly, if the crank cannot turn fully. All directions have one scale.
 
     Parameters
     ----------
@@ -386,20 +385,19 @@ def plot_mechanism(
     shift : float
         Axial shift S1 (m).
     law : PeriodicShift, optional
-        The shift over the crank angle, for the paths; by default it is held at ``shift``.
+        The shift over the crank angle, for the paths; by default it is constant, ``shift``.
     unit : str
-        Of the lengths in the letters: one of `UNITS`.
+        Unit of the lengths in the texts: one of `UNITS`.
     view : (float, float)
-        Elevation of the eye above the plane of crank axis and guide's direction, and its azimuth about the common normal from
-        j of frame 1 towards k (deg).
+        Direction of the eye (deg): elevation above the plane of j and k of frame 1, and azimuth from j towards k.
     title : str
 
     Raises
     ------
     AssemblyError
-        If the rod does not reach the guide at the configuration, with how much it is too short.
+        If the rod does not reach the guide at the configuration; the message says by how much it is too short.
     InputError
-        If angle or shift are not finite, or the unit is not known.
+        If angle or shift are not finite, or the unit is unknown.
     """
     pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
     parts = _parts(parameters, constant_shift(shift) if law is None else law, _factor(unit))
@@ -413,7 +411,7 @@ def plot_mechanism(
 
 @draw_mechanism.register
 def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajectory) -> str:
-    """Draw the mechanism at its start with the paths of both pins."""
+    """Draw the slider-crank at the start of a run with the paths of both pins, and return the caption."""
     factor = UNITS["mm"]
     shown = np.linspace(0, len(run) - 1, min(len(run), _POINTS)).astype(int)
     poses = [_pose(parameters, run["crank.angle"][i], run["shift.position"][i], factor) for i in shown]
@@ -428,7 +426,7 @@ def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajector
 
 
 def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tuple[Figure, Axes]:
-    """Return a figure ``wide`` inches wide with the scene's axes between a head and a foot (inches)."""
+    """Return a figure ``wide`` inches wide, and axes for the scene between a head and a foot of these heights (inches)."""
     width, height = scene.high - scene.low
     tall = float(np.clip(wide * height / width, 2.6, 0.9 * wide))
     figure = Figure(figsize=(wide, head + tall + foot))
@@ -451,28 +449,28 @@ def animate_mechanism(
     frames_per_second: int = 20,
     title: str = "",
 ) -> Path:
-    """Write a GIF of the mechanism over all turns of its shift's law, and below it the slider position.
+    """Write a GIF of the mechanism over all turns of its shift's law, with the slider position over the crank angle below it.
 
-    Where the crank cannot turn fully it goes to and fro in the widest range in which it can be assembled.
+    If the crank cannot turn fully, it moves to and fro in the widest range of assembly.
 
     Parameters
     ----------
     parameters : SliderCrankParameters
     path : str or Path
-        Of the GIF.
+        Path of the GIF.
     law : PeriodicShift, optional
-        The shift over the crank angle; by default none.
+        The shift over the crank angle; by default zero.
     unit, view, title
-        As of `plot_mechanism`.
+        As for `plot_mechanism`.
     frames : int
-        Pictures in all.
+        Number of frames.
 
     Raises
     ------
     AssemblyError
-        If it cannot be assembled at any crank angle.
+        If the mechanism cannot be assembled at any crank angle.
     InputError
-        If there are fewer than two frames, or the unit is not known.
+        If there are fewer than two frames, or the unit is unknown.
     """
     check_frames(frames)
     law = constant_shift(0.0) if law is None else law
@@ -493,7 +491,7 @@ def animate_mechanism(
         total = figure.get_figheight()
         below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
         write_title(figure, title)
-        _slides(below, parts, unit)
+        _plot_slider_position(below, parts, unit)
         (dot,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=7)
         with gif(figure, path, frames_per_second) as (file, add_frame):
             for pose in poses:
@@ -505,8 +503,8 @@ def animate_mechanism(
     return file
 
 
-def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
-    """Plot the slider position over the crank angle with dead centres and limits."""
+def _plot_slider_position(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
+    """Plot the slider position over the crank angle, and mark dead centres and limits of assembly."""
     for part in parts:
         axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=COLOURS[0], zorder=3)
         for places, _, colour, marker in part.marks:
@@ -522,17 +520,17 @@ def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
 def plot_range(
     parameters: SliderCrankParameters, *, law: PeriodicShift | None = None, unit: str = "mm", title: str = ""
 ) -> Figure:
-    """Draw where the mechanism can be assembled: round the crank's circle, and over the crank angle.
+    """Draw the range of assembly on the crank pin's circle and over the crank angle.
 
-    On the circle, seen against the crank axis, the range of assembly is drawn full and the rest dotted; beside it are the
-    margin of assembly (rod length less the crank pin's distance from the guide) and the slider position, with dead centres and
+    On the circle, seen along the crank axis, the range of assembly is a solid line and the rest is dotted. Beside it are the
+    assembly margin (rod length minus distance of the crank pin from the guide) and the slider position, with dead centres and
     limits.
 
     Parameters
     ----------
     parameters : SliderCrankParameters
     law : PeriodicShift, optional
-        The shift over the crank angle; by default none.
+        The shift over the crank angle; by default zero.
     unit : str
         One of `UNITS`.
     title : str
@@ -540,7 +538,7 @@ def plot_range(
     Raises
     ------
     InputError
-        If the unit is not known.
+        If the unit is unknown.
     """
     law = constant_shift(0.0) if law is None else law
     factor = _factor(unit)
@@ -555,7 +553,7 @@ def plot_range(
         panels = figure.subplot_mosaic(
             [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)
         )
-        _circle(panels["circle"], parts, factor * p.a1, unit)
+        _draw_circle(panels["circle"], parts, factor * p.a1, unit)
         upper = panels["margin"]
         missing: dict[str, Any] = {"where": (margin < 0.0).tolist(), "label": "the rod does not reach the guide"}
         upper.fill_between(np.degrees(angles), margin, 0.0, color="0.85", linewidth=0.0, **missing)
@@ -565,7 +563,7 @@ def plot_range(
         upper.axhline(0.0, color="0.3", linewidth=HAIR)
         upper.set_ylabel(f"assembly margin [{unit}]")
         upper.sharex(panels["slider"])
-        _slides(panels["slider"], parts, unit)
+        _plot_slider_position(panels["slider"], parts, unit)
         for angle in (degrees(float(part.angles[end])) for part in parts if part.limits for end in (0, -1)):
             for axis in (upper, panels["slider"]):
                 axis.axvline(angle, color=_LIMIT, linewidth=THIN, linestyle="--", zorder=1)
@@ -574,8 +572,8 @@ def plot_range(
         return finish(figure)
 
 
-def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:
-    """Draw the crank pin's circle seen along the crank axis, with the part that the crank can reach."""
+def _draw_circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:
+    """Draw the crank pin's circle, seen along the crank axis, with the part that the crank can reach as a solid line."""
     turn = np.linspace(0.0, 2.0 * pi, 181)
     axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=LINE)
     for part in parts:

@@ -1,6 +1,6 @@
-"""Solids in space, painted from back to front in orthographic projection.
+"""Paint solids in space in orthographic projection, from back to front.
 
-A solid is an array (n, 4, 3) of faces of four corners, anticlockwise from outside.
+A solid is an array (n, 4, 3) of n faces with four corners each, anticlockwise seen from outside.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-#: Towards the light, along right, up and towards of the view.
+#: Direction towards the light: components to the right, upwards, and towards the eye.
 _LIGHT = np.array([-0.25, 0.75, 0.61])
 
 
 def tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
-    """Return a cylinder with closed ends, in pieces along its length, each painted at its own depth."""
+    """Return a cylinder with closed ends; it is divided along its length into pieces, which are painted by depth."""
     way = (end - start) / np.linalg.norm(end - start)
     first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
     first /= np.linalg.norm(first)
@@ -41,7 +41,7 @@ def tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, 
 
 
 def ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
-    """Return a sphere."""
+    """Return a sphere; ``sides`` is the number of faces round its equator."""
     turn, rise = np.meshgrid(
         np.linspace(0.0, 2.0 * pi, sides + 1), np.linspace(-0.5 * pi, 0.5 * pi, sides // 2 + 1), indexing="ij"
     )
@@ -51,7 +51,10 @@ def ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
 
 
 def box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *, pieces: int = 1) -> FloatArray:
-    """Return a box between corners along right-handed rows from an origin, in pieces along the first row."""
+    """Return a box from corner ``low`` to corner ``high``, divided into pieces along its first axis.
+
+    The corners (3,) are coordinates along ``rows``, right-handed unit vectors (3, 3), from the point ``origin``.
+    """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     faces = []
     cuts = np.linspace(low[0], high[0], pieces + 1)
@@ -71,19 +74,19 @@ def box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *
 
 
 def paint(axis: Axes, solids: Sequence[tuple[FloatArray, str]], view: FloatArray) -> FloatArray:
-    """Paint the faces of solids, each with its colour, that are turned towards the eye.
+    """Paint the faces of solids that are turned towards the eye; each solid has a colour.
 
     Parameters
     ----------
     axis : Axes
     solids : sequence of (ndarray, str)
     view : ndarray, shape (3, 3)
-        Rows: right and up on the page, and towards the eye.
+        Unit vectors in its rows: right and up on the page, and towards the eye.
 
     Returns
     -------
     ndarray, shape (n, 2)
-        Points on the page that are covered: middles and corners of the faces.
+        Covered points on the page: middles and corners of the painted faces.
     """
     seen = np.concatenate([solid for solid, _ in solids]) @ view.T
     colours = np.concatenate([np.broadcast_to(to_rgb(colour), (len(solid), 3)) for solid, colour in solids])

@@ -1,4 +1,4 @@
-"""Pictures of linkages that were found: to scale with their curve and target, their errors, and what was traded for what.
+"""Plot linkages found by synthesis: drawings to scale with curve and target, errors, transmission angle and trade-offs.
 
 Lengths are shown in mm, angles in degrees.
 """
@@ -70,16 +70,16 @@ from .style import (
 FloatArray = NDArray[np.float64]
 
 MM_PER_METRE = 1e3
-#: A sheet of paper, across (in).
+#: Width and height of an A4 sheet in landscape (inches).
 A4 = (297.0 / 25.4, 210.0 / 25.4)
-#: Length of the longest error vector, as a share of the target's extent.
+#: Greatest length of a magnified error vector, relative to the extent of the target.
 LONGEST = 0.12
-#: Rotations whose positions the frame of a picture must hold.
+#: Number of crank rotations at which the linkage must fit in the frame of a picture.
 FRAMED = 72
 
 
 class _Frame:
-    """Limits that hold a linkage in all its positions (mm), and the size in which its pins are drawn."""
+    """Axis limits that contain a linkage at all ``rotations`` (mm), and the size of its pins."""
 
     def __init__(self, scene: LinkageScene, rotations: FloatArray) -> None:
         places = [pins for phi in rotations if (pins := scene.pins(float(phi))) is not None]
@@ -88,16 +88,16 @@ class _Frame:
         everything = MM_PER_METRE * np.vstack(points)
         low, high = everything.min(axis=0), everything.max(axis=0)
         self.extent = float((high - low).max())
-        #: Length by which pins, supports and letters are drawn.
+        #: Length that scales pins, supports and distances of letters (mm).
         self.unit = self.extent / 42.0
         self.low, self.high = low - 3.0 * self.unit, high + 3.0 * self.unit
 
     def prepare(self, axis: Axes) -> None:
-        _one_scale(axis, self.low, self.high)
+        _set_one_scale(axis, self.low, self.high)
 
 
-def _one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
-    """Give both axes one scale with at least this box in view; the rest of the panel shows more of the plane."""
+def _set_one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
+    """Give both axes the same scale; the panel shows at least the box from ``low`` to ``high`` (mm)."""
     axis.update_datalim(np.array([low, high]))
     axis.margins(0.0)
     axis.set_aspect("equal", adjustable="datalim")
@@ -105,19 +105,19 @@ def _one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
     axis.set_ylabel("y [mm]")
 
 
-def _line(axis: Axes, points: Any, **options: Any) -> None:
+def _draw_line(axis: Axes, points: Any, **options: Any) -> None:
     look: dict[str, Any] = {"color": GROUND, "linewidth": LINE, "solid_capstyle": "round"}
     axis.plot(*np.array(points).T, **look | options)
 
 
-def _support(axis: Axes, at: FloatArray, unit: float) -> None:
+def _draw_support(axis: Axes, at: FloatArray, unit: float) -> None:
     """Draw the bearing of a fixed pin."""
     foot, half = at[1] - 1.5 * unit, 0.85 * unit
     corners = np.array([at, [at[0] - half, foot], [at[0] + half, foot]])
     axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=THIN, zorder=5))
-    _line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=THIN, zorder=5)
+    _draw_line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=THIN, zorder=5)
     for x in np.linspace(at[0] - 0.9 * unit, at[0] + 1.3 * unit, 5):
-        _line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=HAIR, zorder=5)
+        _draw_line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=HAIR, zorder=5)
 
 
 def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
@@ -136,7 +136,7 @@ def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> Non
     for piece in scene.curves:
         axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=THIN, zorder=2)
     if not scene.curves:
-        # of a function of the rocker's angle, the ways of B and C, with gaps where the links cannot be joined
+        # for a rocker function the paths of B and C, with gaps where the links cannot be joined
         places = [scene.pins(float(phi)) for phi in scene.transmission[0]]
         for name, colour in (("B", CRANK), ("C", ROCKER)):
             way = MM_PER_METRE * np.array([(np.nan, np.nan) if pins is None else pins[name] for pins in places])
@@ -148,27 +148,27 @@ def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> Non
 def _draw_linkage(
     axis: Axes, scene: LinkageScene, frame: _Frame, pins: Mapping[str, tuple[float, float]], *, letters: bool = True
 ) -> None:
-    """Draw links, pins and supports at one position."""
+    """Draw links, pins and supports at one position; ``pins`` are their positions by name (m)."""
     unit = frame.unit
     at = {name: MM_PER_METRE * np.array(place) for name, place in pins.items()}
     a, b, c, d, e = (at[name] for name in "ABCDE")
     p = at.get("P")
     link: dict[str, Any] = {"linewidth": 3.6 if letters else 2.4}
-    _line(axis, [a, e], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
-    _support(axis, a, unit)
+    _draw_line(axis, [a, e], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
+    _draw_support(axis, a, unit)
     if scene.guide is not None:
         _draw_slider(axis, MM_PER_METRE * scene.guide, d, unit)
     else:
-        _support(axis, e if scene.second_crank else d, unit)
+        _draw_support(axis, e if scene.second_crank else d, unit)
     if scene.second_crank:
-        _line(axis, [e, d], color=CRANK, zorder=8, **link)
+        _draw_line(axis, [e, d], color=CRANK, zorder=8, **link)
     if p is not None:
         axis.add_patch(Polygon([b, c, p], facecolor=COUPLER, alpha=0.14, edgecolor="none", zorder=5))
-        _line(axis, [b, p, c], color=COUPLER, linewidth=LINE, zorder=6)
+        _draw_line(axis, [b, p, c], color=COUPLER, linewidth=LINE, zorder=6)
     if not isinstance(scene.linkage, SliderCrank):
-        _line(axis, [d, c], color=ROCKER, zorder=6, **link)
-    _line(axis, [b, c], color=COUPLER, zorder=7, **link)
-    _line(axis, [a, b], color=CRANK, zorder=8, **link)
+        _draw_line(axis, [d, c], color=ROCKER, zorder=6, **link)
+    _draw_line(axis, [b, c], color=COUPLER, zorder=7, **link)
+    _draw_line(axis, [a, b], color=CRANK, zorder=8, **link)
     for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
         axis.add_patch(Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=THIN, zorder=9))
     if p is not None:
@@ -184,7 +184,7 @@ def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> N
     left = np.array([-along[1], along[0]])
     for side in (-0.8, 0.8):
         rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
-        _line(axis, rail, linewidth=THIN, zorder=3)
+        _draw_line(axis, rail, linewidth=THIN, zorder=3)
     block = [d + s * 1.3 * unit * along + n * 0.8 * unit * left for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     axis.add_patch(Polygon(block, facecolor=BLOCK, edgecolor=SLIDER, linewidth=LINE, zorder=4))
 
@@ -196,7 +196,7 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
     if "P" in at:
         lines += [(at["B"], at["P"]), (at["C"], at["P"])]
     fixed = [at["A"], at["E"] if scene.second_crank else at["D"]]
-    # the bearings: their height, and their foot
+    # height and foot of the bearings
     lines += [(pin, pin - np.array([0.0, 2.0 * unit])) for pin in fixed]
     lines += [(pin - np.array([1.8, 1.7]) * unit, pin + np.array([1.5, -1.7]) * unit) for pin in fixed]
     if scene.guide is not None:
@@ -212,8 +212,8 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
         marks.append(place)
 
 
-def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:
-    """Return the first crank rotation at which the linkage can be drawn, and the pins there."""
+def _start_position(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:
+    """Return the first crank rotation (rad) at which the links can be joined, and the positions of the pins there (m)."""
     for phi in (*scene.rotation, *scene.transmission[0]):
         pins = scene.pins(float(phi))
         if pins is not None:
@@ -221,8 +221,8 @@ def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]
     raise InputError("the links cannot be joined at any rotation of the crank: there is nothing to draw")
 
 
-def _around(scene: LinkageScene) -> FloatArray:
-    """Return the rotations by which the scene is framed."""
+def _framed_rotations(scene: LinkageScene) -> FloatArray:
+    """Return crank rotations (rad), at which the links can be joined, whose positions must fit in the frame."""
     rotation, angle = scene.transmission
     joined = rotation[np.isfinite(angle)]
     chosen: FloatArray = joined[np.linspace(0, len(joined) - 1, min(len(joined), FRAMED + 1)).round().astype(int)]
@@ -230,17 +230,17 @@ def _around(scene: LinkageScene) -> FloatArray:
 
 
 def magnification(worst: float, extent: float) -> float:
-    """Return the factor, 1, 2 or 5 times a power of ten, that makes the longest error vector `LONGEST` of an extent."""
+    """Return the magnification of errors, 1, 2 or 5 times a power of ten, with which the worst is at most `LONGEST` extents."""
     if not (np.isfinite(worst) and worst > 1e-9 * extent):
         return 1.0
     most = LONGEST * extent / worst
     power = 10.0 ** np.floor(log10(most))
-    # half of it where the logarithm was rounded up
+    # 0.5 if the logarithm was rounded up
     return max(1.0, float(power * max(m for m in (0.5, 1.0, 2.0, 5.0) if m * power <= most)))
 
 
-def _enlarged(axis: Axes, scene: LinkageScene) -> None:
-    """Plot target and path alone with magnified error vectors."""
+def _plot_magnified_errors(axis: Axes, scene: LinkageScene) -> None:
+    """Plot target and path, without the linkage, with magnified error vectors."""
     assert scene.target is not None
     columns = scene.stations
     wanted = MM_PER_METRE * np.column_stack([columns["target x [m]"], columns["target y [m]"]])
@@ -254,25 +254,25 @@ def _enlarged(axis: Axes, scene: LinkageScene) -> None:
     _draw_target(axis, scene, size=4.0)
     if scene.traced is not None:
         axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=LINE, zorder=4, label="path")
-    if not _met(scene):
+    if not _is_met(scene):
         axis.plot(*strokes.T, color=CRANK, linewidth=HAIR, zorder=5, label=f"error{times}")
     points = np.vstack([wanted, ends])
     low, high = points.min(axis=0), points.max(axis=0)
     rim = 0.06 * float((high - low).max())
-    _one_scale(axis, low - rim, high + rim)
+    _set_one_scale(axis, low - rim, high + rim)
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
 
 
-def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
-    """Return the abscissa of the stations and its label."""
+def _station_axis(scene: LinkageScene) -> tuple[FloatArray, str]:
+    """Return the values of the stations along the x axis, and the label of the axis."""
     rotation = np.degrees(scene.stations["crank rotation [rad]"])
     if scene.timed:
         return rotation, "crank rotation [deg]"
     return np.arange(len(rotation), dtype=float), "target point"
 
 
-def _rocker(axis: Axes, scene: LinkageScene) -> None:
-    """Plot the angle of the rocker over the crank's rotation with the target."""
+def _plot_rocker(axis: Axes, scene: LinkageScene) -> None:
+    """Plot the rocker angle over the crank rotation with its target."""
     assert scene.function is not None
     columns = scene.stations
     x = np.degrees(columns["crank rotation [rad]"])
@@ -284,15 +284,15 @@ def _rocker(axis: Axes, scene: LinkageScene) -> None:
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
 
 
-def _met(scene: LinkageScene) -> bool:
-    """Return whether every target is met but for rounding."""
+def _is_met(scene: LinkageScene) -> bool:
+    """Return whether all errors are only rounding."""
     errors = [scene.stations[name] for name in ("error [m]", "error of angle [rad]") if name in scene.stations]
     return all(np.nanmax(np.abs(error), initial=0.0) < 1e-3 * ROUNDING for error in errors)
 
 
-def _errors(axis: Axes, scene: LinkageScene) -> None:
-    """Plot the errors station by station."""
-    x, words = _stations(scene)
+def _plot_errors(axis: Axes, scene: LinkageScene) -> None:
+    """Plot the errors, of position and of angle, at the stations."""
+    x, words = _station_axis(scene)
     columns = scene.stations
     few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
     if "error [m]" in columns:
@@ -316,8 +316,8 @@ def _errors(axis: Axes, scene: LinkageScene) -> None:
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _transmission(axis: Axes, scene: LinkageScene) -> None:
-    """Plot the transmission angle over a turn, the part of the task as a strong line."""
+def _plot_transmission(axis: Axes, scene: LinkageScene) -> None:
+    """Plot the transmission angle over a crank turn; the part of the turn that the task uses is a thick line."""
     rotation, angle = scene.transmission
     turns, angles = np.degrees(rotation), np.degrees(angle)
     begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
@@ -327,12 +327,12 @@ def _transmission(axis: Axes, scene: LinkageScene) -> None:
     axis.axhline(90.0, color="0.6", linewidth=HAIR)
     axis.set_ylim(0.0, 180.0)
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
-    _quarters(axis, turns)
+    _tick_quarter_turns(axis, turns)
     axis.set_ylabel("transmission\nangle [deg]")
 
 
-def _motion(axis: Axes, scene: LinkageScene) -> None:
-    """Plot the motion of the rocker pivot over a turn."""
+def _plot_pivot_motion(axis: Axes, scene: LinkageScene) -> None:
+    """Plot the motion of the rocker pivot, of a slider or a second crank, over a crank turn."""
     assert scene.motion is not None
     name, values = scene.motion
     if name.endswith("[m]"):
@@ -341,36 +341,36 @@ def _motion(axis: Axes, scene: LinkageScene) -> None:
         name, values = name.replace("[rad]", "[deg]"), np.degrees(values)
     turns = np.degrees(scene.transmission[0])
     axis.plot(turns, values, color=SLIDER)
-    _quarters(axis, turns)
+    _tick_quarter_turns(axis, turns)
     axis.set_ylabel(name.replace(" ", "\n", 1))
 
 
-def _quarters(axis: Axes, turns: FloatArray) -> None:
+def _tick_quarter_turns(axis: Axes, turns: FloatArray) -> None:
     axis.set_xticks(np.arange(90.0 * np.ceil(turns[0] / 90.0 - 1e-9), turns[-1] + 1.0, 90.0))
     axis.set_xlabel("crank rotation [deg]")
 
 
-def _panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool = True) -> None:
-    """Draw the linkage at its start with its curve and the target."""
-    _, pins = _start(scene)
-    frame = _Frame(scene, _around(scene))
+def _draw_panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool = True) -> None:
+    """Draw the linkage at the start of its motion with its curve and the target."""
+    _, pins = _start_position(scene)
+    frame = _Frame(scene, _framed_rotations(scene))
     frame.prepare(axis)
     _draw_target(axis, scene, size=size)
     _draw_curves(axis, scene)
     _draw_linkage(axis, scene, frame, pins, letters=letters)
 
 
-def _task(axis: Axes, scene: LinkageScene) -> None:
-    """Plot target and result: the function, or the path with magnified errors."""
+def _plot_task(axis: Axes, scene: LinkageScene) -> None:
+    """Plot target and result of the task: the rocker function, or the path with magnified errors."""
     if scene.function is not None:
-        _rocker(axis, scene)
+        _plot_rocker(axis, scene)
     else:
-        _enlarged(axis, scene)
+        _plot_magnified_errors(axis, scene)
 
 
 @plot.register
 def plot_solution(solution: Solution, *, title: str = "") -> Figure:
-    """Plot a linkage to scale, target and path with magnified errors or the function, errors and transmission angle.
+    """Plot a linkage to scale, its target and result with magnified errors, the errors, and the transmission angle.
 
     Raises
     ------
@@ -379,7 +379,7 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
     """
     scene = LinkageScene(solution, title)
     with styled():
-        met = _met(scene)
+        met = _is_met(scene)
         right = ["task", *([] if met else ["errors"]), "transmission", *([] if scene.motion is None else ["motion"])]
         figure = Figure(figsize=(10.4, 3.1 + 1.3 * max(3, len(right))))
         panels = figure.subplot_mosaic(
@@ -387,13 +387,13 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
             width_ratios=(1.25, 1.0),
             height_ratios=(2.1, *(1.0 for _ in right[1:])),
         )
-        _panel(panels["linkage"], scene, size=2.5)
-        _task(panels["task"], scene)
+        _draw_panel(panels["linkage"], scene, size=2.5)
+        _plot_task(panels["task"], scene)
         if not met:
-            _errors(panels["errors"], scene)
-        _transmission(panels["transmission"], scene)
+            _plot_errors(panels["errors"], scene)
+        _plot_transmission(panels["transmission"], scene)
         if scene.motion is not None:
-            _motion(panels["motion"], scene)
+            _plot_pivot_motion(panels["motion"], scene)
         write_title(figure, scene.title)
         write_notes(figure, ["Every target is met: errors are rounding alone."] if met else [])
         figure.align_ylabels([panels[name] for name in right])
@@ -408,12 +408,12 @@ def plot_sheet(
     Parameters
     ----------
     solution : Solution or Assessment
-        An assessment is not computed anew.
+        A solution is assessed first.
     forces : PinForces, optional
-        Without them there is no panel of them.
+        Pin forces; without them there is no panel of them.
     title : str
     made : str
-        What it is made of, and what its forces are for, in a line.
+        Note on the material, and on the load case of the forces.
 
     Raises
     ------
@@ -432,11 +432,11 @@ def plot_sheet(
             width_ratios=(1.2, 1.0),
             height_ratios=(*(2.4 if name == "task" else 1.0 for name in right), 1.5),
         )
-        _panel(panels["linkage"], scene, size=2.0)
-        _task(panels["task"], scene)
-        _transmission(panels["transmission"], scene)
+        _draw_panel(panels["linkage"], scene, size=2.0)
+        _plot_task(panels["task"], scene)
+        _plot_transmission(panels["transmission"], scene)
         if forces is not None:
-            _forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, SliderCrank) else "D")
+            _plot_forces(panels["forces"], forces, "guide" if isinstance(solution.linkage, SliderCrank) else "D")
         head, *dimensions = assessment.dimensions
         panels["table"].axis("off")
         grid = panels["table"].table(
@@ -451,23 +451,23 @@ def plot_sheet(
         return finish(figure)
 
 
-def _forces(axis: Axes, forces: PinForces, last: str) -> None:
-    """Plot the resultant force on each pin over the rotation of the crank; the last pin has another name."""
+def _plot_forces(axis: Axes, forces: PinForces, last: str) -> None:
+    """Plot the resultant force on each pin over the crank rotation; ``last`` names the fourth: D or the guide."""
     for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, COLOURS):
         axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
-    _quarters(axis, np.degrees(forces.rotation))
+    _tick_quarter_turns(axis, np.degrees(forces.rotation))
     axis.set_ylabel("pin force [N]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, borderpad=0.2, columnspacing=1.0)
 
 
 @plot.register
 def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
-    """Plot the ranked linkages beside one another, each to its own scale, with curve, target and errors.
+    """Plot the ranked linkages beside one another, each to its own scale, with curve, target and error.
 
     Raises
     ------
     InputError
-        If there are none.
+        If there are no linkages.
     """
     scenes = [LinkageScene(s, f"{k}: {headline(s)}") for k, s in enumerate(synthesis.solutions, start=1)]
     if not scenes:
@@ -478,7 +478,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         figure = Figure(figsize=(3.5 * columns, 3.8 * rows + 0.3 + (0.3 if title else 0.0)))
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
-            _panel(axis, scene, size=1.8, letters=False)
+            _draw_panel(axis, scene, size=1.8, letters=False)
             axis.set_title("\n".join(fill(line, 46) for line in scene.title.splitlines()), fontsize=SMALL)
         names = [("crank", CRANK), ("coupler", COUPLER), ("rocker", ROCKER), ("target", TARGET), ("path", TRACE)]
         if all(isinstance(scene.linkage, SliderCrank) for scene in scenes):
@@ -495,7 +495,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
 
 @plot.register
 def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
-    """Plot quality function and worst error over the limit in a panel each; limits without a linkage are marked below.
+    """Plot quality function and worst error over the limit that was varied; limits without a linkage are marked.
 
     Raises
     ------
@@ -542,9 +542,10 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
 def animate_solution(
     solution: Solution, path: str | Path, *, title: str = "", frames: int = 48, frames_per_second: int = 20
 ) -> Path:
-    """Write a GIF of a turn, or of the part of one that the crank can make: the linkage, and the transmission angle below.
+    """Write a GIF of the linkage over a crank turn, with the transmission angle below it.
 
-    Of a rocker function its angle with the target is below. Positions in which the links cannot be joined are left out.
+    For a rocker function the rocker angle with its target is below. Positions at which the links cannot be joined are left
+    out.
 
     Raises
     ------
@@ -553,10 +554,10 @@ def animate_solution(
     """
     check_frames(frames)
     scene = LinkageScene(solution, title)
-    first, _ = _start(scene)
+    first, _ = _start_position(scene)
     backwards = len(scene.rotation) > 1 and scene.rotation[-1] < scene.rotation[0]
     turn = first + (-1.0 if backwards else 1.0) * np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
-    frame = _Frame(scene, _around(scene))
+    frame = _Frame(scene, _framed_rotations(scene))
     width, height = frame.high - frame.low
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
     with styled():
@@ -564,9 +565,9 @@ def animate_solution(
         above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
         write_title(figure, scene.title)
         if scene.function is not None:
-            _rocker(below, scene)
+            _plot_rocker(below, scene)
         else:
-            _transmission(below, scene)
+            _plot_transmission(below, scene)
         x, y = np.degrees(scene.transmission if scene.function is None else scene.function)
         (now,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=6)
         trace: list[FloatArray] = []
@@ -586,7 +587,7 @@ def animate_solution(
                         artist.remove()
                 if "P" in pins:
                     trace.append(MM_PER_METRE * np.array(pins["P"]))
-                    _line(above, trace, color=TRACE, linewidth=BOLD, zorder=4)
+                    _draw_line(above, trace, color=TRACE, linewidth=BOLD, zorder=4)
                 _draw_linkage(above, scene, frame, pins, letters=False)
                 at = x[0] + (np.degrees(phi) - x[0]) % 360.0
                 now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])

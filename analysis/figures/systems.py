@@ -1,4 +1,4 @@
-"""Pictures of systems: the diagram, a run with its power residuals, the error of couplings over the step."""
+"""Plot systems of FMUs: block diagram, runs with power residuals, and errors of couplings over the communication step."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from .style import (
     write_title,
 )
 
-#: Room that a connection keeps from the parts, and between two connections (mm).
+#: Clearance of connections from parts, and distance between two connections (mm).
 _CLEAR, _LANE = 8.0, 5.0
 
 
 @plot.register
 def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
-    """Draw the parts of a system with their connected ports, and the connections."""
+    """Draw the block diagram of a system: parts, connected ports, and connections."""
     placed = boxes(wiring)
     lowest = min(box.bottom for box in placed.values())
     width = max(box.right for box in placed.values()) + 60.0
@@ -77,7 +77,10 @@ def plot_wiring(wiring: Wiring, *, title: str = "") -> Figure:
 def _path(
     start: tuple[float, float], end: tuple[float, float], number: int, lowest: float
 ) -> list[tuple[float, float]]:
-    """Return a connection's corners: straight to a part on the right, else below all parts and back."""
+    """Return the corners of a connection: directly to a part on the right, otherwise round below all parts.
+
+    ``number`` is that of the connection, which gives it a lane of its own; ``lowest`` is the lower edge of the parts (mm).
+    """
     lane = _CLEAR + _LANE * (number % 9)
     if end[0] > start[0]:
         x = end[0] - lane
@@ -95,7 +98,7 @@ def _path(
 
 @plot.register
 def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "") -> Figure:
-    """Draw outputs of a run over time, by default those that are connected, accelerations left out, and the power residuals."""
+    """Plot outputs of a run over time, by default all connected ones but accelerations, and the power residuals."""
     names = names or [name for name in run.connected if not name.endswith("acceleration")]
     with styled():
         rows = len(names) + bool(run.powers)
@@ -110,7 +113,7 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
             draw_over_time(axes[-1], run.time, power, label=f"at {spoken(name.rpartition('.')[0])}")
         if run.powers:
             axes[-1].set_ylabel("power that the\ncoupling brings in\n[W]", fontsize=SMALL)
-            # above the axes: the curves fill them
+            # above the axes, as the curves fill them
             axes[-1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=TINY, borderaxespad=0.2)
         axes[-1].set_xlabel("time [s]")
         write_title(figure, title or f"{run.title}, coupling: {run.coupling}")
@@ -121,12 +124,12 @@ def plot_system_run(run: SystemRun, names: Sequence[str] = (), *, title: str = "
 
 @plot.register
 def plot_convergence(found: Convergence, *, title: str = "") -> Figure:
-    """Draw the error of each coupling over the communication step, with its order."""
+    """Plot the error of each coupling over the communication step; the legend states the order of convergence."""
     with styled():
         figure = Figure(figsize=(6.0, 4.2))
         axes = figure.add_subplot()
         for number, (way, errors) in enumerate(found.errors.items()):
-            # seen under another curve by its line and its size
+            # line styles and marker sizes differ, so that covered curves are visible
             look: dict[str, Any] = {"linestyle": LINES[number % len(LINES)], "marker": "osD^v"[number % 5]}
             size = 7.0 - min(number, 4)
             label = f"{way}: order {found.order(way):.2f}"

@@ -1,4 +1,4 @@
-"""The response before and after parameters were tuned, with the range of speeds that was to be kept free."""
+"""Plot the response before and after tuning, with the range of speeds to be kept clear."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .curves import Curve, Panel, Shade, plot_curves
 from .dispatch import plot
 from .style import COLOURS, LINE, spoken
 
-#: Multiplier at which the axis ends.
+#: Greatest Floquet multiplier on the axis.
 _GREATEST = 2.0
 
 
@@ -40,7 +40,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     panels = []
     for number, (label, value) in enumerate(rows):
         curves: list[Curve] = []
-        # the curve after the change is seen on the one before where both are the same
+        # the curve after the change is thinner and above the one before, so that equal curves are both visible
         for colour, width, when, survey in (
             (COLOURS[1], 2.5 * LINE, "" if number else "before", tuned.before),
             (COLOURS[0], LINE, "" if number else "after", tuned.after),
@@ -55,7 +55,7 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
                 curves=curves,
                 shades=[Shade(low=low, high=high, label="" if number else "range to be kept clear")],
                 x_range=(span[0], span[1]),
-                y_range=_in_view(curves),
+                y_range=_view_range(curves),
                 legend_at="above",
             )
         )
@@ -67,8 +67,8 @@ def plot_tuned(tuned: Tuned, *, title: str = "") -> Figure:
     return plot_curves(panels, title=title, notes=[f"Changed: {', '.join(changed)}. Dashed: unstable.", *tuned.missed])
 
 
-def _in_view(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Return the range of the curves with a rim; from zero if they come near it."""
+def _view_range(curves: Sequence[Curve]) -> tuple[float, float]:
+    """Return the range of the y axis: that of the curves with a margin, and from zero if the least value is near zero."""
     y = np.concatenate([np.asarray(curve.y, dtype=float) for curve in curves])
     low, high = float(np.nanmin(y)), float(np.nanmax(y))
     rim = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
@@ -76,13 +76,16 @@ def _in_view(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def _curves(survey: Survey, value: object, colour: str, width: float, name: str, scale: float) -> Iterator[Curve]:
-    """Plot branches of the response, stable parts solid; only the first has a name."""
+    """Yield the curves of a quantity along the branches of a response, stable parts solid, unstable ones dashed.
+
+    ``value`` computes the quantity from a branch; only the first curve has the ``name`` in the legend.
+    """
     for branch in survey.response.branches:
         stable = branch.largest_multiplier <= 1.0
         for part, line in ((stable, "-"), (~stable, "--")):
             if not part.any():
                 continue
-            # an unstable part reaches to the stable ones beside it
+            # unstable parts are extended to the neighbouring stable points
             wide = part | np.append(part[1:], False) | np.insert(part[:-1], 0, False) if line == "--" else part
             y = np.where(wide, value(branch), np.nan)  # type: ignore[operator]
             yield Curve(x=branch.parameter / scale, y=y, colour=colour, line=line, label=name, width=width)
