@@ -1,4 +1,4 @@
-"""Batches of an ensemble: many runs prepared together over arrays, solved by compiled calls, and kept in files."""
+"""Batches of an ensemble: many runs prepared together with arrays, solved by compiled calls, and saved in files."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from .varied import Varied, constants_of, distinct, over_arrays
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
-#: solver.status of a run that cannot start, by the error.
+#: solver.status of a run that cannot start, by the kind of error.
 _STATUS = {AssemblyError: 3, InputError: 2}
-#: In the place of the compiled code's status, of a run that cannot start.
+#: Status, besides those of the compiled code, of a run that cannot start.
 _NO_START = -2
-#: The same of a run that was interrupted.
+#: Status of a run that was interrupted.
 _PAUSED = -3
-#: The same of a stiff run that was given up, see `cautions.too_slow`.
+#: Status of a stiff run that was given up, see `cautions.too_slow`.
 _GIVEN_UP = -4
 
 
@@ -46,11 +46,11 @@ class Task:
     Attributes
     ----------
     first : int
-        Number of the first of them in the ensemble.
+        Number in the ensemble of the first of these runs.
     outputs : tuple of int or None
-        Columns of the outputs that are wanted; None for states and channels.
+        Columns of the chosen outputs; None for states and channels.
     folder : path or None
-        Where the result is kept.
+        Folder in which the result is saved.
     code : str
         Hash of all code that the result depends on.
     """
@@ -66,26 +66,26 @@ class Task:
     code: str
 
     def run(self, i: int) -> Run:
-        """Prepare one of the runs by itself."""
+        """Return run i of the batch as a single `Run`."""
         return Run(self.parameters[i], self.inputs[i], self.initial[i], self.settings)
 
     @property
     def shapes(self) -> list[tuple[int, ...]]:
-        """Return the shapes of the result arrays: see `_integrate`."""
+        """Return the shapes of the arrays ``ends`` and ``samples`` of `_integrate`."""
         m, n, size = len(self.parameters), len(self.settings.times), self.mechanism.size
         samples = (size, len(self.mechanism.channels)) if self.outputs is None else (len(self.outputs),)
         return [(m, 5 + size + len(self.mechanism.channels)), *((m, n, numbers) for numbers in samples)]
 
     def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Split a flat array into views of these shapes."""
+        """Split a flat array into views of the shapes `shapes`."""
         ends = np.cumsum([prod(shape) for shape in self.shapes])
         return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), self.shapes)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Solved runs, with the fields of `ensemble.Ensemble`; ``samples`` are states and channels, or the outputs wanted, and none
-    where they are already in their place."""
+    """Solved runs of a batch, with fields as in `ensemble.Ensemble`; ``samples`` are states and channels, or the chosen
+    outputs, and empty if they were written into the arrays of the ensemble."""
 
     first: int
     samples: list[NDArray[np.float64]]
@@ -96,7 +96,7 @@ class Result:
 
 
 class Prepared(NamedTuple):
-    """A batch ready for the compiled solver: states at the start, and the errors of the runs that cannot start."""
+    """A batch ready for the compiled solver; ``x`` are the states at the start, ``failures`` the errors of runs without one."""
 
     encoded: Encoded
     batch: Any
@@ -104,7 +104,7 @@ class Prepared(NamedTuple):
     failures: dict[int, LinkworkError]
 
     def digest(self, task: Task) -> str:
-        """Return a hash of everything that the result depends on."""
+        """Return a hash of everything on which the result depends."""
         settings, e = task.settings, self.encoded
         numbers = [settings.hold, settings.tolerance, settings.max_steps, *e.modes.values()]
         digest = hashlib.sha256(
@@ -116,10 +116,10 @@ class Prepared(NamedTuple):
 
 
 def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]] | None = None) -> Result | None:
-    """Solve a batch, or read it from its file; None if it was interrupted before it began.
+    """Solve a batch, or read its result from its file; return None if the ensemble was interrupted before.
 
-    ``heard`` is looked at between compiled calls: once there is something in it, runs end where they are. ``into`` are the
-    arrays of the whole ensemble, where this process has them and the task no folder: samples are written there at once.
+    ``heard`` is checked between compiled calls: if it is not empty, the runs are interrupted. ``into`` are the sample arrays of
+    the whole ensemble, if this process has them and the task has no folder: samples are written there directly.
     """
     if heard:
         return None
@@ -144,7 +144,7 @@ def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]]
 
 
 def _kept(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.float64]:
-    """Return the results as one flat array, read from the batch's file or computed and saved there."""
+    """Return the arrays of `Task.shapes` as one flat array, read from the batch's file or computed and saved there."""
     path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
     kept = None if path is None else load_array(path)
     if kept is None or kept.shape != (sum(map(prod, task.shapes)),):
@@ -198,11 +198,11 @@ def _integrate(
     ends: NDArray[np.float64],
     samples: Sequence[NDArray[np.float64]],
 ) -> bool:
-    """Solve the runs and return whether all of them were finished.
+    """Solve the runs; return False if they were interrupted.
 
-    ``ends`` gets a row for each run: the compiled code's status, the number of samples, the time of the end (s), the number
-    of the channel that was not finite, the number of steps, state and channels at the end. ``samples`` get the samples, NaN
-    after the end of a run.
+    A row of ``ends`` receives for each run the status of the compiled code, the number of samples, the time of the end (s), the
+    number of a channel that was not finite, the number of steps, and state and channels at the end. ``samples`` receive states
+    and channels, or the chosen outputs, at the samples, NaN after the end of a run.
     """
     from ..numerics.vectors import LANES
     from . import compiled, lanes
@@ -257,9 +257,9 @@ def _integrate(
 
 
 def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
-    """Return which runs go in lanes: those whose inputs are constant, or held, in each interval.
+    """Return which runs can be solved in vector lanes: those whose inputs are constant, or held, in each interval.
 
-    The others, with harmonics, ramps, motors, torsion bars or functions of the state, go one by one.
+    Runs with harmonics, ramps, motors, torsion bars or functions of the state are solved one by one.
     """
     from ..numerics.vectors import LANES
 
@@ -271,20 +271,20 @@ def _fits(batch: Any, settings: Settings) -> NDArray[np.bool_]:
 
 
 def prepare(task: Task) -> Prepared:
-    """Prepare a batch over arrays, with the same numbers to the last bit as `Run` and `Run.start`.
+    """Prepare the runs of a batch with array operations; the numbers are those of `Run` and `Run.start` to the last bit.
 
-    Runs that come near the limit of assembly or meet a number that is not finite go through `Run.start`, which says why
-    they cannot start.
+    Runs near the limit of assembly or with a number that is not finite are prepared by `Run.start`, whose error says why a run
+    cannot start.
     """
     from . import compiled
 
     mechanism, t = task.mechanism, float(task.settings.times[0])
     encoded, batch = _acting(task)
     x = np.array(_once(mechanism.state, task.initial))
-    # the energy at the start after the constants
+    # constants, and the energy at the start as last column
     p = np.full((len(x), len(mechanism.constants._fields) + 1), np.nan)
     u = np.zeros((len(x), len(mechanism.channels)))
-    # users' functions are called as the Python they are, as in `sample`
+    # users' functions are called as Python functions, as in `sample`
     source = compiled_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
     compiled.channels_of_many(t, source, batch, x, u)
     doubtful: set[int] = set()
@@ -310,11 +310,11 @@ def prepare(task: Task) -> Prepared:
             p[:, -1] = functions.of(equations.energy)(state, columns)
             for n, (column, scale) in enumerate(zip(state, functions.of(mechanism.error_scale)(parameters, state))):
                 x[:, n], scales[:, n] = column, scale
-        # within the limit of assembly the error has a sentence of the mechanism's own
+        # near the limit of assembly the mechanism itself writes the error message
         sound = np.isfinite(np.column_stack([u, x, scales, p[:, -1]])).all(axis=1) & (clearance > 2 * LIMIT_SINE)
         doubtful |= set(np.flatnonzero(~sound).tolist())
     except (ArithmeticError, ValueError):
-        # of a function of `math`: one by one shows which
+        # raised by a function of `math`: prepare each run by itself to find those concerned
         doubtful = set(range(len(x)))
     failures: dict[int, LinkworkError] = {}
     for i in sorted(doubtful):
@@ -336,13 +336,13 @@ def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
 
 
 def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
-    """Apply a function to each item, but only once to the same object."""
+    """Return the values of a function for the items; it is called only once for the same object."""
     made = {key: make(item) for key, item in {id(item): item for item in items}.items()}
     return [made[id(item)] for item in items]
 
 
 def _acting(task: Task) -> tuple[Encoded, Any]:
-    """The inputs of a batch, those of the first run encoded; and of all, as `compiled.Batch` without constants and scales."""
+    """Return the encoded inputs of the first run, and those of all runs as a `compiled.Batch` without constants and scales."""
     from . import compiled
 
     times, mechanism = task.settings.times, task.mechanism
@@ -360,7 +360,7 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
     constant = -1
 
     def kind_of(inputs: Inputs) -> tuple[int, list[float] | None]:
-        """Return the number of the kind of inputs, and the values if all are constant."""
+        """Encode inputs if they are of a new kind; return the number of their kind, and their values if all are constant."""
         nonlocal constant
         values = inputs.constants(signals)
         if values is None or constant < 0:

@@ -1,4 +1,4 @@
-"""Parameters and cases in TOML or JSON files, with units; see `docs/case-files.md`.
+"""Read and write parameters and cases in TOML or JSON files, with units; see `docs/case-files.md`.
 
 In a file every quantity is a number in SI or a text with its unit, such as ``"15.35 cm"`` or ``"420 rpm"``; the unit's
 dimension is checked. Names are those of the FMI contract: ``[slider] stiffness`` is ``slider.stiffness``.
@@ -43,12 +43,12 @@ def parameters_from(
     data : mapping
     base : parameters of a mechanism, optional
     mechanism : Mechanism, optional
-        Whose parameters they are: by default the base's, or what ``data`` says.
+        Mechanism of the parameters: by default that of ``base``, else the one that ``data`` names or has parameters of.
 
     Raises
     ------
     ParameterError
-        If a name is unknown, a value is wrong, or, without a base, one is missing.
+        If a name is unknown, a value is wrong, or, without ``base``, a value is missing.
     """
     if mechanism is None:
         mechanism = _find_mechanism(data) if base is None else mechanism_of(base)
@@ -71,7 +71,7 @@ def parameters_from(
 
 
 def parameters_to(parameters: Parameters) -> dict[str, Any]:
-    """Write parameters as nested tables of texts with SI units and all digits, with the name of the ``mechanism``."""
+    """Return parameters as nested tables of texts with SI units and all digits, with the name of the ``mechanism``."""
     mechanism = mechanism_of(parameters)
     data: dict[str, Any] = {"mechanism": mechanism.name}
     for name, variable in mechanism.mechanism_variables.items():
@@ -83,7 +83,7 @@ def parameters_to(parameters: Parameters) -> dict[str, Any]:
 
 
 def save_parameters(path: str | Path, parameters: Parameters, *, head: str = "") -> Path:
-    """Write parameters to a TOML or JSON file, as the path's ending says; ``head`` is a comment of a TOML file."""
+    """Write parameters to a TOML or JSON file, by the path's ending; ``head`` is a comment at the top of a TOML file."""
     return files.write_tables(path, parameters_to(parameters), head=head)
 
 
@@ -95,13 +95,13 @@ def load_parameters(path: str | Path) -> Parameters:
     InputError
         If the file cannot be read.
     ParameterError
-        As `parameters_from`.
+        As for `parameters_from`.
     """
     return parameters_from(files.read_tables(path))
 
 
 def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
-    """Return the mechanism of a file: its entry ``mechanism``, or else the mechanism with the parameters it names."""
+    """Return the mechanism of a file: by its entry ``mechanism``, else the one with most of the file's parameter names."""
     if "mechanism" in data:
         try:
             return MECHANISMS[Choice(MECHANISMS)(data["mechanism"], "mechanism")]
@@ -120,18 +120,18 @@ def _find_mechanism(data: Mapping[str, Any]) -> Mechanism:
 
 
 def mechanism_in(data: Mapping[str, Any]) -> Mechanism:
-    """Return the mechanism of a case: that of its published set, or the one that the file names or has parameters of."""
+    """Return the mechanism of a case: that of its published set, else the one that the file names or has parameters of."""
     if "published" in data:
         return mechanism_of(PUBLISHED[Choice(PUBLISHED)(data["published"], "published")].parameters)
     return _find_mechanism(data)
 
 
-#: Entries of every case file that are not parameters of the mechanism, beside those that say what acts on it.
+#: Entries of case files of all mechanisms that are neither parameters nor inputs of the mechanism.
 COMMON = ("mechanism", "title", "published", "initial", "run")
 
 
 class Acting(NamedTuple):
-    """An input of a mechanism: its name among the inputs of a run, and its unit; a flag has none."""
+    """An input of a mechanism: its name in `Inputs`, and its unit, empty for a flag."""
 
     argument: str
     unit: str
@@ -140,8 +140,8 @@ class Acting(NamedTuple):
 def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
     """Return the inputs of a mechanism by their names in case files.
 
-    Of a channel it is `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom stands in the table of
-    the freedom's mode: ``axial.groove``.
+    The name of a channel follows from `name_in_files`: ``slider.force`` is ``force``. A flag that drives a freedom is an entry
+    in the table of the freedom's mode: ``axial.groove``.
     """
     units = {variable.name: variable.unit for variable in mechanism.variables}
     found = {}
@@ -158,7 +158,7 @@ def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunTable:
-    """The table ``[run]``: duration and step."""
+    """The table ``[run]``: duration, step and tolerance of a run."""
 
     stop_time: float | None = entry(Quantity("s"), None)
     revolutions: float | None = entry(Quantity("1", above=0.0), None)
@@ -168,7 +168,7 @@ class RunTable:
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
         """Return the stop time and the sampling step (s).
 
-        By default three turns of the slowest crank in steps of a degree of the fastest, at constant speeds.
+        At constant speeds the defaults are three turns of the slowest crank, in steps of one degree of the fastest.
         """
         turn = turn_durations(inputs, mechanism)
         step = self.step if self.step is not None else 1e-3 if turn is None else turn[1] / 360.0
@@ -205,7 +205,7 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
 def case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
-    """Build a case from the tables of a case file; its CSV tables, and a linkage of a file, are read from ``folder``."""
+    """Build a case from the tables of a case file; ``folder`` is where the files that it names, CSV or a linkage, are read."""
     data = with_linkage(data, folder)
     named = {**data, **(overrides or {})}
     mechanism = mechanism_in(named)
@@ -221,7 +221,7 @@ def case_from(
     try:
         parameters = parameters_from(own, printed, mechanism)
     except UnknownNameError as error:
-        if not set(mechanism.mechanism_variables) <= set(error.known):  # of a part, such as a kind of section
+        if not set(mechanism.mechanism_variables) <= set(error.known):  # an entry of a part, such as of a section
             raise
         others = (*acting, *(f"run.{name}" for name in files.entry_names(RunTable)), *COMMON[:-2])
         raise files.unknown_name(error.name, (*error.known, *others)) from None
@@ -246,7 +246,7 @@ def case_from(
 
 
 def with_names_of_files(data: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Any]:
-    """Return the tables of a case in which inputs that have their FMI names have those of case files."""
+    """Return the tables of a case with inputs under their names in case files instead of their FMI names."""
     result = dict(data)
     for channel in mechanism.channels:
         table, _, leaf = channel.name.rpartition(".")
@@ -260,7 +260,7 @@ def with_names_of_files(data: Mapping[str, Any], mechanism: Mechanism) -> dict[s
 
 
 def _in_files(name: str, mechanism: Mechanism) -> str:
-    """Return the name of an entry that is given for itself, where an input may have its FMI name, as parameters have."""
+    """Return the dotted name of an entry with the FMI name of an input replaced by its name in case files."""
     for channel in mechanism.channels:
         if f"{name}.".startswith(f"{channel.name}."):
             return name_in_files(mechanism, channel) + name.removeprefix(channel.name)
@@ -270,7 +270,7 @@ def _in_files(name: str, mechanism: Mechanism) -> str:
 def _without_rivals(
     data: Mapping[str, Any], overrides: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting]
 ) -> dict[str, Any]:
-    """Return the tables without the other ways to drive a freedom that an override drives, or to end a run."""
+    """Return the tables without the entries that an override replaces: other drives of the same freedom, or end of the run."""
     result = dict(data)
     for given, rival in (("run.stop_time", "revolutions"), ("run.revolutions", "stop_time")):
         if given in overrides and isinstance(run := result.get("run"), Mapping):
@@ -290,9 +290,9 @@ def _without_rivals(
 def _divided(
     data: Mapping[str, Any], mechanism: Mechanism, acting: Mapping[str, Acting], folder: Path
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the tables of the parameters, and the inputs by their arguments.
+    """Split the tables of a case into those of the parameters and the inputs, read and by their names in `Inputs`.
 
-    The inputs stand at the top, in tables of their own, or beside the parameters in the table of a body.
+    Inputs are entries at the top, in tables of their own, or among the parameters in the table of a body.
     """
     readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
     found = {name: readers[name](data[name], name) for name in acting if name in data}
@@ -319,7 +319,7 @@ def _divided(
 def _check_drives(
     mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any, acting: Mapping[str, Acting]
 ) -> None:
-    """Raise ParameterError if a groove or a rate at the start is given that has no effect."""
+    """Raise ParameterError if a groove without amplitude drives, or an initial rate of a held freedom is given."""
     if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
@@ -338,11 +338,11 @@ def _check_drives(
             )
 
 
-# What acts
+# Inputs
 
 
 def _reader(unit: str, folder: Path) -> Reader:
-    """Return the reader of one input: a truth value, a signal or, for a torque, a law or a list of summands."""
+    """Return the reader of an input: a flag if it has no unit, else a signal or, for a torque, a law or a list of summands."""
     if not unit:
         return files.flag
     kinds, value = signal_kinds(unit, folder), Quantity(unit)
@@ -358,7 +358,7 @@ def _reader(unit: str, folder: Path) -> Reader:
                 return Kinds(kinds)(item, name)
         except LinkworkError:
             raise
-        except (ValueError, ArithmeticError) as error:  # of a spline through numbers near the end of the floats
+        except (ValueError, ArithmeticError) as error:  # such as of a spline through numbers near 1e308
             raise InputError(f"{name} cannot be made a signal: {files.first_line(error)}") from error
 
     return Many(signal, single=True) if unit == "N.m" else signal

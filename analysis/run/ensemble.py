@@ -38,7 +38,7 @@ from .trajectory import Trajectory
 from .varied import Varied, constants_of, distinct
 from .varied import vary as sets_of
 
-#: Largest number of samples in a batch whose size the caller leaves open.
+#: Largest number of samples in a batch, if the caller does not choose the size of batches.
 _SAMPLES_OF_BATCH = 1 << 16
 
 
@@ -50,27 +50,27 @@ class Ensemble:
     ----------
     time : ndarray, shape (n,)
     states : ndarray, shape (m, n, states)
-        State of every run, dissipated and supplied work included; NaN after a run that ended early, as ``counts`` tells.
-        No samples where outputs were chosen.
+        State of each run, with the dissipated and the supplied work; NaN after the last sample that the run reached. If
+        outputs were chosen, n is 0 here.
     forces : ndarray, shape (m, n, inputs)
-        Channels at the samples, in the order of the FMI inputs. No samples where outputs were chosen.
+        Channels at the samples, in the order of the FMI inputs. If outputs were chosen, n is 0 here.
     values : ndarray, shape (m, n, k), or None
-        The outputs ``names``, where they were chosen.
+        The outputs ``names`` if outputs were chosen.
     names : tuple of str
-        The outputs there are.
+        Names of the outputs.
     status : ndarray of int, shape (m,)
-        solver.status of each run: 2 where an input was not usable, 3 where the links could not be joined, at the start or
-        later; -1 of a run that was interrupted or not begun.
+        solver.status of each run: 2 if an input was not usable, 3 if the links could not be joined, at the start or later;
+        -1 if the run was interrupted or not begun.
     messages : tuple of str
-        Why a run ended early or did not start; of a run to its end, that it is stiff, or nothing.
+        Why a run ended early or did not start; for a complete run a caution that it is stiff, or empty.
     counts : ndarray of int, shape (m,)
-        Samples that each run reached; 0 of one that did not start.
+        Number of samples that each run reached; 0 if it did not start.
     parameters : sequence
-        Those of the mechanism, one for each run.
+        Parameters of the mechanism for each run.
     modes : ndarray
-        Values of the mechanism's modes, the same for all.
+        Values of the mechanism's modes, the same for all runs.
     energies : ndarray, shape (m,)
-        Mechanical energy of each at the start (J); NaN of one that did not start.
+        Mechanical energy of each run at the start (J); NaN if it did not start.
     """
 
     time: NDArray[np.float64]
@@ -95,7 +95,7 @@ class Ensemble:
         return len(self.parameters)
 
     def __getitem__(self, index: int) -> Trajectory:
-        """Return one run as a `Trajectory` of its samples, without the last configuration of a run that ended early."""
+        """Return one run as a `Trajectory`; unlike `simulate`, a run that ended early has no row for its last configuration."""
         n = int(self.counts[index])
         if self.values is not None:
             values = self.values[index, :n]
@@ -115,7 +115,7 @@ class Ensemble:
 
     @property
     def failures(self) -> dict[int, str]:
-        """Return the messages of the runs that did not reach their end, by number of the run."""
+        """Return the messages of the runs that did not reach their end, by the number of the run."""
         return {i: self.messages[i] for i in np.flatnonzero(self.status != 0).tolist()}
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
@@ -132,7 +132,7 @@ class Ensemble:
 
 
 class EnsembleInterrupted(Interrupted):
-    """An ensemble was interrupted; ``ensemble`` holds what was done, the status of the other runs is -1."""
+    """An ensemble was interrupted; ``ensemble`` has the results so far, and status -1 for the other runs."""
 
     def __init__(self, ensemble: Ensemble, folder: Path | None) -> None:
         self.ensemble = ensemble
@@ -140,7 +140,7 @@ class EnsembleInterrupted(Interrupted):
 
 
 class EnsembleBroken(LinkworkError):
-    """The workers of an ensemble failed, as where one was killed; ``ensemble`` holds what was done."""
+    """The workers of an ensemble failed, for example because they were killed; ``ensemble`` has the results so far."""
 
     def __init__(self, ensemble: Ensemble, folder: Path | None, error: WorkersLost) -> None:
         self.ensemble = ensemble
@@ -179,48 +179,47 @@ def simulate_many(
 ) -> Ensemble:
     """Run many mechanisms, or one under many inputs, in batches of compiled calls.
 
-    ``inputs`` and ``initial`` are one for all or as many as ``parameters``; all inputs must drive the same way and share
-    their Python functions, if they have any. The batches go over ``n_jobs`` threads here, which the compiled solver keeps busy
-    side by side; or over the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky"
-    for processes.
+    ``inputs`` and ``initial`` are one for all runs, or a list with one for each; all inputs must drive the same freedoms in the
+    same way and have the same Python functions, if any. The batches are solved by ``n_jobs`` threads of this process, or by the
+    workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky" for processes.
 
-    Runs whose inputs are constant between jumps, or held, are stepped as many at once as the processor takes doubles; the
+    Runs whose inputs are constant between jumps, or held, are integrated side by side in the vector lanes of the processor; the
     others one after the other.
 
     Parameters
     ----------
     vary : mapping, optional
-        Values of parameters or of constant inputs by their names, as many of each as there are runs, in SI or as texts with
-        units: ``parameters`` and ``inputs`` are then what all runs have in common.
+        Values of parameters or of constant inputs by their names, one for each run, in SI or as texts with units;
+        ``parameters`` and ``inputs`` are then what all runs have in common.
     outputs : sequence of str, optional
         Outputs of the FMI contract to keep; by default states and channels, from which `Ensemble` computes all outputs.
     folder : path, optional
-        Where each batch is kept, once it is done, in a file under a name made from all it depends on: the same call goes on
-        from the batches that are there. Files that are damaged are computed again. The arrays of the ensemble are on that
-        disk too, as long as it is in use, and take little memory.
+        Folder in which each finished batch is saved. The file names are made from everything that the results depend on, so
+        that the same call reads the batches that are there and computes the others, damaged files included. The arrays of
+        the ensemble are also on this disk as long as it is in use, and take little memory.
 
     Other Parameters
     ----------------
     batch : int, optional
-        Runs that are prepared and solved together: by default a quarter of all up to 128, or a sixteenth up to 256, at least
-        16, and fewer where they have many samples.
+        Number of runs that are prepared and solved together: by default a quarter of all runs up to 128, or a sixteenth up to
+        256, fewer if they have many samples, but at least 16.
     start_time, max_steps, progress
-        As the others, those of `simulate`.
+        As for `simulate`, like the arguments that are not described here.
 
     Returns
     -------
     Ensemble
-        A run that cannot start, ends early, or meets an input that is not finite has a status and a message, and leaves the
-        others as they are.
+        A run that cannot start, ends early, or meets an input that is not finite has a status and a message; the other runs
+        are not affected.
 
     Raises
     ------
     InputError, ParameterError
-        If what concerns all runs is not usable.
+        If an argument that concerns all runs is not usable.
     EnsembleInterrupted
-        On Ctrl-C; carries what was computed.
+        On Ctrl-C; it has the results so far.
     EnsembleBroken
-        If workers are killed again and again, or a cluster is gone; carries what was computed.
+        If workers are killed again and again, or a cluster is gone; it has the results so far.
 
     Examples
     --------
@@ -255,7 +254,7 @@ def simulate_many(
     encoded = encode(all_inputs[0], mechanism)
     compiled_source(encoded)
     usual = max(min(128, len(parameters) // 4), min(256, len(parameters) // 16))
-    # whole vectors
+    # a multiple of 8 fills whole vectors
     batch = batch or max(16, min(usual, _SAMPLES_OF_BATCH // len(settings.times)) // 8 * 8)
     code = "" if where is None else _code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
@@ -290,7 +289,7 @@ def simulate_many(
 
 
 class _Gathered:
-    """The arrays of an ensemble, made once and filled with the results as they come."""
+    """The arrays of an ensemble, allocated once and filled with the results of batches as these arrive."""
 
     def __init__(
         self,
@@ -325,7 +324,7 @@ class _Gathered:
             with TemporaryFile(dir=folder) as file:
                 file.truncate(size)
                 if hasattr(os, "posix_fallocate"):
-                    # a full disk is found out now, and not by a signal
+                    # a full disk raises an error now, instead of a signal later
                     os.posix_fallocate(file.fileno(), 0, size)
                 self.maps.append(mmap.mmap(file.fileno(), size))
         except OSError as error:
@@ -370,7 +369,7 @@ class _Gathered:
 
 
 def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
-    """Return a hash of the code that runs depend on: equations, solver, users' functions."""
+    """Return hashes of the code on which results depend: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
     from ..numerics.vectors import LANES
     from . import batches, compiled, lanes
@@ -389,7 +388,7 @@ def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Ite
 def _checked(
     mechanism: Mechanism, inputs: Any, initial: Any, count: int
 ) -> tuple[Sequence[Inputs], list[InitialState]]:
-    """Return the inputs and initial state of each run; all inputs must drive the same way with the same functions."""
+    """Check the inputs and initial states and return those of each run; see `simulate_many` for what inputs must share."""
     all_inputs, starts = _each(inputs, count, "inputs"), _each(initial, count, "initial states")
     nothing, rest = given(mechanism, None, None)
     if not isinstance(all_inputs, Varied):
@@ -424,7 +423,7 @@ def column_of(name: str, names: tuple[str, ...]) -> int:
     Raises
     ------
     InputError
-        If it is not among them.
+        If there is no output of that name.
     """
     if name not in names:
         raise unknown_name(name, names, f"output {name!r}")

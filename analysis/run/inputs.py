@@ -1,6 +1,6 @@
 """Inputs of a run: the class `Inputs`, and the arrays made from it for the compiled code.
 
-One object serves `simulate` and `cosimulate`, and every mechanism: which channels there are, the mechanism says.
+`simulate`, `cosimulate` and all mechanisms take the same class; the mechanism determines which channels there are.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, Sta
 
 #: Types that count as numbers.
 NUMBER = (int, float, np.floating, np.integer)
-#: Turns, at most, that one crank makes while another makes whole turns: beyond that they have no common period to speak of.
+#: Largest numerator and denominator of a ratio of crank speeds: beyond it the cranks count as without a common period.
 MOST_TURNS = 100
 _SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
@@ -34,22 +34,22 @@ _SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 class Inputs:
     """Everything that acts on a mechanism during a run.
 
-    A number is a constant in SI, a text such as "420 rpm" one in another unit, a tuple of signals their sum.
+    A number is a constant in SI, a text such as "420 rpm" a constant in another unit, a tuple of signals their sum.
 
     Parameters
     ----------
     **channels : signal or tuple of signals
-        By the names of the mechanism's channels. Of a five-bar: ``speed`` (crank speed, rad/s; the crank torque is then a
-        result) or ``torque`` (N.m), ``force`` (control force on the slider, N), ``load_x``, ``load_y`` (load on the coupler
-        point P, N). Of a slider-crank: ``speed`` or ``torque``; one of ``shift_speed`` (axial velocity of the crank, m/s),
-        ``axial_force`` (N) and ``groove=True`` (a groove in the shaft makes the shift, eq 28), without any of which the
-        shift is held as it is; ``load`` (force on the slider along the guide, N). None is the same as leaving it out.
+        Signals by the names of the mechanism's channels. A five-bar has ``speed`` (crank speed, rad/s; the crank torque is
+        then a result) or ``torque`` (N.m), ``force`` (control force on the slider, N), ``load_x``, ``load_y`` (load on the
+        coupler point P, N). A slider-crank has ``speed`` or ``torque``; one of ``shift_speed`` (axial velocity of the crank,
+        m/s), ``axial_force`` (N) and ``groove=True`` (a groove in the shaft makes the shift, eq 28), or none of these: the
+        shift is then held as it is; and ``load`` (force on the slider along the guide, N). None counts as not given.
 
     Raises
     ------
     InputError
-        If no mechanism has such a channel, two ways of driving one freedom are given, or a value is not finite or of the
-        wrong kind, or a text no quantity of the channel's kind.
+        If no mechanism has such a channel, one freedom is driven in two ways, a value is not finite or of the wrong kind, or
+        a text has not the channel's dimension.
 
     Examples
     --------
@@ -61,7 +61,7 @@ class Inputs:
 
     __slots__ = ("_given", "_told")
     _given: dict[str, Any]
-    #: Units of the inputs that were given as text.
+    #: Units of the inputs that were given as texts.
     _told: dict[str, str]
 
     def __init__(self, **channels: Any) -> None:
@@ -118,7 +118,7 @@ class Inputs:
         return iter(self._given)
 
     def replace(self, **changes: Any) -> Inputs:
-        """Return the inputs with some changed; None removes one."""
+        """Return a copy with some inputs changed; the value None removes an input."""
         return Inputs(**{**self._given, **changes})
 
     def parts(self, channel: str) -> tuple[Any, ...]:
@@ -126,14 +126,14 @@ class Inputs:
         return _parts(self._given.get(channel))
 
     def modes(self, mechanism: Mechanism) -> dict[str, int]:
-        """Return the values of the mechanism's modes, by name, that these inputs select."""
+        """Return the values of the mechanism's modes, by name, that follow from which inputs are given."""
         return {
             mode.name: next((n for n, name in enumerate(mode.arguments) if name in self._given), mode.default)
             for mode in mechanism.modes
         }
 
     def constants(self, names: Sequence[str]) -> list[float] | None:
-        """Return the values of channels if all are constant, else None."""
+        """Return the values of the named channels if all are constant (0 where nothing is given), else None."""
         values = []
         for name in names:
             value = self._given.get(name)
@@ -148,15 +148,12 @@ class Inputs:
 
     @property
     def held_exactly(self) -> bool:
-        """Return whether all inputs are constant, so that holding them over a master's steps is exact.
-
-        A commanded speed goes along the secant of a step, which is exact where it is constant.
-        """
+        """Return whether all inputs are constant, so that holding them over a master's steps is exact."""
         return all(isinstance(part, NUMBER) for name in self._given for part in self.parts(name))
 
 
 def _of(given: dict[str, Any], told: dict[str, str]) -> Inputs:
-    """Restore pickled inputs unchecked, because the reading process may not know their mechanism."""
+    """Restore pickled inputs without checks, because the reading process may not know their mechanism."""
     inputs = object.__new__(Inputs)
     object.__setattr__(inputs, "_given", given)
     object.__setattr__(inputs, "_told", told)
@@ -164,7 +161,7 @@ def _of(given: dict[str, Any], told: dict[str, str]) -> Inputs:
 
 
 def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of all inputs of all mechanisms, including the flags that choose a mode; and the flags."""
+    """Return the names of all inputs of all mechanisms, and those among them that are flags, which choose a mode."""
     mechanisms = MECHANISMS.values()
     channels = dict.fromkeys(c.argument for m in mechanisms for c in m.channels if c.kind != "rate")
     modes = dict.fromkeys(name for m in mechanisms for mode in m.modes for name in mode.arguments)
@@ -172,7 +169,7 @@ def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _rivals(mechanism: Mechanism, given: Iterable[str]) -> list[str]:
-    """Return given inputs that would drive one freedom of a mechanism in two ways."""
+    """Return the given inputs that drive the same freedom of a mechanism, if there are two; else an empty list."""
     found = ([name for name in given if name in mode.arguments] for mode in mechanism.modes)
     return next((names for names in found if len(names) > 1), [])
 
@@ -182,12 +179,12 @@ def _refuse(rivals: Sequence[str]) -> NoReturn:
 
 
 def _all_units(name: str) -> tuple[str, ...]:
-    """Return the units that an input has in any mechanism."""
+    """Return the SI units that an input has in the mechanisms that know it."""
     return tuple(dict.fromkeys(u[name] for m in MECHANISMS.values() if name in (u := input_units(m))))
 
 
 def _in_si(name: str, value: Any) -> tuple[Any, str]:
-    """Return an input in SI, and its unit: of those that the mechanisms have for it the first that a text fits."""
+    """Return an input in SI and its unit: the first unit of this input in any mechanism that the value fits."""
     wrong: ParameterError | None = None
     for unit in _all_units(name):
         try:
@@ -224,7 +221,7 @@ def _check_channel(name: str, value: Any) -> None:
 
 
 def parameter_readers(mechanism: Mechanism) -> dict[str, files.Reader]:
-    """Return the readers of a mechanism's parameters by their fields."""
+    """Return the readers of a mechanism's parameters by the names of their fields."""
     return {
         field_name(name): files.Whole() if variable.kind == "Integer" else files.Quantity(variable.unit)
         for name, variable in mechanism.mechanism_variables.items()
@@ -232,7 +229,9 @@ def parameter_readers(mechanism: Mechanism) -> dict[str, files.Reader]:
 
 
 def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None) -> InitialState:
-    """Read the initial state from a mapping by its fields, in SI or with units, such as {"crank_speed": "420 rpm"}.
+    """Read the initial state from a mapping of its fields, in SI or with units, such as {"crank_speed": "420 rpm"}.
+
+    Missing fields are taken from ``base``, or are the defaults.
 
     Raises
     ------
@@ -258,7 +257,7 @@ def _argument_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fraction:
-    """Return the ratio of two speeds (rad/s) as a fraction of whole numbers; raise InputError if it is none."""
+    """Return value / speed (both rad/s) as a fraction of whole numbers up to `MOST_TURNS`; InputError if it is none."""
     ratio = Fraction(value / speed).limit_denominator(MOST_TURNS)
     if abs(ratio * speed - value) > 1e-9 * abs(value) or (value != 0.0 and ratio == 0):
         raise InputError(
@@ -269,14 +268,14 @@ def speed_ratio(name: str, value: float, reference: str, speed: float) -> Fracti
 
 
 def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
-    """Return the inputs and initial state of a run, by default none and at rest; both must fit the mechanism.
+    """Check the inputs and the initial state of a run and return them; the defaults are no inputs and the state of rest.
 
-    The state may be a mapping, as `start_from` reads it.
+    The state may be a mapping, as for `start_from`.
 
     Raises
     ------
     InputError
-        If they are another mechanism's.
+        If inputs or state belong to another mechanism.
     """
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
@@ -304,18 +303,20 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """`Inputs` of a mechanism, brought onto common breaks.
+    """`Inputs` of a mechanism as arrays, all signals with the same breaks.
 
     Attributes
     ----------
     mechanism : Mechanism
     modes : dict
+        Values of the mechanism's modes, by name.
     source : Source
-        Without the users' functions.
+        Arrays for the compiled code, without the users' functions.
     commands : ndarray of int, shape (c, 3)
-        For each commanded rate in force its channel, the component of the state that it is, and the channel of its rate.
+        For each commanded rate (such as a crank speed): the number of its channel, the component of the state that it
+        prescribes, and the number of the channel of its derivative.
     functions : tuple
-        Of each signal the user's Python function and that of its rate, or None.
+        For each signal the user's Python function and the function of its derivative, or None.
     """
 
     mechanism: Mechanism
@@ -328,8 +329,7 @@ class Encoded:
     def steady(self) -> bool:
         """Return whether all channels except the torsion bar are constant between the breaks.
 
-        A signal whose rate counts, a commanded speed, has to be so by its rate: its value counts at the beginning of an
-        interval only.
+        Of a commanded speed the derivative must be constant, as the speed itself is used at the beginning of an interval only.
         """
         slopes, bends = self.source.coefficients[:, :, 1], self.source.coefficients[:, :, 2:]
         return not (
@@ -341,13 +341,13 @@ class Encoded:
         )
 
     def value_name(self, channel: int) -> str:
-        """Return the name of a channel for a message."""
+        """Return the name of a channel, by its number, as in `Inputs`."""
         return self.mechanism.channels[channel].argument
 
 
 @lru_cache(maxsize=64)
 def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
-    """Return for each signal its name and the numbers of its channel and of its rate's channel, or -1."""
+    """Return for each signal its name, the number of its channel and that of its derivative's channel, -1 if none."""
     rates = {channel.freedom: n for n, channel in enumerate(mechanism.channels) if channel.kind == "rate"}
     return tuple(
         (channel.argument, n, rates.get(channel.freedom, -1) if channel.kind == "command" else -1)
@@ -356,19 +356,19 @@ def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
     )
 
 
-#: Breaks of inputs that have none.
+#: Breaks of inputs without breaks.
 _NO_BREAKS = np.array([0.0, 1.0])
 
 
 def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
-    """Bring all channels onto common breaks."""
+    """Convert inputs to arrays for the compiled code: all signals get the same breaks."""
     signals = _signals(mechanism)
     freedoms = len(mechanism.freedoms)
     pieces = [(n, part) for n, (name, _, _) in enumerate(signals) for part in inputs.parts(name)]
     times = [part.breaks for _, part in pieces if isinstance(part, Piecewise)]
     for _, part in pieces:
         if isinstance(part, Function) and len(part.breaks) > 0:
-            # every one of them is a break inside: the first and the last of the merged ones are none
+            # the first and the last of the merged breaks do not act as breaks, so that others are added outside
             times.append(np.array([min(part.breaks) - 1.0, *part.breaks, max(part.breaks) + 1.0]))
     merged = np.unique(np.concatenate(times)) if times else _NO_BREAKS
     coefficients = np.zeros((len(merged) - 1, len(signals), 4))
@@ -415,7 +415,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
 
 
 def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the coefficients of ``part`` on finer breaks; its outer pieces extend beyond its ends."""
+    """Return the polynomial coefficients of a signal on finer breaks, shape (n, 4); its outer pieces extend beyond its ends."""
     left = breaks[:-1]
     index = np.clip(np.searchsorted(part.breaks, left, side="right") - 1, 0, len(part.coefficients) - 1)
     s = left - part.breaks[index]
@@ -426,10 +426,10 @@ def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float
 
 
 def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
-    """Move breaks that miss a sample by rounding alone onto the sample, and return the new inputs.
+    """Return the inputs with each break that differs from a sample by rounding errors moved onto the sample.
 
-    0.3 is not 3 * 0.1 in floats: a jump at 0.3 s would otherwise be missed by a whole step where inputs are sampled and
-    held, and the sample there would belong to what was before the jump.
+    In floats 0.3 is not 3 * 0.1: where inputs are sampled and held, a jump at 0.3 s would act a whole step late, and the
+    sample at 0.3 s would have the values before the jump.
     """
     breaks = encoded.source.breaks
     if breaks is _NO_BREAKS:
@@ -466,14 +466,14 @@ def compile_function(function: StateFunction, freedoms: int) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """Return the line of Numba's report that names the cause."""
+    """Return the first line of Numba's error report that names the cause."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     telling = [line for line in lines if not line.startswith(("Failed in nopython", "During", "File", "- During"))]
     return (telling or lines or [type(error).__name__])[0]
 
 
 def compiled_source(encoded: Encoded) -> tuple[Source, list[Any]]:
-    """Return the inputs for the compiled code with their own copy of the laws, and the objects to keep alive."""
+    """Return the inputs for the compiled code, with a copy of the torque laws, and the objects to keep while these are used."""
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
