@@ -5,10 +5,10 @@ the rocker and on the coupler as in `kinematics.coefficients`, with respect to e
 without branches, so that the compiler can vectorise over crank angles; if the links cannot be joined the square root is NaN,
 which the callers check.
 
-A linkage is the vector ``q`` of `PLACES`: the thesis's ten parameters in its order. Crank directions come as cosines and
-sines of the crank's rotation, which a timed task knows beforehand. The rocker pivot D may be displaced by (dx, dy) in the frame
-of the ground link: by a slider or a second crank. A rocker of length zero means a slider-crank: C runs on a guide at the end of
-the ground link, at right angles to it, which is a rocker whose pivot lies at infinity.
+A linkage is the vector ``q`` of `PLACES`: the thesis's ten parameters in its order. The arguments ``c, s`` are cosines and
+sines of the crank's rotations, which a timed task computes only once. The rocker pivot D may be displaced by (dx, dy) in the
+frame of the ground link, by a slider or a second crank. A rocker of length zero means a slider-crank: C runs on a guide at the
+end of the ground link, at right angles to it, and the rocker pivot lies at infinity.
 """
 
 from __future__ import annotations
@@ -24,28 +24,29 @@ from ...numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 
 
 def guided(c2, s2, dx, dy, l3, l4, branch):
-    """Close the loop with C on a guide at right angles to the ground link, at the distance dx from B; see `joined`.
+    """Return the `kinematics.Position` of a slider-crank: C is on a guide at right angles to the ground link, dx from B.
 
-    The arguments may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from B to the guide.
+    The arguments are those of `joined`, and may be CasADi symbols. For branch +1, C lies to the left of the perpendicular from
+    B to the guide.
     """
     c3 = dx / l3
     s3 = branch * (1.0 - c3 * c3) ** 0.5
     return kinematics.Position(c2, s2, c3, s3, -1.0, 0.0, -c3, s3)
 
 
-#: The plant's own loop closure, and that of a slider-crank.
+#: The plant's own loop closure, and that of a slider-crank, for use in the kernels.
 joined, _guided = inner(kinematics.joined), inner(guided)
 
 
 @inner
 def closed(c2, s2, dx, dy, l3, l4, branch):
-    """Close the loop of a four-bar, or of a slider-crank if the rocker has length zero."""
+    """Return the `kinematics.Position` of a four-bar, or of a slider-crank if the rocker has length zero."""
     if l4 > 0.0:
         return joined(c2, s2, dx, dy, l3, l4, branch)
     return _guided(c2, s2, dx, dy, l3, l4, branch)
 
 
-#: The vector q: fields of `analysis.synthesis.Linkage`.
+#: Components of the vector q: fields of `analysis.synthesis.Linkage`.
 PLACES = (
     "pivot_x",
     "pivot_y",
@@ -58,7 +59,7 @@ PLACES = (
     "crank_phase",
     "point_angle",
 )
-#: After q, the displacement of D: derivatives with respect to it follow those with respect to q.
+#: Order of derivatives: those with respect to q, then those with respect to the displacement of D.
 COLUMNS = (*PLACES, "dx", "dy")
 
 
@@ -98,7 +99,7 @@ def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
         ex, ey = ca * c2 - sa * s2, sa * c2 + ca * s2
         fx, fy = ux * g.c3 - uy * g.s3, uy * g.c3 + ux * g.s3
         vx, vy = l2 * ex + r * fx, l2 * ey + r * fy
-        # turning the coupler by one radian moves P by this, and 1 m of closure along the rocker turns it by 1/(l3 s43)
+        # motion of P if the loop must close by 1 m more along the rocker: this turns the coupler by 1/(l3 s43)
         w = 1.0 / (l3 * g.s43)
         tx, ty = -r * fy * w, r * fx * w
         out[0, j] = x0 + vx
@@ -189,9 +190,9 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):
 def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
     """Compute the directions of coupler and rocker of many linkages at the same crank rotations.
 
-    ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7), with l5 = 0 where there is
-    no second crank; ``c, s`` are of the crank's rotations, ``cg, sg`` of the second crank's. The directions come as complex
-    numbers, shape (m, n), NaN where the links cannot be joined.
+    ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7), with l5 = 0 without a second
+    crank; ``c, s`` are cosines and sines of the crank's rotations, ``cg, sg`` of the second crank's. The results ``coupler``
+    and ``rocker`` are complex, shape (m, n), NaN where the links cannot be joined.
     """
     for i in range(shapes.shape[0]):
         l1, l2, l3, l4, l5 = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3], shapes[i, 5]
@@ -212,9 +213,9 @@ def match_windows(curves, target, starts, spans, best):
     """Find the piece of each curve that fits an open target best, up to position, rotation and scale.
 
     Each curve is given at equal steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and has one
-    of ``spans`` steps. It is compared at equal steps of arc length with the target, relative to its mean, shape (k,), forwards
-    and backwards. ``best`` receives (misfit relative to the target's sum of squares, start, span, direction), shape (m, 4).
-    Pieces with a point that is not finite are skipped.
+    of ``spans`` steps. At equal steps of arc length it is compared with the points of ``target``, shape (k,), whose mean is 0,
+    forwards and backwards. ``best`` receives, for each curve, the misfit relative to the target's sum of squares, the start,
+    the span, and the direction (1 or -1), shape (m, 4). Pieces with a point that is not finite are skipped.
     """
     m, n = curves.shape
     k = target.shape[0]

@@ -2,5 +2,5 @@
 
 from typing import Literal
 
-#: Not each of them is a mechanism that can be run.
+#: A kind of linkage need not be one of the mechanisms that can be run.
 Kind = Literal["four-bar", "slider-crank", "geared-five-bar"]

@@ -1,6 +1,6 @@
 """Define planar linkages: the four-bar of the thesis's chapter VI, the slider-crank, and the five-bar with two cranks.
 
-Each is a type with the methods that search, report and drawing need.
+Each is a class with the methods that search, report and drawing use.
 
 The coupler point is, with the thesis's symbols (appendix 5),
 
@@ -34,32 +34,35 @@ from .kind import Kind
 from .pivot import SecondCrank, SliderMotion, format_ratio, geared
 
 FloatArray = NDArray[np.float64]
-#: Dimensions of a linkage: those greater than zero, lengths of any sign, angles.
+#: Names of the dimensions: links, which are greater than zero; all lengths; angles.
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
-#: Their units.
+#: SI unit of each dimension.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
-#: Grashof types of a four-bar with a link that turns fully, by its shortest link, in the order of `LINKS`.
+#: Grashof type of a four-bar, one link of which can turn fully, if the shortest link is the first, second, ... of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
-#: Crank rotations at which a full turn is evaluated.
+#: Number of crank rotations at which a full turn is evaluated.
 TURN = 360
 
 
 def wrapped(angle: FloatArray) -> FloatArray:
-    """Wrap angles to within half a turn of zero, [-pi, pi)."""
+    """Wrap angles (rad) to [-pi, pi)."""
     value: FloatArray = (angle + pi) % (2.0 * pi) - pi
     return value
 
 
 def bar(length: Any, line: float, width: float) -> tuple[Any, Any]:
-    """Return the mass of a rectangular bar between its pins (kg), and its moment of inertia about its centre (kg.m2)."""
+    """Return the mass of a rectangular bar (kg) and its moment of inertia about its centre (kg.m2).
+
+    ``length`` is the distance between its pins (m), ``line`` the mass per length (kg/m), ``width`` its width (m).
+    """
     mass = line * length
     return mass, mass * (length * length + width * width) / 12.0
 
 
 def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float, straight: bool) -> dict[str, Any]:
-    """Return masses, moments of inertia and centres of mass, by their names in `FiveBarParameters`.
+    """Return masses, moments of inertia and centres of mass of the links, by their names in `FiveBarParameters`.
 
     Crank and rocker are bars between their pins. The coupler consists of two bars, B to C and B to P; if P is on the line of B
     and C (``straight``), it is one bar over the whole length.
@@ -69,10 +72,11 @@ def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float
     l2, l3, l4, r, a2 : float
         Lengths of crank, coupler and rocker; distance and direction of the coupler point (m, rad).
     line : float
-        kg/m.
+        Mass of a bar per length (kg/m).
     width : float
-        m.
+        Width of a bar (m).
     straight : bool
+        Whether P is on the line of B and C.
     """
     m2, i2 = bar(l2, line, width)
     m4, i4 = bar(l4, line, width)
@@ -102,7 +106,7 @@ def bodies(l2: Any, l3: Any, l4: Any, r: Any, a2: Any, line: float, width: float
 
 
 def on_line(l3: float, r: float, a2: float) -> bool:
-    """Return whether the coupler point lies on the line of B and C."""
+    """Return whether the coupler point, with the polar coordinates r (m) and a2 (rad) from B, is on the line of B and C."""
     return abs(sin(a2)) * r <= 1e-9 * l3
 
 
@@ -120,7 +124,7 @@ class Linkage:
     ground_length, crank_length, coupler_length, rocker_length : float
         l1 ... l4.
     point_distance, point_angle : float
-        r and a2: the coupler point from the crank pin B, and its direction from the coupler's.
+        r and a2: distance of the coupler point P from the crank pin B, and angle from B -> C to B -> P.
     ground_angle : float
         a1: direction of the ground link, from A to the rocker pivot.
     crank_phase : float
@@ -135,7 +139,7 @@ class Linkage:
     Raises
     ------
     ParameterError
-        If a value is not finite, a link not longer than zero, the branch neither +1 nor -1, or the pivot of another type.
+        If a value is not finite, a link is not longer than zero, the branch is not +1 or -1, or the pivot has a wrong type.
     """
 
     kind: ClassVar[Kind] = "four-bar"
@@ -143,9 +147,9 @@ class Linkage:
     links: ClassVar[tuple[str, ...]] = LINKS
     #: Types of the motion of the rocker pivot.
     pivots: ClassVar[tuple[type, ...]] = (SliderMotion, type(None))
-    #: The driven link, its motions, and its mechanical advantage, in words.
+    #: Words for reports: the driven link, its motions, and the meaning of its mechanical advantage.
     driven: ClassVar[tuple[str, str, str]] = ("rocker", "swings", "torque of the rocker for one of the crank")
-    #: Bars by the layers on which they are drawn, as pairs of pins; pins that are drawn with their letters.
+    #: Bars of a drawing as (layer, letters of the two pins); pins that are labelled with their letters.
     bars: ClassVar[tuple[tuple[str, str], ...]] = (("ground", "AE"), ("crank", "AB"), ("rocker", "DC"))
     letters: ClassVar[str] = "ABCD"
 
@@ -178,7 +182,7 @@ class Linkage:
 
     @property
     def point_is_pin(self) -> bool:
-        """Return whether the coupler point is a slider's pin C."""
+        """Return whether the coupler point is the pin C of a slider."""
         return False
 
     @property
@@ -188,17 +192,20 @@ class Linkage:
 
     @property
     def turns(self) -> int:
-        """Return the turns of the crank per turn of the input shaft: more than 1 with gears such as 1/2."""
+        """Return the turns of the crank per turn of the input shaft: more than 1 for gear ratios such as 1/2."""
         return 1
 
     def crank_angle(self, rotation: ArrayLike) -> FloatArray:
-        """Return th2, the crank angle from the ground link (rad)."""
+        """Return th2, the crank angle from the ground link, at rotations of the input shaft (rad)."""
         value: FloatArray = self.turns * np.asarray(rotation, dtype=float) + self.crank_phase
         return value
 
     @classmethod
     def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
-        """Build a linkage from the vector of `kernels.PLACES`; an eleventh component is the output angle."""
+        """Build a linkage from its parameters in the order of `kernels.PLACES`; an eleventh one is the output angle.
+
+        ``more`` are further fields, such as the pivot.
+        """
         values = dict(zip((*PLACES, "output_angle"), np.asarray(q, dtype=float).tolist()))
         own = {f.name for f in fields(cls) if f.init}
         return cls(**{name: value for name, value in values.items() if name in own}, branch=branch, **more)
@@ -209,7 +216,7 @@ class Linkage:
         return np.array([getattr(self, name) for name in PLACES])
 
     def values(self) -> dict[str, float]:
-        """Return the dimensions by name, without the pivot's motion (m, rad)."""
+        """Return the dimensions (m, rad) and the branch by name, without the pivot's motion."""
         return {name: getattr(self, name) for name in (*LENGTHS, *ANGLES)} | {"branch": self.branch}
 
     @property
@@ -235,14 +242,14 @@ class Linkage:
     def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
         """Return the coupler point at crank rotations, shape (n, 2) in m; NaN if the links cannot be joined.
 
-        ``displacement`` of the rocker pivot replaces the one by its own motion, as in `directions`.
+        A given ``displacement`` of the rocker pivot (m) replaces that of the pivot's own motion, as in `directions`.
         """
         out = np.empty((2, np.size(rotation)))
         coupler_path(*self._arguments(rotation, displacement), out)
         return out.T
 
     def path_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the coupler point (n, 2), and its derivatives with respect to `kernels.COLUMNS`, shape (12, 2, n)."""
+        """Return the coupler point (n, 2) in m, and its derivatives with respect to `kernels.COLUMNS`, shape (12, 2, n)."""
         n = np.size(rotation)
         out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
         coupler_path_jacobian(*self._arguments(rotation), out, jacobian)
@@ -256,19 +263,19 @@ class Linkage:
         return out, jacobian
 
     def directions(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
-        """Return (c3, s3, c4, s4, c43, s43) of `kinematics.Position`, shape (6, n), in the frame of the ground link."""
+        """Return cosine and sine of th3, th4 and th4 - th3, shape (6, n), in the frame of the ground link."""
         out = np.empty((6, np.size(rotation)))
         link_directions(*self._arguments(rotation, displacement), out)
         return out
 
     def coupler_angle(self, rotation: ArrayLike) -> FloatArray:
-        """Return the direction of the coupler in the plane, with the output angle (rad), continuous over the rotations."""
+        """Return the direction of the coupler in the plane plus the output angle (rad), continuous over the rotations."""
         g = self.directions(rotation)
         turned: FloatArray = np.unwrap(np.arctan2(g[1], g[0])) + self.ground_angle + self.output_angle
         return turned
 
     def rocker_angle(self, rotation: ArrayLike) -> FloatArray:
-        """Return th4 from the ground link, with the output angle (rad), continuous over the rotations (the thesis's th4)."""
+        """Return the rocker's angle th4 from the ground link plus the output angle (rad), continuous over the rotations."""
         g = self.directions(rotation)
         turned: FloatArray = np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
         return turned
@@ -345,11 +352,11 @@ class Linkage:
 
     @property
     def title(self) -> str:
-        """Return Grashof's type, or the kind of a moving pivot, for which Grashof's criterion does not hold."""
+        """Return Grashof's type; for a moving pivot, to which his criterion does not apply, "four-bar with a moved pivot"."""
         return self.grashof if self.pivot is None else "four-bar with a moved pivot"
 
     def reach(self, rotation: ArrayLike) -> FloatArray:
-        """Return the distance from B to D; for a slider-crank that from B to the guide, along the ground link (m)."""
+        """Return the distance from B to D; for a slider-crank the distance from B to the guide (m)."""
         dx, dy = self.displacement(rotation)
         th2 = self.crank_angle(rotation)
         along = self.ground_length + dx - self.crank_length * np.cos(th2)
@@ -374,21 +381,22 @@ class Linkage:
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return g of the constraints g <= 0 that bound the magnitude of cos mu at C by ``cosine``, written without division.
+        """Return the values g of constraints g <= 0 that bound |cos mu| by ``cosine``, with the transmission angle mu at C.
 
-        It accepts numbers, arrays and symbols; ``nearest`` and ``farthest`` are the squares of the least and greatest `reach`.
+        The arguments are numbers, arrays or symbols; ``nearest`` and ``farthest`` are the squares of the least and greatest
+        `reach`.
         """
         joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
         return joint - nearest - product, farthest - joint - product
 
     @staticmethod
     def excess_slope(l3: Any, l4: Any, cosine: Any) -> Any:
-        """Return the derivative of `transmission_excess` with respect to the cosine."""
+        """Return the derivative of `transmission_excess` with respect to the cosine, with the opposite sign."""
         return 2.0 * l3 * l4
 
     @staticmethod
     def slack(l1: Any, l2: Any, cosine: Any) -> Any:
-        """Return the greatest change of `square` from its extreme over a crank rotation with this cosine."""
+        """Return the most by which `square` can change if the crank turns, by an angle with this cosine, from its extreme."""
         return 2.0 * l1 * l2 * (1.0 - cosine)
 
     def cosine_at_c(self, reach: FloatArray) -> FloatArray:
@@ -403,8 +411,8 @@ class Linkage:
     def transmission_range(self) -> tuple[float, float]:
         """Return the least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
 
-        With a fixed pivot the extremes are at the crank along the ground link; with a moving one they are found over `TURN`
-        rotations. If the crank cannot turn fully the extremes are 0 or pi.
+        With a fixed pivot the extremes occur where the crank lies along the ground link; with a moving pivot they are sought
+        at `TURN` rotations. If the crank cannot turn fully, an extreme is 0 or pi.
         """
         if self.pivot is None:
             d = np.array([self.ground_length - self.crank_length, self.ground_length + self.crank_length])
@@ -416,13 +424,13 @@ class Linkage:
 
     @property
     def least_transmission(self) -> float:
-        """Return the least deviation of the transmission angle from 0 and pi over a turn (rad); 0 without a full turn."""
+        """Return the least deviation of the transmission angle from 0 and pi over a turn (rad); 0 if it cannot turn fully."""
         low, high = self.transmission_range()
         return min(low, pi - high)
 
     @property
     def turns_fully(self) -> bool:
-        """Return whether the crank can turn fully, with the motion of the pivot."""
+        """Return whether the crank can turn fully while a moving pivot makes its motion."""
         return self.least_transmission > 0.0
 
     def to_five_bar(
@@ -438,8 +446,8 @@ class Linkage:
     ) -> FiveBarParameters:
         """Return the parameters of the plant and its FMU, with masses from density and section.
 
-        The links are bars, see `bodies`. The plant's x axis is the ground link, so that gravity acts at the linkage's
-        inclination. A fixed rocker pivot becomes a slider: give it a spring, or hold it by a force.
+        The links are bars, see `bodies`. The plant's x axis is the ground link, which the ground angle inclines to the
+        horizontal. A fixed rocker pivot becomes a slider: give it a spring, or hold it by a force.
 
         Parameters
         ----------
@@ -495,7 +503,7 @@ class SliderCrank(Linkage):
     rocker_length : float
         Always 0.
     ground_angle : float
-        a1: from A to the guide, at right angles to it (rad).
+        a1: direction from A to the guide, at right angles to the guide (rad).
     """
 
     kind: ClassVar[Kind] = "slider-crank"
@@ -514,11 +522,11 @@ class SliderCrank(Linkage):
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Return the names of the dimensions that it does not have: those of a rocker, and of a coupler point at the pin."""
+        """Return the names of the missing dimensions: the rocker's length, and those of a coupler point that is the pin."""
         return ("rocker_length", *(("point_distance", "point_angle") if self.point_is_pin else ()))
 
     def slider_position(self, rotation: ArrayLike) -> FloatArray:
-        """Return the position of C on its guide from the foot E of the offset, to the left of A -> E (m)."""
+        """Return the position of C on its guide (m): 0 at the foot E of the offset, positive to the left of A -> E."""
         position: FloatArray = self.crank_length * np.sin(self.crank_angle(rotation))
         position += self.coupler_length * self.directions(rotation)[1]
         return position
@@ -528,7 +536,7 @@ class SliderCrank(Linkage):
         return self.slider_position(rotation), 0.5 * pi
 
     def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
-        """Return the places of `Linkage.pins`, D being the slider."""
+        """Return the positions of the pins as `Linkage.pins` does, with D at the slider's pin C."""
         places = Linkage.pins(self, rotation)
         return places | {"D": places["C"]}
 
@@ -548,7 +556,7 @@ class SliderCrank(Linkage):
 
     @staticmethod
     def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
-        """Return g of the constraint g <= 0, as for a four-bar; the angle is between coupler and normal of the guide."""
+        """Return g of the constraint g <= 0, as for a four-bar; mu is the angle between coupler and normal of the guide."""
         return (farthest - (l3 * cosine) ** 2,)
 
     @staticmethod
@@ -585,7 +593,7 @@ class FiveBar(Linkage):
 
     @property
     def title(self) -> str:
-        """Return the type with the gear ratio."""
+        """Return "five-bar", with the gear ratio if gears alone turn the second crank."""
         return "five-bar" if self.pivot.series.order else f"five-bar, gears {format_ratio(self.pivot.ratio)}"
 
     @property

@@ -27,9 +27,9 @@ from .linkage import Linkage, SliderCrank, on_line
 
 #: Links that have a mass.
 WEIGHED = ("crank", "coupler", "rocker")
-#: Distance of the rocker pivot that represents one at infinity, in coupler lengths.
+#: Distance at which a rocker pivot counts as being at infinity, in coupler lengths.
 FAR = 1e7
-#: Stiffness of the slider that represents a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
+#: Least natural frequency of a slider that represents a fixed pivot: in rad/s, and as a multiple of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
 
 
@@ -46,8 +46,8 @@ class Make:
     pin : float, optional
         Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
     slider_mass, slider_stiffness, slider_damping : float, optional
-        Properties of the slider that carries D (kg, N/m, N.s/m); by default of a block on such a stiff spring that D is nearly
-        a fixed pivot.
+        Properties of the slider that carries D (kg, N/m, N.s/m); by default those of a block on a spring so stiff that D
+        hardly moves.
     slider_coulomb_friction : float
         N.
     gravity : float
@@ -89,7 +89,7 @@ class Make:
         return 0.4 * self.width if self.pin is None else self.pin
 
     def describe(self, *, forces: bool = True) -> str:
-        """Describe the bars and, with forces, the speed in a line, for a sheet."""
+        """Return a line that describes the bars and, with ``forces``, speed, gravity and load."""
         bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
         if not forces:
             return bars
@@ -98,14 +98,14 @@ class Make:
         )
 
     def masses_in_words(self) -> str:
-        """Say where the masses come from, for the head of a file."""
+        """Return a sentence for the head of a file that says where the masses come from."""
         given = [f"{link}.mass" for link in (*WEIGHED, "slider") if getattr(self, f"{link}_mass") is not None]
         weighed = f"; as given: {', '.join(given)}" if given else ""
         bars = self.describe(forces=False).partition(",")[0]
         return f"masses, centres of mass and moments of inertia: {bars}{weighed}; [make] of the task changes them"
 
     def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        """Replace the masses of `bodies` by the given ones; the moments of inertia change in proportion."""
+        """Return masses and moments of inertia of the links: those of `bodies`, in proportion to the masses that are given."""
         own: dict[str, Any] = {}
         for link in WEIGHED:
             mass, inertia, given = made[f"{link}_mass"], made[f"{link}_inertia"], getattr(self, f"{link}_mass")
@@ -114,7 +114,7 @@ class Make:
         return own
 
     def load_along(self, c: Any, s: Any) -> tuple[Any, Any]:
-        """Return the components of the load along and across the ground link (N); c, s are cosine and sine of its direction."""
+        """Return the components of the load along and across the ground link (N), whose direction has cosine c and sine s."""
         x, y = self.load
         return c * x + s * y, c * y - s * x
 
@@ -172,15 +172,15 @@ class Make:
         return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if sliding else {}))
 
     def sliding(self, far: Any) -> dict[str, Any]:
-        """Return the mass of a rocker, whose pivot is at the distance ``far`` (m), that represents the slider; see `moving`."""
+        """Return mass, inertia and centre of the rocker of length ``far`` (m) that represents the slider; see `moving`."""
         return {"rocker_mass": self.block, "rocker_inertia": 0.0, "rocker_cog_distance": far}
 
     def plant(self, linkage: Linkage) -> FiveBarParameters | SliderCrankParameters:
-        """Return the parameters of the plant that simulates a linkage: slider-crank, or five-bar with its slider held."""
+        """Return the parameters of the plant that simulates a linkage: slider-crank, or five-bar with a stiffly held slider."""
         return self.slider_crank(linkage) if isinstance(linkage, SliderCrank) else self.five_bar(linkage)
 
     def five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Return the parameters of the five-bar plant for a linkage, with its slider held."""
+        """Return the parameters of the five-bar plant for a linkage, with its slider held by spring and damper."""
         free = self.moving(linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
@@ -196,16 +196,16 @@ USUAL_MAKE = Make()
 
 FloatArray = NDArray[np.float64]
 PINS = "ABCD"
-#: Samples of a turn that is run.
+#: Number of steps at which a run of the plant is sampled.
 SAMPLES = 720
-#: Mass of the slider that represents a fixed pivot in such a run, relative to the mass of the links.
+#: Mass of the slider that represents a fixed pivot in a run, relative to the mass of the links.
 HEAVY = 1e8
 
 
 def pin_functions(
     d: Any, make: Make, crank_angle: Any, *, straight: bool = False, linkage: type[Linkage] = Linkage
 ) -> dict[str, tuple[Any, Any]]:
-    """Compute the force on each pin along and across the ground link (N), for CasADi symbols and numbers.
+    """Return the components of each pin's force along and across the ground link (N), for CasADi symbols and numbers.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def pin_functions(
     g = plant.position(crank_angle, 0.0, p)
     k = plant.coefficients(g, p)
     w3, w4 = k.k32 * w2, k.k42 * w2
-    # the slider is held and the crank's speed constant: what is left are the centripetal accelerations
+    # the slider is held and the crank's speed constant: only centripetal accelerations remain
     e3, e4 = plant.centripetal(g, w2, w3, w4, p)
     held = Motion(w3, w4, 0.0, 0.0, e3, e4, 0.0, 0.0, 0.0, 0.0, 0.0)
     f = plant.reactions(g, (crank_angle, 0.0, w2, 0.0, 0.0, 0.0), held, Acting(1.0, 0.0, 0.0, 0.0, *load), p)
@@ -267,7 +267,7 @@ def pin_functions(
 
 @cache
 def _traced() -> tuple[Any, Any, Any]:
-    """Trace the plant's parameters and functions, and the mass properties, with CasADi symbols."""
+    """Return the class of the plant's parameters, the plant's functions, and `bodies`, for CasADi symbols."""
     casadi = symbolic.library()
     plant = of_parameters(FIVE_BAR)
     law = symbolic.traced((geometry,), min=casadi.fmin, max=casadi.fmax)
@@ -290,9 +290,9 @@ class PinForces:
     rotation : ndarray, shape (n,)
         Crank rotations from the start of the task (rad).
     force : ndarray, shape (n, 4)
-        Forces on the pins A to D (N).
+        Magnitudes of the forces on the pins A to D (N).
     moved : float
-        Displacement of the slider that represents the fixed pivot (m).
+        Greatest displacement of the slider that represents the fixed pivot (m).
     """
 
     rotation: FloatArray
@@ -315,7 +315,7 @@ class PinForces:
         return float(self.rotation[int(self.force.max(axis=1).argmax())])
 
     def of(self, pins: str) -> float:
-        """Return the greatest force on some of the pins (N)."""
+        """Return the greatest force on the pins with these letters (N)."""
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
 
@@ -324,8 +324,8 @@ def pin_forces(
 ) -> PinForces:
     """Compute the forces on the pins of a linkage at constant speed.
 
-    They come from a run of the compiled plant, whose slider is so heavy that it hardly moves, with its weight carried by the
-    control force; or from the plant's equations alone.
+    With ``run`` the compiled plant is run, with a slider so heavy that it hardly moves and whose weight the control force
+    carries. Otherwise the plant's equations are evaluated with the slider held.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def pin_forces(
 
 
 def _held(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
-    """Compute the pin forces by the plant's equations, with its slider held."""
+    """Compute the pin forces at crank rotations from the plant's equations, with its slider held."""
     casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
     straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
     th2 = casadi.DM(linkage.crank_angle(rotation))

@@ -1,4 +1,4 @@
-"""Define motions of the rocker pivot, on a guide or on a second crank: given ones, and unknown ones of a search."""
+"""Define motions of the rocker pivot on a guide or on a second crank: known motions, and the unknowns of a search."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ TEETH = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SliderMotion:
-    """The rocker pivot D moves along a guide as a Fourier series of the crank's rotation.
+    """Motion of the rocker pivot D along a guide: a Fourier series of the crank's rotation phi.
 
     Attributes
     ----------
     series : FourierSeries
-        u(phi) in m: its order is the number of harmonics.
+        Position u(phi) on the guide from the end E of the ground link (m); its order is the number of harmonics.
     guide_angle : float
         alpha, the guide's direction from the ground link (rad).
 
@@ -44,7 +44,7 @@ class SliderMotion:
             raise ParameterError("guide_angle", self.guide_angle, "be a finite number")
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the displacement of D in the frame of the ground link (m)."""
+        """Return x and y of D from the end E of the ground link, in the frame of that link (m)."""
         u = self.series(rotation)
         return u * cos(self.guide_angle), u * sin(self.guide_angle)
 
@@ -59,7 +59,7 @@ class SliderMotion:
 
 
 def geared(ratio: float) -> tuple[int, int]:
-    """Return the turns k of the first crank and m of the second after which both are back at their angles: the ratio is m/k.
+    """Return the least whole numbers of turns, k of the first crank and m of the second, in the same time: m/k is the ratio.
 
     Raises ParameterError if the ratio is neither zero nor a quotient of whole numbers up to six.
     """
@@ -77,10 +77,10 @@ def format_ratio(ratio: float) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SecondCrank:
-    """The rocker pivot D sits on a second crank, geared to the first or turned independently: a five-bar.
+    """Motion of the rocker pivot D on a second crank, geared to the first or turned independently: that of a five-bar.
 
-    D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio and
-    the first crank turns k times as fast as phi: the input shaft with the rotation phi turns once per period of the linkage.
+    D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio.
+    The input shaft, with the rotation phi, turns once per period of the linkage, in which the first crank turns k times.
 
     Attributes
     ----------
@@ -89,14 +89,14 @@ class SecondCrank:
     ratio : float
         Turns of the second crank per turn of the first: a quotient of whole numbers up to six.
     phase : float
-        psi at the start (rad).
+        psi at phi = 0, without the series (rad).
     series : FourierSeries
-        Rotation added to the geared one (rad): zero with gears.
+        Rotation added to that by the gears, a function of phi (rad); zero if gears alone turn the crank.
 
     Raises
     ------
     ParameterError
-        If the length is not greater than zero, the ratio is not such a quotient, or the phase is not finite.
+        If the length is not greater than zero, the ratio is not a quotient as above, or the phase is not finite.
     """
 
     length: float
@@ -118,7 +118,7 @@ class SecondCrank:
         return value
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the displacement of D in the frame of the ground link (m)."""
+        """Return x and y of D from the end E of the ground link, in the frame of that link (m)."""
         psi = self.angle(rotation)
         return self.length * np.cos(psi), self.length * np.sin(psi)
 
@@ -135,17 +135,17 @@ class SliderUnknown:
     Attributes
     ----------
     harmonics : int
-        Number of harmonics; 0 for a slider that is set once.
+        Number of harmonics; 0 for a slider that is adjusted once and stays there.
     guide_angle : (float, float)
-        Bounds (rad); equal ones fix it.
+        Bounds of the guide's direction from the ground link (rad); equal bounds fix it.
     position : (float, float), optional
-        Least and greatest slider position (m); by default one ground link to either side of that link's end.
+        Least and greatest slider position (m); by default a ground length to either side of the end of the ground link.
     stroke : float
-        Greatest length of its travel (m).
+        Greatest length of the slider's travel (m).
     speed, acceleration : float
         Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
     smoothness : float
-        Weight of the mean of (d2u/dphi2)^2 in the quality (1/rad4), which trades error for smoothness.
+        Weight of the mean of (d2u/dphi2)^2, which is added to the quality: it trades error for smoothness.
     """
 
     harmonics: int
@@ -183,13 +183,13 @@ class CrankUnknown:
     Attributes
     ----------
     ratio : float
-        Turns per turn of the first crank: see `SecondCrank`.
+        Turns of the second crank per turn of the first: see `SecondCrank`.
     length : (float, float)
-        Bounds (m).
+        Bounds of the second crank's length (m).
     harmonics : int
-        Harmonics of the rotation that is added to the geared one; 0 for gears alone.
+        Number of harmonics of the rotation that is added to that by the gears; 0 for gears alone.
     speed : float
-        Greatest deviation of d psi/d phi from the ratio.
+        Greatest magnitude of the derivative of the added rotation with respect to phi.
     """
 
     ratio: float
