@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"]
 #: The unknowns of every linkage, in their order: `kernels.PLACES` and the output angle.
 UNKNOWNS = (*PLACES, "output_angle")
-#: Name of the further dimension of a geared five-bar.
+#: Name of the additional dimension of a geared five-bar.
 SECOND_LENGTH = "second_crank_length"
 #: Least transmission angle at which a crank still counts as turning fully (rad).
 TURNING = 0.002
@@ -79,7 +79,7 @@ class Grashof:
 @in_si(length="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestLink:
-    """No link, and not the distance of the coupler point from B, is longer than ``length`` (m)."""
+    """No link is longer than ``length`` (m), and the coupler point is no farther than that from B."""
 
     length: Amount
 
@@ -161,7 +161,7 @@ class Require:
     name : str
         Name in messages.
     scale : float
-        Magnitude of the values.
+        Magnitude of the function's values, by which a search divides them.
     unit : str
         Unit of the values in messages.
     symbolic : bool
@@ -191,7 +191,7 @@ class Along(Require):
     rotation : ndarray, shape (n,)
         Rotations at which it is bounded from the beginning (rad); ``function(d, rotation)`` has rows of n values each.
     ends : (float, float) or None
-        Range in which its greatest values are found and bounded, too; None if only the given rotations count.
+        Range of rotations in which its greatest values are found and bounded, too; None if only the given rotations count.
     """
 
     rotation: FloatArray
@@ -219,9 +219,9 @@ class Way(NamedTuple):
     linkage: type[Linkage] = Linkage
 
     def ends(self, what: str) -> tuple[float, float]:
-        """Return the first and last crank angle of a turn, or the first and last crank rotation of the task.
+        """Return the first and last crank angle of a turn, or the first and last crank rotation of the task (rad).
 
-        Raises InputError if neither is known.
+        Raises InputError, which names ``what`` needs them, if neither is known.
         """
         if self.turn:
             return 0.0, 2.0 * pi
@@ -236,7 +236,7 @@ class Way(NamedTuple):
 
 
 class Least(NamedTuple):
-    """Objective: the greatest value of a function, minimised while the greatest error is below a bound (units)."""
+    """Objective: the greatest value of ``along``, minimised while the greatest error is at most ``error`` (units)."""
 
     along: Along
     error: float
@@ -246,19 +246,19 @@ class Demand:
     """A constraint that is expressed by functions of the dimensions that must be at most zero."""
 
     __slots__ = ()
-    #: Type of four-bar that it is about.
+    #: Grashof type that it requires.
     grashof: ClassVar[GrashofType | None] = None
-    #: Whether the crank then cannot turn fully.
+    #: Whether a crank that meets it cannot turn fully.
     stops: ClassVar[bool] = False
-    #: Whether something is minimised instead of an error.
+    #: Whether it is an objective that replaces the error.
     seeks: ClassVar[bool] = False
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """Return the required functions."""
+        """Return the functions of the dimensions that must be at most zero."""
         raise NotImplementedError
 
     def sought(self, way: Way, normal: Normal) -> Least | None:
-        """Return the function that is minimised in the place of an error; None where there is none."""
+        """Return the function that is minimised instead of an error; None if there is none."""
         return None
 
 
@@ -269,7 +269,7 @@ class TimeRatio(Demand):
     Attributes
     ----------
     least, greatest : float
-        Bounds; 1 at least.
+        Bounds of the time ratio, which is at least 1.
     """
 
     grashof: ClassVar[GrashofType | None] = "crank-rocker"
@@ -305,12 +305,12 @@ class TimeRatio(Demand):
 
 
 Constraint = Demand | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
-#: A least transmission angle of 40 degrees over a full turn.
+#: Default constraints: a least transmission angle of 40 degrees over a full turn.
 USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
 
 
 def _kinds() -> list[str]:
-    """Return the names of the constraints."""
+    """Return the class names of all constraints."""
     found, below = [kind.__name__ for kind in get_args(Constraint)[1:]], [Demand]
     while below:
         below = [kind for one in below for kind in one.__subclasses__()]
@@ -386,14 +386,14 @@ class _Forces(Demand):
     pins: str
 
     def along(self, way: Way) -> Along:
-        """Return the forces on the pins (N), a column for each pin."""
+        """Return the magnitudes of the pin forces (N) as a function of the crank's rotation, with a column for each pin."""
         ends, turn = way.ends("a force on the pins"), way.turn
 
         def magnitudes(d: Any, rotation: Any) -> Any:
             casadi = symbolic.library()
             th2 = rotation if turn else rotation + d.crank_phase
             found = pin_functions(d, self.make, th2, straight=way.straight, linkage=way.linkage)
-            # a force of zero has a slope, too
+            # the added number keeps the slope of a zero force finite
             chosen = [found[pin] for pin in self.pins]
             return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))
 
@@ -465,34 +465,34 @@ class LeastPinForce(_Forces):
         _check_pins(self.pins)
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """Return the required functions."""
+        """Return no required functions, since the pin force is the objective."""
         return ()
 
     def sought(self, way: Way, normal: Normal) -> Least:
-        """Return the function that is minimised in the place of an error; None where there is none."""
+        """Return the function that is minimised instead of an error, with the bound of the greatest error."""
         error = quantity(self.error, "rad" if normal.of_rocker else "m", "greatest error")
         if not (isfinite(error) and error > 0.0):
             raise ParameterError("greatest error", self.error, "be a finite number greater than zero")
         return Least(self.along(way), error / normal.unit)
 
 
-#: The constraints that are about pin forces.
+#: The constraints on pin forces.
 FORCES = (MaxPinForce, LeastPinForce)
 #: Number of rotations at which an `Along` is bounded from the beginning.
 GRID = 48
-#: Rotation beyond a turn in which peaks are sought (rad).
+#: Rotation by which the search for peaks extends a full turn at either end (rad).
 BEYOND = 0.02
 
 
-# As constraints
+# Rotations at which functions are bounded
 
 
 def even_rotations(ends: tuple[float, float]) -> FloatArray:
-    """Return evenly spaced rotations between two angles."""
+    """Return evenly spaced rotations between two angles, without the end of a full turn (rad)."""
     return np.linspace(*ends, GRID, endpoint=ends[1] - ends[0] < 2.0 * pi)
 
 
 def search_range(ends: tuple[float, float]) -> tuple[float, float]:
-    """Return the range in which peaks are sought: a little more than a turn, so that a peak at its end is found."""
+    """Return the range in which peaks are sought: a full turn is extended a little, so that a peak at its end is found."""
     over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
     return ends[0] - over, ends[1] + over

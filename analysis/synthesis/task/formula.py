@@ -51,9 +51,9 @@ _LONGEST = 1000
 def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]:
     """Convert a text such as ``"70 + 100*abs(sin(t/2))"`` to a function of one variable.
 
-    Numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign
-    floor ceil hypot min max degrees radians``, and the variable; angles in radians. Nothing else is evaluated: the text is
-    parsed with `ast`, and every node that is not on this list is refused.
+    It may contain numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh exp log
+    sqrt abs sign floor ceil hypot min max degrees radians``, and the variable; angles are in radians. The text is parsed with
+    `ast`, and anything else in it is refused, not evaluated.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
     Raises
     ------
     InputError
-        If the text is not such a formula; the message names the wrong part.
+        If the text is no such formula; the message names the wrong part.
     """
     tree = _parsed(text)
 
@@ -104,7 +104,7 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
 
     def evaluated(t: ArrayLike) -> FloatArray:
         t = np.asarray(t, dtype=float)
-        with np.errstate(all="ignore"):  # what comes out is checked instead
+        with np.errstate(all="ignore"):  # the values are checked below
             values: FloatArray = np.array(np.broadcast_to(value(tree, t), t.shape), dtype=float)
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
@@ -139,7 +139,7 @@ def _number(value: float | str) -> float:
 
 
 def _parameter(start: float | str, end: float | str, n: int, turn: bool) -> FloatArray:
-    """Return n values at equal steps from start to end, without the end for a whole turn."""
+    """Return n values at equal steps from start to end; with ``turn`` without the end."""
     a, b = _number(start), _number(end)
     if not (np.isfinite([a, b]).all() and b > a):
         raise InputError(f"the parameter goes from {start!r} to {end!r}: the end must be greater, and both finite")
@@ -169,13 +169,15 @@ def path_from_formula(
     start, end : float or str
         Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve ends at its first point (to within
         1e-9 of its extent), it is closed, and that point is not repeated.
+    variable : str
+        Name of the parameter in the formulas.
 
     Raises
     ------
     InputError
         If a formula, the range or the curve is not usable.
     ParameterError
-        If the unit is not one of length.
+        If the unit is not a unit of length.
     """
     factor = quantity(f"1 {unit}", "m", "unit")
     functions = [formula(text, variable) for text in (x, y)]
@@ -210,7 +212,7 @@ def function_from_formula(
     unit : str
         Unit of the formula's value.
     start, end : float or str
-        Range of the crank angle; for whole turns the end, which equals the start, is left out.
+        Range of the crank angle; for whole turns the end, which is the start again, is left out.
     spacing : "even" or "chebyshev"
         "chebyshev" is for precision points: see `chebyshev_spacing`.
 
@@ -224,7 +226,7 @@ def function_from_formula(
     InputError
         If the formula or the range is not usable.
     ParameterError
-        If the unit is not one of angle.
+        If the unit is not a unit of angle.
     """
     factor = quantity(f"1 {unit}", "rad", "unit")
     if spacing == "chebyshev":
@@ -237,7 +239,7 @@ def function_from_formula(
 
 
 def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
-    """Return n precision points between two limits for which the error between the points is about the least.
+    """Return n precision points between two limits, spaced so that the error between them is nearly the least possible.
 
     They are the roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
 
@@ -261,7 +263,7 @@ _COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {
     ast.Gt: (-1, False),
     ast.Eq: (1, True),
 }
-#: Longest text that is read.
+#: Longest requirement, in characters.
 _LONGEST_TEXT = 1000
 _REQUIRED = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp", "log", "hypot")
 _MEASURE = re.compile(
@@ -272,8 +274,8 @@ _MEASURE = re.compile(
 def requirement(text: Any, name: str = "constraints.require") -> Require:
     """Convert a text such as ``"crank_length + rocker_length <= 300 mm"`` to a constraint.
 
-    Two sides are compared by ``<=``, ``>=`` or ``==``. They may contain dimensions by their name in `Linkage`, numbers with a
-    unit of length or angle or without (SI), ``+ - * / **``, brackets, ``pi`` and functions. Anything else is refused.
+    The text compares two sides by ``<=``, ``>=`` or ``==``. They may contain dimensions by their name in `Linkage`, numbers
+    with a unit of length or angle or without one (SI), ``+ - * / **``, brackets, ``pi`` and functions, nothing else.
 
     Raises InputError if the text is not a constraint; the message names the wrong part.
     """
@@ -314,7 +316,7 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
     except LinkworkError:
         raise
     except (ValueError, ArithmeticError):
-        pass  # of these dimensions only
+        pass  # it has no value only for these dimensions
     scale = max((abs(number) for number in numbers if number), default=1.0)
     return Require(function=function, equal=equal, name=text, scale=scale)
 
@@ -365,9 +367,9 @@ def _compile_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
     return FunctionType(inner, space, "requirement")
 
 
-#: Rotations among which the greatest values of a function are looked for.
+#: Number of rotations at which a function is evaluated to find its greatest values.
 DENSE = 721
-#: Names that a user's function may take from `math` or NumPy.
+#: Functions that a user's function may take from `math` or NumPy.
 TRACED = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
     "exp", "log", "sqrt", "hypot", "fabs",
@@ -384,7 +386,7 @@ RENAMED: dict[str, Callable[..., Any]] = {
 
 
 def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
-    """Convert dimensions from normal form to SI, for functions of the user."""
+    """Convert dimensions from normal form to SI, as functions of the user expect them."""
     values = dict(vars(p))
     for name in UNKNOWNS[:7]:
         values[name] = unit * values[name]
@@ -393,12 +395,12 @@ def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespac
 
 
 def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
-    """Evaluate a function with CasADi symbols; functions of `math` and NumPy are replaced by those of CasADi.
+    """Evaluate a required function with CasADi symbols; functions of `math` and NumPy are replaced by those of CasADi.
 
     Raises
     ------
     InputError
-        If it branches on its argument, or calls a function that CasADi does not have.
+        If the function branches on its argument, or calls a function that CasADi does not have.
     """
     casadi = symbolic.library()
     if require.symbolic:
@@ -411,7 +413,7 @@ def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
             "without branches"
         ) from error
     if value.numel() != 1 or value.is_constant():
-        # what turns a symbol into a float by itself has lost it: NaN
+        # a function that converts a symbol to a float loses the symbol, and its value is NaN
         raise InputError(
             f"{require.name} cannot be traced (its value is {value}): it must be one number, by arithmetic and functions of "
             "math from the dimensions"
@@ -425,8 +427,9 @@ def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
     Returns
     -------
     ndarray, shape (count, 1 + n)
-        In each row a rotation (rad), the greatest value first and repeated if there are fewer peaks; then for each of the n
-        values -1/2 divided by its second derivative, which gives the height of a nearby peak from the slope; 0 without a peak.
+        A row for each peak, the highest first: the rotation (rad), then for each of the n values of the function -1/2 divided
+        by its second derivative, from which, with the slope, the height of a nearby peak follows; 0 if this value has no peak
+        there. If there are fewer peaks, the first row is repeated.
     """
     assert along.ends is not None
     rotation = np.linspace(*along.ends, DENSE)
@@ -437,7 +440,7 @@ def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
         inner = row[1:-1]
         for k in np.nonzero((inner >= row[:-2]) & (inner > row[2:]) & np.isfinite(row[:-2] + row[2:]))[0]:
             before, now, after = row[k : k + 3]
-            # the top of the parabola through three
+            # the vertex of the parabola through three values
             curved = 2.0 * now - before - after
             off = 0.5 * (after - before) / curved
             bends = [*none[:n], 0.5 * step**2 / curved, *none[n + 1 :]]
@@ -448,7 +451,7 @@ def find_peaks(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
 
 
 def _rebound(value: Any, seen: dict[int, Any]) -> Any:
-    """Replace `math` and NumPy by CasADi in a user's function, and in the functions that it calls."""
+    """Return a copy of a user's function that calls CasADi instead of `math` and NumPy, as do the functions that it calls."""
     casadi = symbolic.library()
     if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
         known = {n: getattr(casadi, n) for n in TRACED} | RENAMED

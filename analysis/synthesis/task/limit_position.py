@@ -34,7 +34,7 @@ InLine = Literal["stretched", "folded"]
 
 
 class _FourBarPositions:
-    """Conditions for the limit positions of a four-bar, for numbers and symbols; `POSITIONS` has those of each kind."""
+    """Conditions for the limit positions of a four-bar, for numbers and symbols; `POSITIONS` has the class of each kind."""
 
     @staticmethod
     def dead_cosine(l1: float, reach: float, l4: float) -> float:
@@ -43,7 +43,7 @@ class _FourBarPositions:
 
     @staticmethod
     def dead_gap(d: Any, reach: Any, c: Any) -> Any:
-        """Return the closure error of the triangle A, C, D with crank and coupler collinear: zero in a dead centre."""
+        """Return the closure error of the triangle A, C, D, zero in a dead centre; c is the cosine of the angle at A."""
         l1, l3, l4 = d.ground_length, d.coupler_length, d.rocker_length
         return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
 
@@ -54,14 +54,14 @@ class _FourBarPositions:
 
     @staticmethod
     def toggle_gap(d: Any, c: Any, side: float) -> Any:
-        """Return a function of the cosine of the crank angle that is zero in a toggle; side 1 is stretched, -1 folded."""
+        """Return a value that is zero in a toggle; c is the cosine of the crank angle, side 1 for stretched, -1 for folded."""
         l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
         reach = l3 + l4 if side > 0.0 else l3 - l4
         return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
 
     @staticmethod
     def out_of_line(d: Any, c: Any) -> Any:
-        """Return a function that is negative if coupler and rocker are not collinear."""
+        """Return values that are negative unless coupler and rocker are almost collinear; c as in `toggle_gap`."""
         l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
         square = l1**2 + l2**2 - 2.0 * l1 * l2 * c
         both = Linkage.transmission_excess(l3, l4, square, square, cos(TURNING))
@@ -74,7 +74,7 @@ class _FourBarPositions:
 
     @staticmethod
     def speed(g: Any, c2: Any, s2: Any, l2: Any, l3: Any, l4: Any) -> Any:
-        """Return the speed of the driven link divided by that of the crank, from loop closure."""
+        """Return the speed of the driven link divided by that of the crank; g is the closed loop's position."""
         return traced(FIVE_BAR).coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
 
 
@@ -111,7 +111,7 @@ class _SliderCrankPositions(_FourBarPositions):
         return (g.s3 * c2 - g.c3 * s2) / g.s3
 
 
-#: A geared five-bar has no dead centres.
+#: Conditions for each kind of linkage; a geared five-bar has no dead centres.
 POSITIONS: Mapping[Kind, type[_FourBarPositions]] = {
     "four-bar": _FourBarPositions,
     "slider-crank": _SliderCrankPositions,
@@ -128,11 +128,11 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
     """
     l1, l2, l3, l4 = _fixed_lengths(linkage)
     found = []
-    # C from A with coupler and crank in line, stretched and folded
+    # distance of C from A with coupler and crank in line, stretched and folded
     for reach in (l3 + l2, l3 - l2):
         if reach == 0.0:
             continue
-        # of the direction of the coupler, which points to the side of the assembly
+        # cosine of the coupler's direction, which points to the side of the assembly
         cosine = POSITIONS[linkage.kind].dead_cosine(l1, reach, l4)
         if abs(cosine) > 1.0:
             continue
@@ -216,7 +216,7 @@ def _fixed_lengths(linkage: Linkage) -> tuple[float, float, float, float]:
 
 
 def _rotations(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
-    """Read a range of crank rotations (rad), shorter than the longest, from its two ends or from one value."""
+    """Return the ends of a range of crank rotations (rad), given as two or as one; raise ParameterError if it is too long."""
     try:
         low, high = (float(end) for end in (value if isinstance(value, tuple | list) else (value, value)))
     except (TypeError, ValueError):
@@ -300,9 +300,9 @@ class _Place(Demand):
     Attributes
     ----------
     at : float or (float, float)
-        From the start of the task's rotations (rad).
+        Crank rotation, or range of it, counted as those of the task (rad).
     position : "stretched" or "folded"
-        One link extends the other, or lies over it.
+        Whether one link extends the other, or lies over it.
     """
 
     at: Amount
@@ -335,7 +335,7 @@ class DeadCentre(_Place):
     Attributes
     ----------
     at : float or (float, float)
-        From the start of the task's rotations (rad).
+        Crank rotation, or range of it, counted as those of the task (rad).
     position : "stretched" or "folded"
         The coupler extends the crank, or lies over it.
     """
@@ -352,7 +352,7 @@ class DeadCentre(_Place):
 
         def closes(d: Any, rotation: float) -> Any:
             reach = d.coupler_length + d.crank_length if stretched else d.coupler_length - d.crank_length
-            # C from A is along the crank, or against it
+            # A -> C points along the crank, or against it
             c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
             return POSITIONS[way.linkage.kind].dead_gap(d, reach, c)
 
@@ -372,7 +372,7 @@ class Toggle(_Place):
     Attributes
     ----------
     at : float or (float, float)
-        From the start of the task's rotations (rad).
+        Crank rotation, or range of it, counted as those of the task (rad).
     position : "stretched" or "folded"
         The coupler extends the rocker, or lies over it.
     """
@@ -402,7 +402,7 @@ class NoToggle(Demand):
     Attributes
     ----------
     between : (float, float)
-        From the start of the task's rotations (rad).
+        Crank rotations, counted as those of the task (rad).
     """
 
     between: tuple[Amount, Amount]

@@ -40,7 +40,7 @@ from .constraint import (
 from .task import Normal, RockerFunction, SliderFunction, Task
 
 FloatArray = NDArray[np.float64]
-#: Default bound of the links, in sizes of the target; for a rocker function in ground links.
+#: Default upper bound of the links, in sizes of the target; for a rocker function in ground links.
 LARGEST = 5.0
 #: Ground link of a rocker function by default (m): its angles do not depend on the size.
 GROUND = 0.1
@@ -57,14 +57,16 @@ class Limits:
     low, high : ndarray, shape (11,)
         Bounds of `UNKNOWNS`.
     turn, way : float or None
-        Least transmission angle (rad) over a turn and during the task: 0 if the crank must only turn fully, or the links must
-        only stay joined; None without such a constraint.
+        Least transmission angle (rad), over a turn and during the task. 0 only requires that the crank turns fully, or that
+        the links stay joined; None requires nothing.
     grashof : str or None
+        Required Grashof type.
     branches : tuple of int
         Assemblies that are tried.
     regions : tuple
-        (pivot, triangles of complex corners), in units.
+        For each region the pivot, "A" or "D", and the triangles, each shape (3, 2), in units.
     requires : tuple of Require
+        Functions that must be at most zero, or zero.
     linkage : type
         Type of the linkages.
     second : (float, float), optional
@@ -94,14 +96,14 @@ class Limits:
         return (1, 0) if self.second is None else geared(self.ratio)
 
     def second_crank(self, unit: float) -> CrankUnknown | None:
-        """Return the second crank that a search varies; None unless for a geared five-bar. ``unit`` is in m."""
+        """Return the unknowns of a geared five-bar's second crank, otherwise None. ``unit`` is the target's size (m)."""
         if self.second is None:
             return None
         low, high = self.second
         return CrankUnknown(ratio=self.ratio, length=(unit * low, unit * high))
 
     def admits(self, linkage: Linkage) -> bool:
-        """Return whether a linkage is of the kind of these limits; with a pivot on a guide it counts as a four-bar."""
+        """Return whether a linkage has the kind and gears of these limits; with a pivot on a guide it is a four-bar."""
         if self.linkage is FiveBar:
             return isinstance(linkage, FiveBar) and linkage.pivot.ratio == self.ratio
         return isinstance(linkage, SliderCrank) == (self.linkage is SliderCrank)
@@ -119,7 +121,7 @@ class Limits:
 
     @property
     def bounds_only(self) -> bool:
-        """Return whether there are bounds only, so that a least squares method is sufficient."""
+        """Return whether there are only bounds, so that a least squares method is sufficient."""
         return (
             self.turn is None
             and self.way is None
@@ -139,8 +141,8 @@ def make_limits(
 ) -> Limits:
     """Return bounds and constraints of a task in normal form, for one type of linkage.
 
-    Raises ParameterError if a bound does not have the name of a dimension, or its ends are in the wrong order; InfeasibleError
-    if bounds and constraints contradict one another.
+    Raises InputError or ParameterError if a bound or constraint is not usable; InfeasibleError if the ends of a bound are in
+    the wrong order, or bounds and constraints contradict one another.
     """
     if not isinstance(bounds, Mapping | None):
         raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
@@ -197,7 +199,7 @@ def _ends(
     caps = [c.length for c in constraints if isinstance(c, LargestLink)]
     function = isinstance(task, RockerFunction)
     cap = min(caps, default=LARGEST * (GROUND if function else normal.unit))
-    # where a function is required, what is returned is what that function saw
+    # with a required function angles stay within a turn, so that they are returned as the function was evaluated
     turns = 1.0 if any(isinstance(c, Require) for c in constraints) else 4.0
     usual = dict.fromkeys(ANGLES, (-turns * pi, turns * pi)) | dict.fromkeys(LINKS, (1e-3 * cap, cap))
     usual["point_distance"] = 0.0, cap
@@ -248,7 +250,7 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
     if type_ in _SWINGING:
         if turn is not None:
             raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
-        # on its way it must stay joined all the same
+        # even so, its links must stay joined during the task
         way = way or 0.0
     if turn is not None and any(c.stops for c in demands):
         raise InfeasibleError(
@@ -324,19 +326,19 @@ def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, const
 
 #: Default gear ratios of five-bars.
 GEARS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
-#: Constraints that apply to any linkage, and those for slider-cranks.
+#: Constraints that apply to any linkage, and all that apply to each kind.
 _ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
 _KEPT: Mapping[Kind, tuple[type, ...]] = {
     "four-bar": get_args(Constraint),
     "slider-crank": (*_ANY, Demand, Stroke),
     "geared-five-bar": _ANY,
 }
-#: Reason why these constraints do not apply to a five-bar.
+#: Reason why a `Demand` does not apply to a five-bar.
 _NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant of the pin forces has no second crank"
 
 
 def usual_kinds(task: Task) -> tuple[Kind, ...]:
-    """Return the kinds of linkages that are tried by default."""
+    """Return the kinds of linkages that are tried for a task by default."""
     return ("slider-crank",) if isinstance(task, SliderFunction) else ("four-bar",)
 
 
@@ -409,7 +411,7 @@ def _slider_crank_limits(task: Task, normal: Normal, bounds: Any, constraints: S
         own.append(FullTurn())
     if isinstance(task, SliderFunction):
         own += (
-            # the guide is the x axis, from either side of it, and the coupler point the slider
+            # the guide is the x axis, with the shaft on either side, and the coupler point is the slider
             Require(function=lambda d: np.cos(d.ground_angle), equal=True, name="direction of the guide"),
             Require(
                 function=lambda d: d.point_distance - d.coupler_length, equal=True, name="slider", scale=normal.unit
@@ -437,13 +439,13 @@ def _five_bar_limits(
         low, high = bounds[SECOND_LENGTH]
         unknown = CrankUnknown(ratio=1, length=(low, high))
         second = unknown.length[0] / normal.unit, unknown.length[1] / normal.unit
-    # a ratio of gears is refused where it is made one
+    # CrankUnknown refuses a number that is no ratio of gears
     made = [CrankUnknown(ratio=ratio, length=(1.0, 1.0)).ratio for ratio in gears]
     return [replace(limits, linkage=FiveBar, second=second, ratio=float(ratio)) for ratio in made]
 
 
 def as_asked(task: Task, linkage: Linkage) -> Linkage:
-    """For a slider function, move a slider-crank's guide exactly to the x axis, and its coupler point to the slider."""
+    """Return the linkage; for a slider function with its guide exactly on the x axis, and its coupler point at the slider."""
     if not isinstance(task, SliderFunction):
         return linkage
     side = 1.0 if linkage.ground_angle > 0.0 else -1.0

@@ -30,8 +30,8 @@ FREEDOM_WEIGHT = 1.4
 def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
     """Return points as an array of shape (n, 2) of finite numbers, a copy.
 
-    Raises InputError, with ``what`` as their name, if the shape is another, a coordinate is not finite, or there are fewer than
-    ``least`` points.
+    Raises InputError, with ``what`` as the name of the points, if the shape is wrong, a coordinate is not finite, or there are
+    fewer than ``least`` points.
     """
     try:
         array = np.array(points, dtype=float)
@@ -66,7 +66,7 @@ def arc_lengths(vertices: FloatArray) -> FloatArray:
 
 
 def halves(lengths: FloatArray, closed: bool) -> FloatArray:
-    """Return half the length of the two segments at each point of a polyline, from the lengths of its segments."""
+    """Return, for each point of a polyline, half the total length of its segments that meet there, from their lengths."""
     before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
     after = lengths if closed else np.append(lengths, 0.0)
     both: FloatArray = 0.5 * (before + after)
@@ -83,9 +83,9 @@ def even_odd_area(*rings: FloatArray) -> float:
     """Compute the area of the points that closed polylines encircle an odd number of times in total (m2).
 
     For one polyline it is the enclosed area by the even-odd rule: both lobes of a figure-eight count, an inner loop does not.
-    For two it is the area of the symmetric difference of the enclosed areas, since a point is in that if it is inside one
-    polyline and not the other. The polylines are cut at their crossings, and each face between the pieces counts or not
-    according to a point inside it.
+    For two it is the area of the symmetric difference of the enclosed areas, whose points are inside exactly one of the
+    polylines. The polylines are cut at their crossings; a face between the pieces counts if a point inside it is encircled an
+    odd number of times.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ class TargetPath:
     Raises
     ------
     InputError
-        If there are less than 3 points (2 if open), one is not finite, two in succession or all are the same, the shape is
-        not (n, 2), or a closed curve encloses no area.
+        If there are fewer than 3 points (2 if open), a point is not finite, two successive points or all are the same, the
+        shape is not (n, 2), or a closed curve encloses no area.
     """
 
     points: FloatArray
@@ -131,7 +131,7 @@ class TargetPath:
             raise InputError(
                 f"all {len(points)} points of the target are the same one: {points[0, 0]:.6g} m, {points[0, 1]:.6g} m"
             )
-        # the magnitude too: far from the origin the digits of a coordinate are fewer
+        # relative to the coordinates, too: far from the origin rounding makes close points coincide
         steps = np.hypot(*np.diff(ring(points, self.closed), axis=0).T)
         same = np.flatnonzero(steps <= nothing)
         if len(same):
@@ -152,7 +152,7 @@ class TargetPath:
     def from_file(
         cls, path: str | Path, *, unit: str | None = None, name: str | None = None, closed: bool | None = None
     ) -> TargetPath:
-        """Read the curve of a CSV or SVG file; see `analysis.files.read_points`. ``closed`` overrules the file.
+        """Read the curve of a CSV or SVG file; see `analysis.files.read_points`. If given, ``closed`` overrules the file.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class TargetPath:
     def size(self) -> float:
         """Return the radius of gyration: the root of the mean squared distance of the line from its centroid (m)."""
         middles, lengths = self._segments()
-        # a segment has l^2/12 about its own middle
+        # the mean squared distance of a segment from its own middle is l^2/12
         squares = ((middles - self.centroid) ** 2).sum(axis=1) + lengths**2 / 12.0
         return float(np.sqrt(lengths @ squares / lengths.sum()))
 
@@ -217,15 +217,15 @@ class TargetPath:
 
     @property
     def weights(self) -> FloatArray:
-        """Return the arc length that belongs to each point: half of both segments at it (m), shape (n,)."""
+        """Return the arc length that belongs to each point: half the length of its two segments (m), shape (n,)."""
         return halves(self._segments()[1], self.closed)
 
     @property
     def normals(self) -> FloatArray:
         """Return the unit normals at the points, shape (n, 2): outward for a closed curve, to the right along an open one.
 
-        The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), at an
-        open end that of the segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
+        The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), or at an
+        open end that of the end segment. For a closed curve that crosses itself, outward refers to the lobe with more area.
         """
         vertices = ring(self.points, self.closed)
         steps = np.diff(vertices, axis=0)
@@ -238,7 +238,7 @@ class TargetPath:
             h, k = np.vstack([lengths[:1], lengths]), np.vstack([lengths, lengths[-1:]])
         tangents = (k * before + h * after) / (h + k)
         size = np.hypot(*tangents.T)[:, None]
-        # at the tip of a cusp the curve turns back on itself: the side on which it came
+        # at the tip of a cusp, where the curve turns back on itself, take the tangent before the tip
         tangents = np.where(size > 1e-9, tangents / np.maximum(size, 1e-9), before)
         side = -1.0 if self.closed and self.signed_area < 0.0 else 1.0
         normals: FloatArray = side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
@@ -298,8 +298,8 @@ class TargetPath:
         Raises
         ------
         InputError
-            If the curve has fewer than 6 points, or the deviation is not greater than zero and less than that of the
-            smoothest possible curve (a point if closed, a straight line if open).
+            If the curve has fewer than 6 points, or the deviation is not between zero and that of the smoothest possible curve
+            (a point if closed, a straight line if open).
         """
         from scipy.interpolate import CubicSpline
         from scipy.optimize import brentq, minimize_scalar
@@ -312,12 +312,12 @@ class TargetPath:
         u = arc_lengths(vertices)
         z = vertices[: len(points)] @ np.array([1.0, 1j])
         stiffness, modes = np.linalg.eigh(_bending(np.diff(u), self.closed))
-        free = 1 if self.closed else 2  # what bending leaves as it is: a point, or a straight line
+        free = 1 if self.closed else 2  # modes without bending: a point, or a straight line
         stiffness[:free] = 0.0
         c = modes.T @ z
 
         def misfit(log: float) -> float:
-            """Return the mean squared distance of the points from the spline."""
+            """Return the mean squared distance of the points from the spline, for the logarithm of lambda."""
             held = 1.0 / (1.0 + np.exp(log) * stiffness)
             return float((np.abs((1.0 - held) * c) ** 2).mean())
 
@@ -349,7 +349,9 @@ class TargetPath:
 
 
 def _bending(h: FloatArray, closed: bool) -> FloatArray:
-    """Return the matrix K of z' K z = integral of z''^2 over the cubic spline through z at knots h apart, K = Q R^-1 Q'.
+    """Return the matrix K = Q R^-1 Q' for which z' K z is the integral of z''^2 over the cubic spline through the values z.
+
+    ``h`` has the distances between the knots.
 
     Green and Silverman, section 2.1.2; periodic, or natural with z'' = 0 at both ends.
     """
@@ -373,7 +375,7 @@ PIECES = 2000
 
 
 def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> FloatArray:
-    """Compute the distance of each point from a curve, exact to its segments (m), shape (m,).
+    """Compute the distance of each point from a curve of straight segments, exactly (m), shape (m,).
 
     Parameters
     ----------
@@ -387,7 +389,7 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
     Raises
     ------
     InputError
-        If the curve has less than 2 points, or a coordinate is not finite.
+        If the curve has fewer than 2 points, or a coordinate is not finite.
     """
     import shapely
 
@@ -397,7 +399,7 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
 
 
 def _cut(vertices: FloatArray) -> tuple[FloatArray, float]:
-    """Divide a polyline into `PIECES` pieces; return their middles, and its length."""
+    """Divide a polyline into `PIECES` pieces of equal length; return their midpoints, shape (PIECES, 2), and its length."""
     length = float(arc_lengths(vertices)[-1])
     return along(vertices, (np.arange(PIECES) + 0.5) * (length / PIECES)), length
 
@@ -413,8 +415,8 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
         A = 1/2 (integral over the target of d(p, curve) ds + integral over the curve of d(p, target) ds),
 
     which is symmetric and zero only for equal curves. For parallel curves it is the area of the strip between them, exactly
-    (Steiner's formula: their distance times the mean of their lengths). If a closed curve traces an open target with a part of
-    it, the rest of the curve does not count:
+    (Steiner's formula: their distance times the mean of their lengths). If the target is open and the curve closed, only a part
+    of the curve traces the target, and the rest of the curve does not count:
 
         A = integral over the target of d(p, curve) ds.
 
@@ -431,7 +433,7 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
     Raises
     ------
     InputError
-        If the curve has less than 3 points (2 if open), or a coordinate is not finite.
+        If the curve has fewer than 3 points (2 if open), or a coordinate is not finite.
     """
     points = plane_points(curve, "the curve", 3 if closed else 2)
     if closed and target.closed:
@@ -447,8 +449,8 @@ def area_between(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -
 def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> float:
     """Compute the Hausdorff distance of a traced curve from its target (m).
 
-    For an open target and a closed curve only the target's points count, as in `area_between`. It is the largest distance of
-    the vertices and of `PIECES` points at equal arc length, smaller than the true one by at most half their spacing.
+    For an open target and a closed curve only the target's points count, as in `area_between`. Distances are computed at the
+    vertices and at `PIECES` points at equal arc lengths: the result is below the true one by at most half their spacing.
 
     Parameters
     ----------
@@ -474,7 +476,7 @@ def hausdorff(curve: ArrayLike, target: TargetPath, *, closed: bool = True) -> f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straightness:
-    """Length and flatness of a part of a curve.
+    """Length and flatness of a part of a curve, along and across a straight line.
 
     Attributes
     ----------
@@ -511,7 +513,7 @@ def straightness(part: ArrayLike, *, direction: float | None = None) -> Straight
     Raises
     ------
     InputError
-        If there are less than 2 points, a number is not finite, or no direction is given and all points are the same.
+        If there are fewer than 2 points, a number is not finite, or no direction is given and all points are the same.
     """
     points = plane_points(part, "the part", 2)
     points = points - points[0]
@@ -552,7 +554,7 @@ def straightest_part(
     least_travel: float = 0.0,
     closed: bool = True,
 ) -> Straightness:
-    """Find the flattest part of a curve with ``count`` successive points, such as a range of crank angles.
+    """Find the flattest part of ``count`` successive points in a curve, such as those of a range of crank angles.
 
     Parameters
     ----------
@@ -570,7 +572,7 @@ def straightest_part(
     Raises
     ------
     InputError
-        If there are fewer points, or no part has the least travel.
+        If the curve has fewer points, or no part has the least travel.
     """
     parts = parts_of(curve, count, direction=direction, closed=closed)
     longest = max(part.travel for part in parts)
@@ -584,12 +586,12 @@ def straightest_part(
 def parts_of(
     curve: ArrayLike, count: int, *, direction: float | None = None, closed: bool = True
 ) -> list[Straightness]:
-    """Return travel and flatness of every part of a curve with ``count`` successive points: see `straightest_part`."""
+    """Return travel and flatness of every part of ``count`` successive points in a curve: see `straightest_part`."""
     points = plane_points(curve, "the curve", 2)
     if not 2 <= count <= len(points):
         raise InputError(f"a part of {count} points of {len(points)}: it must be from 2 to all of them")
     starts = len(points) if closed else len(points) - count + 1
-    # over the seam: the curve's beginning once more
+    # a part may cross the seam of a closed curve: append the curve's beginning
     laid = np.vstack([points, points[: count - 1]]) if closed else points
     return [
         replace(straightness(laid[start : start + count], direction=direction), start=start) for start in range(starts)

@@ -1,11 +1,11 @@
 """Define the tasks of synthesis, and their normal form.
 
-A task has target values and weights. All methods here work on its normal form (`normal_form`): lengths are in units of the
-target's size, relative to its centre, so that a watch and an excavator are the same problem.
+A task has target values and weights. Searches work on its normal form (`normal_form`): lengths are divided by the target's
+size and measured from its centre, so that a watch and an excavator are the same problem.
 
-The quality functions are the thesis's (chapter VI). For a timed path it is the sum of weighted squared distances at the given
-crank rotations; for a rocker function the sum of weighted squared angular errors; for an untimed path the area between the
-curves or the squared distance to the curve.
+The quality functions are the thesis's (chapter VI): for a timed path the sum of weighted squared distances at the given crank
+rotations, for a rocker function the sum of weighted squared angular errors, for an untimed path the area between the curves or
+the sum of squared distances to the curve.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ...units import in_si
 from .target import TargetPath, halves
 
 FloatArray = NDArray[np.float64]
-#: Size of a body that only turns, where none is given (m).
+#: Default size of a target at which a body only rotates (m).
 TURNED = 0.1
 Measure = Literal["area", "distance"]
 Objective = Literal["error", "worst"]
@@ -42,7 +42,7 @@ def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
 
 
 def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None) -> None:
-    """Check that successive targets without crank rotations differ: a dwell needs crank rotations."""
+    """Raise InputError if two successive targets are the same and have no crank rotations: a dwell needs crank rotations."""
     same = (np.diff(points, axis=0) == 0.0).all(axis=1)
     if angle is not None:
         same &= np.diff(angle) == 0.0
@@ -112,7 +112,7 @@ def _set(task: Any, **values: Any) -> None:
 
 
 def turn(n: int) -> FloatArray:
-    """Return n equal steps over one turn of the crank (rad), without the end."""
+    """Return n evenly spaced crank rotations over one turn, from 0 and without 2 pi (rad)."""
     return np.linspace(0.0, 2.0 * pi, n, endpoint=False)
 
 
@@ -130,7 +130,7 @@ class TimedPath:
     weights : ndarray, shape (n,)
         Weights of the squared distances.
     objective : "error" or "worst"
-        The objective: the quality function, or the greatest error, times the root of its weight.
+        What is minimised: the quality function, or the greatest error times the square root of its weight.
     """
 
     points: ArrayLike
@@ -140,7 +140,7 @@ class TimedPath:
 
     def __post_init__(self) -> None:
         _check_objective(self.objective)
-        # two are met exactly by any number of linkages
+        # any number of linkages pass two points exactly
         points = _points(self.points, "target points", 3)
         _extended(points, "target points")
         n = len(points)
@@ -176,7 +176,7 @@ class SliderFunction(TimedPath):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straight:
-    """A part of an untimed path that must be straight and passed within a crank rotation.
+    """A part of an untimed path that must be straight and traced within a given crank rotation.
 
     Attributes
     ----------
@@ -185,9 +185,10 @@ class Straight:
     rotation : float
         Greatest crank rotation for that part (rad).
     flatness : float, optional
-        Greatest extent of that part across the line (m); without it flatness is only favoured, by ``weight``.
+        Greatest extent of the traced part across the line from start to end (m); if it is not given, ``weight`` only favours
+        flatness.
     weight : float
-        Weight of the deviation across the line.
+        Weight of the squared deviation across that line, 1 or greater.
     """
 
     start: int
@@ -218,17 +219,16 @@ class UntimedPath:
     path : TargetPath
         Closed or open.
     measure : "area" or "distance"
-        Quality function that ranks solutions: the area between the curves (m2), or the mean squared distance times the
-        number of points (m2).
+        Quality function that ranks solutions: the area between the curves (m2), or the weighted sum of squared distances from
+        the stations to the curve (m2).
     samples : int
-        Points at equal arc length at which the curve is fitted.
+        Number of stations: points of the path at equal arc lengths, at which the curve is fitted.
     straight : Straight, optional
-        A straight part that is passed within a crank rotation; its points are those of ``path``.
+        A straight part that is traced within a crank rotation; its points are those of ``path``.
     weights : ndarray, shape (number of the path's points,), optional
         Weight of each point of ``path``, interpolated between the points.
     objective : "error" or "worst"
-        The objective: the quality function, or the Hausdorff distance between curve and path, in which weights do not
-        count.
+        What is minimised: the quality function, or the Hausdorff distance between curve and path, which ignores weights.
     """
 
     path: TargetPath
@@ -261,11 +261,11 @@ class RockerFunction:
     angle : ndarray, shape (n,)
         th4 from the ground link (rad).
     rotation, weights : ndarray, shape (n,)
-        As in `TimedPath`; the weights are of the squared errors of angle.
+        As in `TimedPath`; the weights are those of the squared angular errors.
     mounting : bool
         Whether the output may be mounted on the rocker at any angle.
     objective : "error" or "worst"
-        The objective: the quality function, or the greatest error, as in `TimedPath`.
+        What is minimised: the quality function, or the greatest error, as in `TimedPath`.
     """
 
     angle: ArrayLike
@@ -296,8 +296,8 @@ class Motion:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        Positions of the coupler point (m). One position with several directions is a body that rotates there; one pose at
-        successive crank rotations is a dwell.
+        Positions of the coupler point (m). Equal positions with several directions mean a body that only rotates; the same
+        pose at successive crank rotations is a dwell.
     angle : ndarray, shape (n,)
         Direction of the body at each point (rad); its mounting angle on the coupler is free.
     rotation : ndarray, shape (n,), optional
@@ -307,7 +307,7 @@ class Motion:
         extent, or 50 mm for a body that only rotates.
     weights : ndarray, shape (n,)
     objective : "error" or "worst"
-        The objective: the quality function, or the greatest error, position and angle combined.
+        What is minimised: the quality function, or the greatest error, position and angle combined.
     """
 
     points: ArrayLike
@@ -335,18 +335,18 @@ class PrecisionPoints:
     """Task: the coupler point passes exactly through a few points, in order, at any crank rotations or at given ones.
 
     A four-bar can pass nine untimed points or five timed ones, but rarely with a good transmission angle; if it cannot pass
-    them exactly it comes as close as possible. With an ``angle`` they are poses: five untimed ones are possible.
+    them exactly it comes as close as possible. With ``angle`` the targets are poses, of which it can pass five untimed ones.
 
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        m.
+        Points in the order in which they are passed (m).
     angle, rotation : ndarray, shape (n,), optional
         Directions of the carried body, and crank rotations (rad).
     length : float, optional
         See `Motion`.
     objective : "error" or "worst"
-        The objective if the points cannot be passed exactly: the quality function, or the greatest error.
+        What is minimised if the points cannot be passed exactly: the quality function, or the greatest error.
     """
 
     points: ArrayLike
@@ -377,7 +377,7 @@ def _extent(points: FloatArray) -> float:
 
 
 def _leverage(length: float | None, points: FloatArray) -> float:
-    """Return the length by which an angular error counts as an error of position, as given or by default."""
+    """Return the length by which an angular error counts as an error of position (m/rad), as given or by default."""
     if length is None:
         return 0.5 * (_extent(points) or TURNED)
     if not (isfinite(length) and length > 0.0):
@@ -386,7 +386,7 @@ def _leverage(length: float | None, points: FloatArray) -> float:
 
 
 def covers_turn(rotation: FloatArray) -> bool:
-    """Return whether crank rotations cover a whole turn: the step from last to first is not wider than the others."""
+    """Return whether crank rotations cover a whole turn: the gap from last to first is no wider than the widest step."""
     gap = 2.0 * pi - float(np.ptp(rotation))
     return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
 
@@ -406,7 +406,7 @@ class Normal:
     angle : ndarray, shape (n,), or None
         Target of the coupler's or the rocker's angle (rad).
     of_rocker : bool
-        Whether the angle is that of the rocker, relative to the ground link, or of the coupler, in the plane.
+        Whether ``angle`` is the rocker's, relative to the ground link; otherwise it is the coupler's, in the plane.
     of_slider : bool
         Whether the points are positions of a slider.
     mounting : bool
@@ -414,7 +414,7 @@ class Normal:
     leverage : float
         Factor of an angular error (units per rad); 1 for a rocker function.
     weights : ndarray, shape (n,)
-        Of the squared errors.
+        Weights of the squared errors.
     rotation : ndarray, shape (n,), or None
         Crank rotations; None if only the order is given.
     closed : bool
@@ -422,7 +422,7 @@ class Normal:
     arc : ndarray, shape (n,)
         Length of the target that belongs to each station.
     outline : ndarray of complex, shape (m,), or None
-        The points of an untimed path, as the task gives them.
+        All points of an untimed path, of which the stations are samples.
     outline_weights : ndarray, shape (m,)
         Weights of the errors at these points.
     straight : Straight or None
@@ -430,7 +430,7 @@ class Normal:
     exact : bool
         Whether the points must be passed exactly.
     quality : "squares", "area" or "worst"
-        Sum of squared errors, area between the curves, or greatest error.
+        What is minimised: the sum of squared errors, the area between the curves, or the greatest error.
     """
 
     origin: complex
@@ -474,7 +474,7 @@ class Normal:
 
     @property
     def shares(self) -> FloatArray:
-        """Return the arc length of the polyline through the stations up to each of them, relative to the total, shape (n,)."""
+        """Return the arc length up to each station of the polyline through all, divided by its total length, shape (n,)."""
         assert self.points is not None
         steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
         length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -502,7 +502,7 @@ def normal_form(task: Task) -> Normal:
     Raises
     ------
     InputError
-        If it is not a task.
+        If the argument is not a task.
     """
     if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
         raise InputError(f"{task!r} is no task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints")
@@ -522,7 +522,7 @@ def normal_form(task: Task) -> Normal:
     if isinstance(task, UntimedPath):
         return _path_normal(task)
     points = np.asarray(task.points)
-    # of a body that only turns: what its angles count for
+    # a body that only rotates has no extent: its size follows from the length by which its angles count
     unit = _extent(points) or 2.0 * float(task.length)  # type: ignore[union-attr, arg-type]
     low, high = points.min(axis=0), points.max(axis=0)
     origin = complex(*(0.5 * (low + high)))
