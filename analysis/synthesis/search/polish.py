@@ -1,7 +1,7 @@
 """Optimise from the starts of a scan: SciPy's least squares if there are only bounds, IPOPT if there are constraints.
 
-Both use exact Jacobians. Other objectives than a sum of squares are fitted by least squares first. Then `refine` minimises the
-area or the greatest distance of a path, and IPOPT the greatest error at given stations, as the least bound of all errors.
+Both use exact Jacobians. If the objective is not a sum of squares, squares are fitted first. Then `refine` minimises the area
+or the greatest distance of a path, and IPOPT the greatest error at given stations, an unknown that bounds all errors.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ from .statement import Objective
 FloatArray = NDArray[np.float64]
 #: Number of untimed stations up to which least squares is as fast as IPOPT, whose Jacobian is sparse.
 FEW = 20
-#: Number of fits after which the greatest error is minimised.
+#: Number of the best fits from which the greatest error is minimised.
 ONWARDS = 6
-#: Numbers of paths whose measure between the curves is minimised, with their iterations: many paths by a few iterations, the
-#: best of them by more. For an open path, whose ends are free, too, the first laps say less.
+#: Laps of the refinement of paths, as (number of paths, iterations of each): many paths by a few iterations, then the best of
+#: them by more. Open paths, whose ends are free, are harder to rank early, so that more of them stay.
 RACE = {
     "area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)),
     "open area": ((40, 12), (12, 40), (3, 100), (1, 100), (1, 200)),
     "worst": ((ONWARDS, ITERATIONS),),
 }
-#: Least-squares fits from which paths are refined, besides the starts themselves: most end at the same few optima.
+#: Number of least-squares fits from which paths are refined, besides the starts: most fits end at the same few optima.
 FITTED = 8
-#: Number of the best answers that are continued if they reached the limit of iterations, and further iterations for each.
+#: Number of the best answers that are continued if they reached the limit of iterations, and the new limit for each.
 FINISHED, LONG = 4, 1500
 #: Number of triangles of a region that are tried at a time.
 PIECES = 3
-#: Greatest number of starts per piece of work on several cores, which is lost on an interruption.
+#: Greatest number of starts per piece of work on several cores; an interruption loses the piece.
 MOST = 32
 #: Linkages that differ by less than this, relative to the longest link and in rad, count as one.
 DIFFERENT = 1e-3
@@ -89,7 +89,10 @@ ONE_THREAD = _OneThread()
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """Answers of all starts: the feasible ones, best first, and the others; and the starts that are feasible themselves."""
+    """Answers of all starts: ``kept`` are the feasible ones, best first, ``others`` the infeasible ones.
+
+    ``done`` is the number of searches; ``begun`` are the starts that are feasible without a search.
+    """
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]
@@ -101,12 +104,12 @@ class Polished:
     def of(
         cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
     ) -> Polished:
-        """Build the record from all answers and the feasible starts."""
+        """Build the record from all answers, the feasible ones in order, and the feasible starts."""
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
     def joined(self, other: Polished) -> Polished:
-        """Join the answers of searches for different kinds of linkages."""
+        """Return the answers of both searches, such as for two kinds of linkages, in one record."""
         return Polished(
             kept=self.kept + other.kept,
             others=self.others + other.others,
@@ -143,21 +146,21 @@ def polish(
     def spread(name: str, items: Sequence[Any], what: str) -> tuple[list[Answer], bool]:
         cores = search.cores
         size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
-        # a polisher holds compiled solvers, which do not travel: each part of the work makes its own
+        # a polisher holds compiled solvers, which cannot be sent to a process: each part of the work makes its own
         step = getattr(worker, name) if cores == 1 else partial(_apart, name, normal, limits, pivot)
         parts, interrupted = over_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
         return [answer for part in parts for answer in part], interrupted
 
     begun = kept_answers([worker.kept(start) for start in starts])
     given = [answer for answer in begun if answer.start.given]
-    # where enough of the starts themselves can race, few are fitted by squares; the ends of a straight part are not met by few
+    # if enough starts can be refined directly, only a few are fitted by squares; not with a straight part, whose ends need more
     # iterations
     races = normal.outline is not None and normal.quality != "squares" and pivot is None and normal.straight is None
     enough = races and len(begun) >= FITTED
     fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
     found, interrupted = spread("fit_all", fitted, f"fitting {len(fitted)} starts")
     kept = kept_answers(found)
-    # an interruption after the last search has nothing to stop
+    # an interruption after the last search is ignored
     if interrupted and len(found) < len(fitted):
         return Polished.of(found, kept, True, begun)
     interrupted = False
@@ -189,9 +192,9 @@ def _raced(
     given: Sequence[Answer],
     laps: Sequence[tuple[int, int]],
 ) -> tuple[list[Answer], bool]:
-    """Refine many answers by few iterations each, then the best of them by more; also return whether that was interrupted."""
+    """Refine many answers by few iterations each, then the best by more; return the answers, and whether Ctrl-C interrupted."""
     for lap, (count, iterations) in enumerate(laps):
-        # guesses run in the first lap whatever they are worth; what does not run in it is left behind
+        # guesses take part in the first lap however poor they are; answers that do not take part are dropped
         best = distinct([*given, *kept], count + len(given), distance=RACED)
         stage = "refining" if lap else "comparing"
         done, interrupted = spread(
@@ -200,7 +203,7 @@ def _raced(
         if interrupted:
             return [*done, *kept], True
         rest = [answer for answer in kept if answer not in best] if lap else []
-        # those that have come to the same optimum count as one
+        # answers that have reached the same optimum count as one
         kept, given = distinct(kept_answers([*done, *rest]), len(done) + len(rest), distance=RACED), []
     return list(kept), False
 
@@ -219,29 +222,29 @@ def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None
 def distinct(
     answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
 ) -> list[Answer]:
-    """Return the first answers that differ in links relative to the longest, coupler point or pivot."""
+    """Return the first ``count`` answers that differ by ``distance`` in links, relative to the longest, point or pivot."""
 
     def mark(answer: Answer) -> FloatArray:
         q, v = answer.start.q, answer.start.pivot
         largest = q[2:7].max()
         if isinstance(pivot, SliderUnknown):
-            # as vectors: a guide is the same one from its other end
+            # as vectors, because a guide turned by pi is the same guide
             v = np.concatenate([np.cos(v[0]) * v[1:], np.sin(v[0]) * v[1:]])
         if isinstance(pivot, CrankUnknown):
-            # seen from where the first crank lies along the ground link, however often either has turned since
+            # the second crank's angle while the first lies along the ground link, independent of whole turns
             turned = geared(pivot.ratio)
             relative = turned[0] * v[1] - turned[1] * q[8]
             v = np.array([v[0], largest * np.cos(relative), largest * np.sin(relative), *v[2:]])
         side = 3.0 * answer.start.branch
         if answer.start.linkage is SliderCrank:
-            # a slider-crank without an offset is the same one seen from the other side of its guide
+            # without an offset a slider-crank and its mirror image about the guide are the same
             turned = np.exp(1j * q[7])
             v = np.array(
                 [q[2] * turned.real, q[2] * turned.imag, *(side * largest * np.array([turned.real, turned.imag]))]
             )
             q, side = np.array([*q[:2], 0.0, *q[3:7], 0.0, q[7] + q[8], *q[9:]]), 0.0
         mark = np.concatenate([q[:7] / largest, np.cos(q[7:]), np.sin(q[7:]), v / largest])
-        # the start of an untimed path's rotation is no dimension
+        # the crank phase of an untimed path is no dimension
         if answer.start.rotation is not None:
             mark[[8, 12]] = 0.0
         return np.append(mark, side)
@@ -260,19 +263,19 @@ class Polisher:
         self._programs: dict[tuple[str, bool, bool], Program] = {}
 
     def program(self, objective: Objective, *, exact: bool = False, judged: bool = False) -> Program:
-        """Return the program with this objective; with a fixed pivot every program is exact."""
+        """Return the program with this objective; with a fixed pivot ``exact`` has no effect."""
         key = objective, exact and self.pivot is not None, judged
         if key not in self._programs:
             self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1], judged=judged)
         return self._programs[key]
 
     def fit(self, start: Start) -> Answer:
-        """Fit the squared errors from a start; if the points are met exactly, maximise the transmission angle."""
+        """Minimise the squared errors from a start; if precision points are met, then maximise the transmission angle."""
         fitted = self.by_least_squares
         return self.best_exact(fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start))
 
     def best_exact(self, answer: Answer) -> Answer:
-        """Maximise the transmission angle, starting at an answer that meets its points exactly."""
+        """Maximise the transmission angle from an answer that meets its precision points; return other answers unchanged."""
         if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
             met = self.program("transmission").solve(answer.start)
             if met.feasible:
@@ -284,7 +287,7 @@ class Polisher:
         return [self.fit(start) for start in starts]
 
     def _solved(self, start: Start) -> Answer:
-        """Solve by IPOPT; a region of several triangles in the nearest ones, again from the best answer while it improves."""
+        """Solve by IPOPT, for a region in its nearest triangles, and again from the best answer while it improves."""
         program = self.program("squares")
         if all(len(triangles) == 1 for _, triangles in self.limits.regions):
             return program.solve(start)
@@ -306,7 +309,10 @@ class Polisher:
         return best
 
     def finish(self, answer: Answer) -> Answer:
-        """Continue a search that reached its limit of iterations: on a flat slope its result depends on the last digits."""
+        """Continue a search that reached its limit of iterations, then impose bounds at the extremes of the solution.
+
+        On a flat slope the result of an unfinished search depends on rounding.
+        """
         if self.by_least_squares:
             return answer
         program = self.program("squares")
@@ -329,7 +335,7 @@ class Polisher:
         found = program.solve(answer.start, size=size)
         solve: Callable[..., Answer] = partial(program.solve, size=size)
         if self.normal.outline is not None:
-            # at stations first, then of the whole curves
+            # the error is bounded at the stations first, then along the whole curves
             refinement = Refinement(self.program("least curve", exact=True))
             program = refinement.program
 
@@ -343,12 +349,12 @@ class Polisher:
         return program.exact(found, lambda start, places: solve(start, places=places)) if found.feasible else found
 
     def measured(self, answer: Answer) -> Answer:
-        """Return the answer with the measure of its path as its quality."""
+        """Return the answer with the measure between its path and the target as its quality."""
         curve, _ = self.refinement.traced(*self.refinement.program.at(answer.start))
         return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
 
     def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
-        """Minimise the area or the greatest error, from least-squares answers with their limits of iterations."""
+        """Minimise the area or the greatest error, from pairs of an answer and its limit of iterations."""
         return [self._onwards(*item) for item in items]
 
     def _onwards(self, answer: Answer, iterations: int) -> Answer:
@@ -374,13 +380,13 @@ class Polisher:
 
     @property
     def refinement(self) -> Refinement:
-        """Return the refinement of an untimed path; it is built when it is first needed."""
+        """Return the refinement of an untimed path; the first call builds it."""
         if self._refinement is None:
             self._refinement = Refinement(self.program("curve", exact=True))
         return self._refinement
 
     def kept(self, start: Start) -> Answer:
-        """Check, without optimising, whether a start meets every constraint and bound."""
+        """Return a start, not optimised, as an answer that tells whether it meets every constraint and bound."""
         if self.by_least_squares:
             within = outside(self.normal, self.limits.low, self.limits.high, start).max() <= KEPT
             quality = sum_of_squares(self.normal, start)
@@ -396,7 +402,7 @@ class Polisher:
 def violated(
     solution: Solution, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint | Stroke]
 ) -> str:
-    """Say which constraint a linkage violates most, and by how much; empty if it meets all bounds and constraints."""
+    """Return, as text, which constraint a linkage violates most and by how much; empty if it violates none."""
     task, linkage = solution.task, solution.linkage
     normal = normal_form(task)
     ratios = [linkage.pivot.ratio] if isinstance(linkage, FiveBar) else []
@@ -492,7 +498,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
 
     def value(x: FloatArray) -> FloatArray:
         found = residuals(normal, start.branch, *unpacked(x))
-        # at the limit of assembly and beyond: farther than anything, so that the step is shortened
+        # beyond the limit of assembly: residuals larger than any others, so that the step is shortened
         return found[0] if all(np.isfinite(part).all() for part in found) else np.full(len(found[0]), 1e3)
 
     def derivative(x: FloatArray) -> FloatArray:

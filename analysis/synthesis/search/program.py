@@ -34,11 +34,11 @@ FOLLOWING: dict[str, dict[str, Any]] = {
     "least": {"mu_strategy": "adaptive"},
     "worst": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
 }
-#: Iterations of IPOPT: most optima are reached in a hundred, or in many.
+#: Limit of iterations of IPOPT: most optima are reached within a hundred, the others only after many.
 ITERATIONS = 250
 #: Tolerance of a constraint: units, rad, or a fraction of the bound.
 KEPT = 1e-7
-#: Margin of the bounds of the pivot's motion at its extremes, and the greatest number of times that these are found anew.
+#: Margin of the bounds of the pivot's motion at its extremes, and the greatest number of times that extremes are updated.
 HELD, ROUNDS = 2e-7, 6
 
 
@@ -47,12 +47,12 @@ class Program(Statement):
 
     @cached_property
     def _value(self) -> Any:
-        """Return objective and constraints as a function, which also shows whether a start can be evaluated."""
+        """Return objective and constraints as a CasADi function, whose values are finite if a start can be evaluated."""
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
     @cached_property
     def _begin(self) -> Any:
-        """Return the starting values of the auxiliary unknowns: a greatest value, or the middle of a range."""
+        """Return the starting values of the auxiliary unknowns, a greatest value or the middle of a range, as a function."""
         casadi = self._casadi
         return casadi.Function(
             "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
@@ -60,19 +60,19 @@ class Program(Statement):
 
     @cached_property
     def _curvature(self) -> Any:
-        """Return the first two derivatives of the pivot's bounded motions, over the crank rotation, at the given extremes."""
+        """Return a function: the first two derivatives of the pivot's bounded motions at the extremes in the parameters."""
         function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._bent)
         return lambda z, parameters: function.call([z, parameters])
 
     @cached_property
     def _slopes(self) -> Any:
-        """Return the gradient of the objective and the Jacobian of the constraints, dense, as a function."""
+        """Return the gradient of the objective and the Jacobian of the constraints, dense, as a CasADi function."""
         casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
         both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
         return casadi.Function("slopes", [x, p], both)
 
     def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Return objective and constraints, whose bounds are `g_low` and `g_high`, at the unknowns and parameters of `at`."""
+        """Return objective and constraints, with bounds `g_low` and `g_high`, at unknowns and parameters as from `at`."""
         objective, constraints = self._value(z, parameters)
         return float(objective), np.asarray(constraints).ravel()
 
@@ -92,7 +92,7 @@ class Program(Statement):
 
     @cached_property
     def trace(self) -> Any:
-        """Return, as a function, the coupler point at a fraction of a path's crank rotation, (2, 1), and its derivatives."""
+        """Return a function: the coupler point at a fraction of a path's crank rotation, (2, 1), and its derivatives."""
         casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
         share = casadi.SX.sym("share")
         first, last = self._ends
@@ -117,7 +117,7 @@ class Program(Statement):
         return self._solvers[iterations, near]
 
     def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
-        """Order the triangles of each region by the distance of the pivot from them."""
+        """Return the numbers of each region's triangles, the nearest to the pivot first."""
         order = []
         for name, triangles in self.limits.regions:
             x, y = float(q[0]), float(q[1])
@@ -134,7 +134,7 @@ class Program(Statement):
 
     @property
     def own(self) -> int:
-        """Index of the unknown that represents the greatest value of the function that is minimised instead of an error."""
+        """Return the index of the unknown that is the greatest value of the function minimised instead of an error."""
         return len(self.low) - len(self._initial)
 
     def greatest(self, start: Start) -> float:
@@ -150,7 +150,10 @@ class Program(Statement):
         places: Sequence[FloatArray] | None = None,
         share: float | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the unknowns and parameters of a start; see `solve`."""
+        """Return the unknowns and parameters of a start; see `solve`.
+
+        ``share`` is the fraction of its bounds that the pivot's motion may use at the rotations at which it is bounded.
+        """
         count = pivot_size(self.pivot)
         pivot = np.zeros(count) if len(start.pivot) == 0 else start.pivot
         if len(pivot) != count:
@@ -181,7 +184,7 @@ class Program(Statement):
         )
         z = np.clip(z, self.low, self.high)
         if self._initial and (places is not None or self.objective != "squares"):
-            # least squares come from farther away, and find their own middles
+            # a first fit of squares starts farther away, and finds the middles itself
             z[-len(self._initial) :] = np.asarray(self._begin(z, parameters)).ravel()
         if self._peaks and places is not None:
             for number, derivatives in enumerate(self._curvature(z, parameters)):
@@ -200,17 +203,17 @@ class Program(Statement):
         pieces: Sequence[int] | None = None,
         places: Sequence[FloatArray] | None = None,
     ) -> Answer:
-        """Solve from a start.
+        """Solve the program from a start.
 
         Parameters
         ----------
         start : Start
         size : float
-            Magnitude of the greatest error (units), if that is minimised.
+            Magnitude of the greatest error (units) or greatest value, if that is minimised.
         iterations : int
             Limit of iterations.
         pieces : sequence of int, optional
-            Number of the triangle of each region; by default the nearest.
+            Number of the triangle of each region in which the pivot must lie; by default the nearest.
         places : sequence of ndarray, optional
             Rotations of `extremes` at which the bounds of the pivot's motion are imposed. Without them the bounds are imposed
             on a grid, with a margin that guarantees them everywhere.
@@ -230,7 +233,7 @@ class Program(Statement):
         )
 
     def judged(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
-        """Evaluate unknowns as an answer. The values of CasADi are not used: it returns zeros if IPOPT ends at NaN."""
+        """Evaluate unknowns, and return the answer. CasADi's own values are not used: if IPOPT ends at NaN, they are zero."""
         f, g = self.stated(z, parameters)
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
@@ -248,7 +251,7 @@ class Program(Statement):
         )
 
     def start_at(self, z: FloatArray, start: Start, quality: float) -> Start:
-        """Convert unknowns to a start; rotations of stations that are not unknown are those of ``start``."""
+        """Convert unknowns to a start; the stations' rotations are those of ``start`` unless all of them are unknowns."""
         end = len(UNKNOWNS) + pivot_size(self.pivot)
         rotation = None if self.normal.timed else start.rotation
         if not self.normal.timed and len(self.knots) == self.normal.n:
@@ -263,7 +266,7 @@ class Program(Statement):
         )
 
     def kept(self, start: Start) -> Answer:
-        """Check, without optimising, whether a start meets every constraint and bound, and find its worst violation."""
+        """Return a start, not optimised, as an answer: whether it meets every constraint and bound, and its worst violation."""
         places = self.extremes(start)
         ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
         best: Answer | None = None
@@ -278,9 +281,9 @@ class Program(Statement):
         return replace(best, feasible=best.feasible and within)
 
     def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
-        """Solve repeatedly, with the bounds imposed at the extremes of the last solution, until the solution no longer moves.
+        """Solve repeatedly, with bounds imposed at the extremes of the last solution, until the pivot's motion settles.
 
-        These are the extremes of the pivot's motion, and of functions that are bounded along the crank's rotation.
+        The extremes are those of the pivot's motion, and of functions that are bounded along the crank's rotation.
         """
         if not (self._peaks or self._along):
             return answer
@@ -302,7 +305,7 @@ class Program(Statement):
         return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
-        """Find the crank rotations at which the bounded motions of the pivot, and the functions `Along`, are extreme.
+        """Return the crank rotations at which the bounded motions of the pivot, and the functions `Along`, are extreme.
 
         Extremes of a motion or of one of its derivatives are roots of the next derivative, a trigonometric polynomial.
         """
@@ -320,7 +323,7 @@ class Program(Statement):
         return found + self._greatest(start)
 
     def _greatest(self, start: Start) -> list[FloatArray]:
-        """Find the rotations at which each function `Along` has its greatest values; see `find_peaks`."""
+        """Return the rotations at which each function `Along` has its greatest values; see `find_peaks`."""
         values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
         p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
         return [find_peaks(along, p, FURTHER) for along, _ in self._along]

@@ -3,8 +3,8 @@
 A least-squares fit at ordered stations cannot cut a corner, and its sum of squares is not an area. Here the curve is the
 polygon by which a solution is evaluated, and the measure is that of `task.target`: the area of the symmetric difference, the
 area of the strip along an open path, or the Hausdorff distance. The areas have a continuous gradient, which follows from the
-polygons and the exact derivatives of the coupler point; the Hausdorff distance is minimised as the least bound of many
-distances. SciPy's SLSQP starts from an optimum of the squares, in coordinates each of which moves the curve by the same amount.
+polygons and the exact derivatives of the coupler point; the Hausdorff distance becomes an unknown that bounds many distances.
+SciPy's SLSQP starts from an optimum of the squares, in scaled coordinates that each move the curve by the same amount.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
 #: Iterations of SLSQP, and the change of the measure, relative to its first value, at which it ends.
 ITERATIONS, CHANGE = 100, 1e-7
-#: Least mean square displacement of the curve by a direction, relative to the greatest, down to which directions are scaled.
+#: Added to the mean square displacement by which a direction is scaled, relative to the greatest: it limits the scaling.
 STIFF = 1e-6
 #: Least number of pieces of the target at which distances are computed.
 PIECES = 360
-#: For the greatest distance: every so many of all distances are bounded first, then those of at least this fraction of it.
+#: To minimise the greatest distance, first every STRIDE-th distance is bounded, then all of at least GREAT times the greatest.
 STRIDE, GREAT = 3, 0.5
 #: Greatest rotation of the first station from its former place, and least rotation between successive stations (rad).
 WINDOW, APART = 0.6, 1e-10
 #: Fraction by which the bound of the greatest distance may be exceeded: its points on the curve change from step to step.
 WITHIN = 1e-5
-#: The crank rotation at the start does not affect a closed curve.
+#: Index of the crank phase, which does not affect a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
 
 
@@ -63,13 +63,13 @@ class Near(NamedTuple):
 
 
 class Refinement:
-    """Minimisation of the measure of a path, for a program with the objective "curve"."""
+    """Minimisation of the measure of a path, for a program with the objective "curve" or "least curve"."""
 
     def __init__(self, program: Program) -> None:
         self.program, normal = program, program.normal
         self.normal = normal
         assert normal.outline is not None
-        #: Bound of the greatest distance, where what the program makes small is something else.
+        #: Bound of the greatest distance, if the program minimises something else; otherwise None.
         self.limit = program.least.error if program.objective == "least curve" else None
         self._target = TargetPath(points=_rows(normal.outline).T, closed=normal.closed)
         self._shares = np.linspace(0.0, 1.0, CURVE, endpoint=not normal.closed)
@@ -116,7 +116,7 @@ class Refinement:
         for near, weight in ((missed, w), (away, v * lengths)):
             np.add.at(gradient.T, near.before, (weight * near.early).T)
             np.add.at(gradient.T, near.after, (weight * near.late).T)
-        # a longer piece counts for more
+        # derivative of the lengths of the pieces, by which the distances are weighted
         pull = (v * away.distance * steps / lengths).T
         np.add.at(gradient.T, away.after, pull)
         np.add.at(gradient.T, away.before, -pull)
@@ -124,7 +124,10 @@ class Refinement:
         return 0.5 * self._scale * total, 0.5 * self._scale * gradient
 
     def apart(self, curve: FloatArray) -> tuple[Near, Near]:
-        """Compute the distances of the target's pieces from the curve, and of the curve's from the target, at their middles."""
+        """Compute the distances of the target's pieces from the curve, and of the curve's pieces from the target.
+
+        A piece is represented by its middle; if the greatest distance is minimised, the target's corners count as well.
+        """
         closed, n = self.normal.closed, curve.shape[1]
         middles = _middles(self._line, closed)
         if self.normal.quality == "worst":
@@ -139,10 +142,10 @@ class Refinement:
         before = np.arange(len(distance))
         return missed, Near(distance, before, (before + 1) % n, half, half)
 
-    # The way down
+    # Minimisation
 
     def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
-        """Return the objective: the measure, or, if the measure is only bounded, the program's own objective."""
+        """Return the measure; if it is only bounded, the program's objective, infinite if the bound is exceeded."""
         if self.limit is None:
             return self.measure(curve)
         return self.program.stated(z, parameters)[0] if self.over(curve) <= WITHIN * self.limit else inf
@@ -161,7 +164,7 @@ class Refinement:
         places: Sequence[FloatArray] | None = None,
         size: float = 1.0,
     ) -> Answer:
-        """Minimise the measure near an answer; return the answer itself if no better one meets the constraints."""
+        """Minimise the measure near an answer, and return the best answer that meets the constraints, or the first one."""
         program = self.program
         z0, parameters = program.at(answer.start, places=places, size=size)
         curve, slopes = self.traced(z0, parameters)
@@ -181,7 +184,7 @@ class Refinement:
             curve, slopes = self.traced(z, parameters)
             scale = max(self.measure(curve), 1e-9)
             if self.limit is not None:
-                # a path is judged at other places of the curves
+                # the path is judged at other points of the curves: tighten the bound by the excess
                 scale *= self.limit / (self.limit + self.over(curve))
             down = _Descent(self, z, parameters, self._stretched(curve, slopes), scale, some(curve))
             found = minimize(
@@ -200,7 +203,7 @@ class Refinement:
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _rounds(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
-        """Choose the distances that are constrained in each round: first a few along the whole curve, then the large ones."""
+        """Return, for each round, a function that chooses the distances to constrain: first a few, then the large ones."""
         if self.normal.quality != "worst":
             return (lambda _: (),)
 
@@ -217,18 +220,18 @@ class Refinement:
         return few, great, great
 
     def _stretched(self, curve: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return directions of the unknowns that each move the curve by one, root mean square across it; shape (k, free)."""
+        """Return directions of the unknowns, shape (k, free); each moves the curve across itself by 1, root mean square."""
         tangent = np.roll(curve, -1, axis=1) - np.roll(curve, 1, axis=1)
         normal = np.array([-tangent[1], tangent[0]]) / np.maximum(np.hypot(*tangent), 1e-300)
         across = (slopes * normal[:, :, None]).sum(axis=0)[:, self.free]
         size, directions = np.linalg.eigh(np.einsum("ni,nj->ij", across, across) / CURVE)
         stretch = np.zeros((slopes.shape[2], len(self.free)))
-        # of a point that nothing moves, such as the crank pin, all directions are as good
+        # if nothing moves the point across its curve, as at the crank pin, all directions are equally good
         stretch[self.free] = directions / np.sqrt(np.maximum(size, 0.0) + STIFF * (size.max() or 1.0))
         return stretch
 
     def met(self, start: Start, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Find, by dynamic programming, the ordered rotations at which the curve is nearest to the stations."""
+        """Find, by dynamic programming, the crank rotations, in order, at which the curve is nearest to the stations."""
         normal, program = self.normal, self.program
         assert normal.points is not None
         assert start.rotation is not None
@@ -238,7 +241,7 @@ class Refinement:
         curve = self.traced(z, parameters)[0].T @ np.array([1.0, 1j])
         turn = self._shares * 2.0 * pi
         if normal.closed:
-            # from where the first station is met, all the way round
+            # from the point nearest to the first station, all the way round
             off = np.abs(np.angle(np.exp(1j * (turn - start.rotation[0]))))
             first = int(np.argmin(np.where(off <= WINDOW, np.abs(curve - normal.points[0]), inf)))
             order = (first + int(forward) * np.arange(CURVE)) % CURVE
@@ -255,7 +258,7 @@ class Refinement:
         place[-1] = int(total.argmin()) if normal.closed else CURVE - 1
         for k in range(normal.n - 1, 0, -1):
             place[k - 1] = back[k, place[k]]
-        # between the points of the curve: where the chord about each comes nearest
+        # between the points of the curve: the nearest point of the chord about each
         before, after = np.maximum(place - 1, 0), np.minimum(place + 1, CURVE - 1)
         chord = curve[after] - curve[before]
         share = ((normal.points - curve[before]) * chord.conj()).real / np.maximum(np.abs(chord) ** 2, 1e-300)
@@ -267,9 +270,9 @@ class Refinement:
 
 
 class _Descent:
-    """The problem for SLSQP: the measure as a function of directions of the unknowns, relative to its first value.
+    """The problem for SLSQP: the measure, relative to its first value, as a function of steps y along scaled directions.
 
-    For the greatest distance there is one more unknown, the bound of all distances.
+    If the greatest distance is minimised, y has one more component, the bound of all distances.
     """
 
     def __init__(
@@ -284,12 +287,12 @@ class _Descent:
         self._of, self._program = refinement, refinement.program
         self._z0, self._stretch, self._size = z0, size * stretch, size
         if refinement.limit is not None:
-            # what is minimised is a direction of its own
+            # the unknown that is minimised is a direction of its own
             self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.own]])
         self._some = some
         self._held = refinement.normal.quality == "worst"
         self._bound = self._held and refinement.limit is None
-        # each is asked for again with the same unknowns, by the measure and by the constraints
+        # SLSQP asks for each twice at the same unknowns: for the measure and for the constraints
         self.curve = _remembered(lambda z: refinement.traced(z, parameters))
         self._stated = _remembered(lambda z: refinement.program.stated(z, parameters))
         self._steep = _remembered(lambda z: refinement.program.slopes_at(z, parameters))
@@ -305,7 +308,7 @@ class _Descent:
         return np.clip(z, self._program.low, self._program.high)
 
     def value(self, y: FloatArray) -> tuple[float, FloatArray]:
-        """Return the measure plus the program's own terms, and the gradient; a large value if the links cannot be joined."""
+        """Return the function that is minimised, and its gradient; a large value if the links cannot be joined."""
         if self._bound:
             return float(y[-1]), np.append(np.zeros(len(y) - 1), 1.0)
         z = self.unknowns(y)
@@ -320,11 +323,11 @@ class _Descent:
         return (area + added) / self._size, whole @ self._stretch / self._size
 
     def _near(self, z: FloatArray) -> list[tuple[Near, Any]]:
-        """Return the distances, and which of them are constrained by the bound."""
+        """Return the two sets of distances of `Refinement.apart`, each with the indices of those that are bounded."""
         return list(zip(self._of.apart(self.curve(z)[0]), self._some))
 
     def constraints(self) -> list[dict[str, Any]]:
-        """Return the constraints: those of the program, its bounds, and the bound of the distances."""
+        """Return the constraints for SLSQP: those of the program, its bounds, and the bound of the distances."""
         program = self._program
         low, high = program.g_low, program.g_high
         equal = low == high
@@ -342,7 +345,7 @@ class _Descent:
             g = self._stated(z)[1]
             parts = [(g - low)[above], (high - g)[below], (z - program.low)[lower], (program.high - z)[upper]]
             if self._held:
-                # without a bound of its own among the unknowns the distances are within the size
+                # if the bound is no unknown, the distances are bounded by the size
                 bound = y[-1] if self._bound else 1.0
                 parts += [bound - near.distance[k] / self._size for near, k in self._near(z)]
             kept: FloatArray = np.nan_to_num(np.concatenate(parts), nan=-1e3, neginf=-1e3)
@@ -379,7 +382,7 @@ class _Descent:
 
 
 def _remembered(function: Callable[[FloatArray], Made]) -> Callable[[FloatArray], Made]:
-    """Cache the last value of a function, for another call with the same unknowns."""
+    """Return the function with a cache of its last value, for a second call with the same unknowns."""
     last: list[tuple[bytes, Made]] = []
 
     def called(z: FloatArray) -> Made:
@@ -396,7 +399,7 @@ def _rows(points: NDArray[np.complex128]) -> FloatArray:
 
 
 def _middles(line: FloatArray, closed: bool) -> FloatArray:
-    """Return the middles of the pieces of a polyline, rows x, y."""
+    """Return the midpoints of the pieces of a polyline, rows x, y."""
     both = 0.5 * (line + np.roll(line, -1, axis=1))
     return np.ascontiguousarray(both if closed else both[:, :-1])
 
@@ -404,7 +407,7 @@ def _middles(line: FloatArray, closed: bool) -> FloatArray:
 def _nearest(
     points: FloatArray, line: FloatArray, closed: bool
 ) -> tuple[FloatArray, NDArray[np.int64], FloatArray, FloatArray]:
-    """Return the distance of each point from a polyline, the nearest piece, the fraction of it, and the nearest point."""
+    """Return each point's distance from a polyline, its nearest piece, the fraction along this piece, and the nearest point."""
     count = points.shape[1]
     distance, piece, share = np.empty(count), np.empty(count, dtype=np.int64), np.empty(count)
     nearest(points, line, closed, distance, piece, share)
@@ -413,7 +416,7 @@ def _nearest(
 
 
 def divided(outline: NDArray[np.complex128], weights: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """Cut the pieces of an outline into short ones, rows x, y; return their weights, too."""
+    """Cut the segments of an outline into short pieces; return their ends, rows x, y, and the weight of each piece."""
     points = np.append(outline, outline[0]) if closed else outline
     around = np.append(weights, weights[0]) if closed else weights
     lengths = np.abs(np.diff(points))

@@ -3,10 +3,10 @@
 Variable projection: let the shape of the linkage and the crank's phase be given. The shape is the ratios of the links to the
 ground link, for a slider-crank to the coupler, and for a geared five-bar also the second crank and its phase. Then the coupler
 point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: position, size with direction, and coupler point.
-The remaining unknowns are sampled by a Sobol sequence, which a seed scrambles.
+The other unknowns are sampled by a Sobol sequence, which a seed scrambles.
 
 - Timed tasks: shape and phase are sampled.
-- Few untimed stations: their crank rotations, too, in order.
+- Few untimed stations: shape, phase and the stations' crank rotations, in order, are sampled.
 - Untimed paths: shape and coupler point are sampled. Each coupler curve is laid over the target by the best similarity
   transformation, at equal arc lengths, over all starting points (by a fast Fourier transform of their correlation), or, for an
   open path, over all pieces of the curve.
@@ -36,17 +36,17 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: Ranges of l2/l1, l3/l1, l4/l1 that are sampled, uniformly in the logarithm.
 SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
-#: Ranges of l1/l3 and l2/l3 of a slider-crank; of l5/l1 of a second crank; crank rotations at which a five-bar is checked.
+#: Ranges of l1/l3 and l2/l3 of a slider-crank; of l5/l1 of a second crank; number of rotations at which a five-bar is checked.
 GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
-#: Candidates in one piece of work.
+#: Number of candidates that are placed together.
 CHUNK = 4096
-#: One of so many coupler points is at the crank pin.
+#: Of this many coupler points one is at the crank pin.
 PINNED = 64
 #: Number of coupler curves of a chunk that are placed over the target: the most similar ones.
 PLACED = 160
-#: Steps of a coupler curve, and its points at equal arc lengths.
+#: Number of crank steps of a coupler curve, and of its points at equal arc lengths.
 CURVE, EVEN = 128, 64
-#: Pieces of a coupler curve that are compared with an open target: points at equal arc lengths, first steps, numbers of steps.
+#: Pieces of a coupler curve for an open target: number of points at equal arc lengths, first steps, numbers of steps.
 PIECE = 24
 STARTS = np.arange(0, CURVE, 8)
 SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])
@@ -56,9 +56,10 @@ APART = 0.08
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidates:
-    """Candidates: quality (m,), finite for those that were placed, eleven unknowns (m, 11), rotations (m, n) or None, branch.
+    """Candidates: their quality (m,), infinite for those that were not placed, and their `UNKNOWNS` ``q`` (m, 11).
 
-    With a second crank also its length and phase, ``pivot`` (m, 2).
+    ``rotation`` (m, n) are the stations' crank rotations, None if the task gives them; ``pivot`` (m, 2) are length and phase of
+    a second crank.
     """
 
     quality: FloatArray
@@ -69,16 +70,16 @@ class Candidates:
 
 
 class _FourBarShapes:
-    """Shapes of four-bars: the ratios of links that are sampled, and which of them the constraints allow.
+    """Shapes of four-bars: the ratios of links that are sampled, and which shapes the constraints allow.
 
-    The ratios are those of ``others`` to the unknown ``base``, within ``ranges``.
+    The ratios are those of the unknowns ``others`` to the unknown ``base``, by their indices, within ``ranges``.
     """
 
     base, others, ranges = 2, slice(3, 6), SHAPES
 
     @staticmethod
     def links(shapes: FloatArray, limits: Limits) -> FloatArray:
-        """Return rows (l1, l2, l3, l4, l5)."""
+        """Return rows (l1, l2, l3, l4, l5), relative to the base; 0 for a link that is absent."""
         return np.column_stack([np.ones(len(shapes)), shapes[:, :3], np.zeros(len(shapes))])
 
     @staticmethod
@@ -123,7 +124,10 @@ class _FiveBarShapes(_FourBarShapes):
 
     @staticmethod
     def turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
-        """Return which shapes meet it at `AROUND` rotations, which are tried in turn; few shapes reach the last one."""
+        """Return which shapes meet the least transmission angle at `AROUND` rotations.
+
+        Some rotations are tried first, and the others only for the shapes that are left.
+        """
         turned = limits.gears
         allowed = np.ones(len(shapes), dtype=bool)
         for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
@@ -179,7 +183,7 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
 def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
     """Yield allowed shapes, with the other sampled numbers in [0, 1), in chunks.
 
-    Rows are (l2/l1, l3/l1, l4/l1), for a slider-crank (l1/l3, l2/l3, 1), and six numbers.
+    A row has the ratios (l2/l1, l3/l1, l4/l1), for a slider-crank (l1/l3, l2/l3, 1), followed by six numbers.
     """
     sequence = qmc.Sobol(9, seed=seed)
     kept, tried = 0, 0
@@ -194,7 +198,7 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
 
 
 def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
-    """Yield the same rows in chunks of about `CHUNK`, of each of which only the best are placed."""
+    """Yield the same rows in chunks of at least `CHUNK`: of the curves of a chunk only the best are placed."""
     rows: list[FloatArray] = []
     for chunk in chunks:
         rows.append(chunk)
@@ -206,7 +210,7 @@ def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
 
 
 def _why(limits: Limits, seed: int) -> str:
-    """Say which limit leaves no shape, by itself or together with the others."""
+    """Return, in words, the limit that alone leaves no shape, or all limits if only together they leave none."""
     free = replace(limits, low=np.full(len(limits.low), 1e-9), high=np.full(len(limits.high), 1e9))
     alone = {"is within the bounds of the links": replace(limits, turn=None, grashof=None)}
     if limits.turn is not None:
@@ -222,7 +226,7 @@ def _why(limits: Limits, seed: int) -> str:
 
 
 def _stretched(unit: FloatArray, limits: Limits) -> FloatArray:
-    """Map numbers in [0, 1) to the rows of `_shapes`."""
+    """Map rows of numbers in [0, 1) to rows of `_shapes`."""
     low, high = np.log(_ratios(limits)).T
     return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
 
@@ -234,7 +238,7 @@ def _ratios(limits: Limits) -> FloatArray:
     given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
     ranges = np.array(own.ranges)
     both = np.column_stack([np.maximum(given[:, 0], ranges[:, 0]), np.minimum(given[:, 1], ranges[:, 1])])
-    # an offset may be none
+    # an offset may be zero
     return np.maximum(np.where(both[:, :1] <= both[:, 1:], both, given), 1e-12)
 
 
@@ -244,7 +248,7 @@ def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
 
 
 def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
-    """Return which shapes meet transmission angle and Grashof type, and for some size the bounds of their links."""
+    """Return which shapes meet transmission angle and Grashof type and, for some size, the bounds of their links."""
     sized = _SHAPES[limits.linkage.kind].links(shapes, limits)
     links = sized[:, :4]
     allowed = np.ones(len(shapes), dtype=bool)
@@ -259,12 +263,12 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
             shortest = BY_SHORTEST.index(limits.grashof)
             allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
     least, most = _sizes(sized, limits)
-    # links that are fixed leave one size but for rounding
+    # fixed links leave a single size, apart from rounding
     return allowed & (least <= most * (1.0 + 1e-9))
 
 
 def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
-    """Return the phase of the second crank for which the curve does not depend on the phase of the first one."""
+    """Return the second crank's phase: a sampled angle plus what keeps the curve independent of the first crank's phase."""
     turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
     return turned
 
@@ -303,7 +307,10 @@ def _directions(
     limits: Limits,
     turned: FloatArray | float = 0.0,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Compute the directions of coupler and rocker at crank rotations, counted from a rotation that each shape has."""
+    """Compute the directions of coupler and rocker, complex, shape (m, n), at n crank rotations of m shapes.
+
+    Each shape may have its own rotation ``turned``, from which the others are counted.
+    """
     first, second = limits.gears
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
@@ -349,7 +356,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
     factor = off @ (w * (x - wanted)) / (off**2 @ w)
     least, most = _sizes(links, limits)
     size = np.clip(np.abs(factor), least, most)
-    # seen from the shaft the slider's position grows to the left
+    # seen from the shaft, the slider's position increases to the left
     side = -np.sign(factor)
     quality = (x - wanted + (side * size)[:, None] * off) ** 2 @ w
     q = np.zeros((len(shapes), 11))
@@ -363,7 +370,7 @@ def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> 
 def _timed(
     normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator | None
 ) -> Candidates:
-    """Place timed paths and motions by variable projection; without given rotations, over random ones in order."""
+    """Place timed paths and motions by variable projection; untimed ones at random rotations, in order."""
     phase = 2.0 * pi * shapes[:, 3]
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     n = normal.n
@@ -382,7 +389,7 @@ def _timed(
     basis = np.stack([np.ones_like(crank), crank, coupler], axis=1)
     w, p = normal.weights, normal.points
     z = _projected(basis, p, w)
-    # the size that the links' bounds allow; the rest follows once more
+    # the size is clipped to the links' bounds, and the other unknowns are computed again
     least, most = _sizes(links, limits)
     size = np.abs(z[:, 1]) / links[:, 1]
     bounded = np.clip(size, np.maximum(least, 1e-9), most)
@@ -425,8 +432,8 @@ def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> C
     links = _SHAPES[limits.linkage.kind].links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
     coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
-    # the coupler point anywhere about the coupler, evenly in the logarithm of its distance; of some on the crank pin itself,
-    # whose circle no descent comes to: at no distance its direction has no meaning
+    # the coupler point lies anywhere about the coupler, evenly in the logarithm of its distance; a few lie on the crank pin,
+    # because no search reaches the pin's circle: at zero distance the direction of the point has no meaning
     longest = links.max(axis=1)
     distance = longest * np.exp(np.log(0.1) + np.log(30.0) * shapes[:, 4])
     distance[: len(shapes) // PINNED] = 0.0
@@ -470,7 +477,7 @@ def _closed_paths(
     misfit = (np.abs(goal) ** 2).sum() - 2.0 * (scale.conj() * product).real + np.abs(scale) ** 2 * energy
     misfit[broken] = inf
     place = target[0].mean() - scale * mean
-    # crank rotation of each station: its share of the target's length, from where the target starts on the curve
+    # crank rotation of each station: from its share of the target's length and the point of the curve at the target's start
     stations = normal.shares * EVEN
     rotations = np.empty((len(curves), normal.n))
     chosen = np.argsort(misfit)[:PLACED]
@@ -497,7 +504,7 @@ def _open_paths(
     )
     goal = even - even.mean()
     best = np.empty((len(curves), 4))
-    # where the links cannot be joined all round, a curve begins after the gap: pieces end before the next
+    # if the links cannot be joined all round, a curve begins after the gap, so that its pieces end before the next gap
     gaps = ~np.isfinite(curves)
     first = np.where(gaps.any(axis=1), CURVE - np.argmax(gaps[:, ::-1], axis=1), 0)
     curves = np.take_along_axis(curves, (np.arange(CURVE) + first[:, None]) % CURVE, axis=1)
@@ -528,7 +535,7 @@ def _open_paths(
 def _bounded(
     scale: ComplexArray, links: FloatArray, point: ComplexArray, limits: Limits
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return the sizes and scales within the bounds of links and coupler point."""
+    """Return sizes, shape (m,), and complex scales, clipped to the bounds of links and coupler point."""
     least, most = _sizes(links, limits)
     most = np.minimum(most, limits.high[6] / np.maximum(np.abs(point), 1e-300))
     size = np.abs(scale)
@@ -551,7 +558,7 @@ def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
     ring = np.hstack([curves, curves[:, :1]])
     length = np.hstack([np.zeros((m, 1)), np.cumsum(np.abs(np.diff(ring, axis=1)), axis=1)])
     place = length[:, -1:] * np.arange(k) / k
-    # the segment that each place is on: one sorted search for all rows
+    # the segment of each place, by one sorted search for all rows
     rows = np.arange(m)[:, None]
     offset = 2.0 * rows
     shares = length / length[:, -1:]
@@ -564,7 +571,7 @@ def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
 
 
 def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
-    """Return the best candidates of all, none within `APART` of a better one."""
+    """Return the best candidates as starts, none of them within `APART` of a better one."""
     best = [
         Start(
             q=c.q[i],
@@ -583,7 +590,7 @@ def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
         begin = start.q[8] if start.rotation is None else start.rotation[0]
         links = _SHAPES[limits.linkage.kind].shares(start)
         if start.q[6] == 0.0:
-            # on the crank pin any other links trace the same circle
+            # with the coupler point on the crank pin, the other links do not affect the circle that it traces
             links = np.ones(len(links))
         second = (
             [log(start.pivot[0] / start.q[2]), cos(start.pivot[1]), sin(start.pivot[1])] if len(start.pivot) else []

@@ -156,7 +156,7 @@ def synthesize(
     pivot : SliderUnknown or CrankUnknown, optional
         Unknown motion of the rocker pivot, which is found together with the links.
     guesses : sequence of Solution
-        Solutions from which a search starts, too.
+        Solutions from which searches start in addition to the scan's.
     search : Search
         Method, starts, seed, cores.
     kinds : sequence of "four-bar", "slider-crank", "geared-five-bar", optional
@@ -295,7 +295,7 @@ def improve(
     kept: Collection[str] = (),
     search: Search = USUAL_SEARCH,
 ) -> Synthesis:
-    """Search from a linkage with a moving rocker pivot: from ``search.starts`` random motions of it, and from guesses.
+    """Search from a linkage with a moving rocker pivot: from ``search.starts`` random motions of the pivot and from guesses.
 
     Parameters
     ----------
@@ -334,9 +334,9 @@ def improve(
 
 
 def _searched_task(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
-    """Return the task for the search: with the greatest error as objective if it is bounded and another function is minimised.
+    """Return the task for the search: if a function other than an error is minimised, errors are measured by the greatest.
 
-    Raises InputError if a constraint or objective does not apply to a moving pivot, or the method can only minimise errors.
+    Raises InputError if a constraint does not apply to a moving pivot.
     """
     demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
     if demands and pivot is not None:
@@ -394,7 +394,7 @@ def make_solutions(
         return ranked(there)
 
     solutions = made(distinct(done.kept, 4 * count, pivot))
-    # what a search began with counts by itself where it is better than all that came of it
+    # the best start is a solution itself if it is better than all answers
     first = made(done.begun)[:1] if limits.least is None else ()
     if first and ranked([*solutions[:1], *first])[0] is first[0]:
         solutions = ranked([*first, *solutions])
@@ -402,7 +402,7 @@ def make_solutions(
 
 
 def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-    """Return the crank rotations of the task's stations, from those of the stations of the fit."""
+    """Return the crank rotations of the task's stations, interpolated from those of a search that has other stations."""
     own = normal_form(task)
     if rotation is None or len(rotation) == own.n:
         return rotation
@@ -490,9 +490,9 @@ def trade_off(
 ) -> TradeOff:
     """Trade error against size, transmission angle or pin force, by the epsilon-constraint method with warm starts.
 
-    From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the one before. A
-    second pass in the opposite direction uses late solutions for looser limits, too, as they are or optimised again, since the
-    error of the best linkage can only grow as the limit is tightened.
+    From the loosest limit to the tightest, each problem starts from its own scan and from the solutions of the previous one. A
+    second pass in the opposite direction uses solutions for tighter limits at looser ones, too, as they are or optimised again:
+    the error of the best linkage can only grow as the limit is tightened.
 
     Parameters
     ----------
@@ -546,14 +546,14 @@ def solve_both_ways(
     search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
     begin: Sequence[Solution] = (),
 ) -> tuple[dict[int, Solution], int | None]:
-    """Solve a series of problems, from the loosest to the tightest and back, each starting from the solutions before it.
+    """Solve a series of problems, from the loosest to the tightest and back, each starting from the previous solutions.
 
     Parameters
     ----------
     order : sequence of int
         Numbers of the problems, the loosest first.
     search : callable
-        Function of a problem's number, guesses, and whether on the way back: it returns solutions or raises `InfeasibleError`.
+        Function of a problem's number, guesses, and whether it is the way back; returns solutions or raises `InfeasibleError`.
     begin : sequence of Solution
         Guesses for the first problem.
 

@@ -35,7 +35,7 @@ class Search:
     Attributes
     ----------
     starts : int
-        Number of searches: candidates of the scan that are optimised.
+        Number of candidates of the scan from which a search is started.
     solutions : int
         Greatest number of different linkages that are returned.
     seed : int
@@ -43,7 +43,7 @@ class Search:
     candidates : int
         Number of linkages in the scan.
     n_jobs : int, optional
-        Number of processes, -1 for one per core; inside `joblib.parallel_config` for a cluster, all of its cores.
+        Number of processes, -1 for one per core; inside `joblib.parallel_config` for a cluster, all cores of the cluster.
     progress : bool
         Show a progress bar.
     """
@@ -72,14 +72,17 @@ class Search:
 
 
 USUAL_SEARCH = Search()
-#: Where one search follows another.
+#: Default settings if many searches follow one another.
 QUICK_SEARCH = Search(starts=12)
 
 
 def over_cores(
     work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
 ) -> tuple[list[Made], bool]:
-    """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted it."""
+    """Apply ``work`` to all items on several cores; return the results in order, and whether Ctrl-C interrupted it.
+
+    ``what`` is the text beside the progress bar.
+    """
     made: dict[int, Made] = {}
     with interruptible() as interrupted, shown(search.progress, float(len(items)), what) as show:
         for number, value in over_workers(work, items, interrupted, n_jobs=search.n_jobs):
@@ -91,7 +94,7 @@ def over_cores(
 
 
 FloatArray = NDArray[np.float64]
-#: Initial amplitudes of the motion of a pivot, relative to the ground link.
+#: Initial amplitude of the motion of a pivot, relative to the ground link.
 AMPLITUDE = 0.1
 
 
@@ -105,16 +108,16 @@ class Start:
         Values of `UNKNOWNS`.
     branch : int
     pivot : ndarray
-        Unknowns of a moving pivot: guide angle, mean, then cosine and sine of each harmonic; for a second crank length and
-        phase instead of the first two.
+        Unknowns of a moving pivot: guide angle and mean position, or length and phase of a second crank; then cosine and sine
+        coefficient of each harmonic.
     rotation : ndarray, shape (n,), or None
         Crank rotations of the stations if they are unknown.
     quality : float
-        Quality in units squared; a greatest error in units.
+        Value of the objective: in units squared, for a greatest error in units.
     given : bool
-        Whether it is a guess.
+        Whether it is a guess, not a candidate of the scan.
     linkage : type
-        Type of the linkage; a second crank belongs to the pivot.
+        Type of the linkage; a five-bar is a `Linkage` with a second crank in ``pivot``.
     """
 
     q: FloatArray
@@ -128,9 +131,10 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Result of an optimisation: its point, whether it meets every constraint, the worst violation, and the solver's status.
+    """Result of an optimisation: the point that it reached, and whether it meets every constraint.
 
-    ``violation`` is in units, rad or fractions of a bound; ``excess`` is a text with its unit.
+    ``worst`` is the name of the constraint that is violated most, ``violation`` by how much, in units, rad or fractions of a
+    bound, and ``excess`` the same as text with its unit. ``status`` is the solver's message.
     """
 
     start: Start
@@ -165,7 +169,7 @@ def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.r
     ground : float
         Ground link (units).
     unit : float
-        m.
+        Size of the target (m).
     """
     orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
     waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)
@@ -173,7 +177,7 @@ def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.r
         length = random.uniform(*unknown.length) / unit
         return np.array([length, random.uniform(-pi, pi), *(0.3 * waves)])
     low, high = unknown.guide_angle
-    # a guide is the same one from its other end
+    # a guide turned by pi is the same guide
     angle = low + min(high - low, pi) * random.random()
     size = min(AMPLITUDE * ground, 0.25 * unknown.stroke / unit)
     return np.array([angle, size * random.standard_normal(), *(size * waves)])
@@ -198,7 +202,7 @@ def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, F
 
 
 def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Clip unknowns to their bounds, angles by whole turns if that is enough."""
+    """Return the unknowns clipped to their bounds; angles are first shifted by whole turns."""
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
     middle = 0.5 * (low[angles] + high[angles])
@@ -209,7 +213,7 @@ def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> FloatArray:
-    """Return the distance of each unknown of a start from its bounds (units, rad); 0 for one that does not affect the task."""
+    """Return the distance of each unknown of a start from its bounds (units, rad); 0 if it does not affect the task."""
     q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
     off = np.abs(wrapped(q - start.q))
     off[:7] = np.abs(q - start.q)[:7]
@@ -223,7 +227,7 @@ def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> 
 def make_linkage(
     start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
 ) -> Linkage:
-    """Build the linkage of a start, in SI, with angles in [-pi, pi) or, if these are out of bounds, within their limits."""
+    """Build the linkage of a start, in SI; angles are wrapped to [-pi, pi) unless ``limits`` then exclude them."""
     q = start.q.copy()
     q[:7] *= normal.unit
     q[0] += normal.origin.real
@@ -249,7 +253,10 @@ def make_linkage(
 def make_start(
     linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
 ) -> Start:
-    """Convert a linkage to a start; the pivot's motion is truncated, or padded with zeros, to the unknown harmonics."""
+    """Convert a linkage to a start; the series of its pivot is cut off, or padded with zeros, at the unknown harmonics.
+
+    ``rotation`` has the crank rotations of the stations, if they are unknown.
+    """
     q = np.append(linkage.vector, linkage.output_angle)
     q[0] -= normal.origin.real
     q[1] -= normal.origin.imag
@@ -272,7 +279,7 @@ def make_start(
 def start_of(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
     """Convert a linkage or solution to a start, with untimed stations at the solution's rotations or the nearest ones.
 
-    Raises InputError if rotations are needed and cannot be found in this way, because the path is open.
+    Raises InputError for an open path if the rotations are not known: the nearest ones are found for closed paths only.
     """
     linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
     if normal.timed:
@@ -288,20 +295,23 @@ def start_of(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None)
 
 
 def closed_form(task: Task) -> tuple[Solution, ...]:
-    """Return the four-bars without defects that do a task exactly, if it has a closed form: untimed poses, function points."""
+    """Return the sound four-bars that do a task exactly, if a closed form exists: for untimed poses and function points."""
     try:
         if isinstance(task, RockerFunction):
             return function_generators(task).sound
         if isinstance(task, PrecisionPoints | Motion) and task.angle is not None and task.rotation is None:
             return tuple(s for s in guidance(task).solutions if s.verdicts.sound)
     except InputError:
-        # more or fewer targets than unknowns, or dependent ones
+        # not as many targets as unknowns, or targets that depend on one another
         pass
     return ()
 
 
 def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
-    """Return the first ``count`` items whose marks have at least this distance from those of all items before."""
+    """Return the first ``count`` items that are distinct from those chosen before.
+
+    ``mark`` gives an item's vector. Two items are distinct if a component of their vectors differs by at least ``distance``.
+    """
     chosen: list[Item] = []
     marks: list[FloatArray] = []
     for item in items:

@@ -31,8 +31,8 @@ Objective = Literal["squares", "worst", "transmission", "curve", "least", "least
 GRID, BETWEEN = 96, 2.5e-3
 #: Margin of a Grashof type, relative to the sum of the links: at zero a four-bar is a change-point.
 MARGIN = 1e-4
-#: Parts between two stations at whose ends a search bounds the transmission angle, and the rotations of a whole task at which
-#: a start is judged, more than a search can afford.
+#: Number of parts between two stations at whose ends a search bounds the transmission angle; number of rotations over the
+#: whole task at which a linkage is judged, more than a search can afford.
 PARTS, JUDGED = 4, 400
 #: Least crank rotation between untimed stations, relative to equal steps.
 ADVANCE = 1e-3
@@ -44,12 +44,15 @@ GAP = 8.0
 SOUGHT = ("least", "least curve")
 #: Name of the bound of the greatest error; fraction of it that smooths the absolute value at an error of zero.
 ERROR, SMOOTH = "bound of the greatest error", 1e-3
-#: Further rotations at which an `Along` is bounded: those of its greatest values in the solution before.
+#: Number of further rotations at which an `Along` is bounded: those of its greatest values in the previous solution.
 FURTHER = 8
 
 
 class Label(NamedTuple):
-    """Name of a constraint, with the unit in which its violation is written, and the factor to it."""
+    """Name of a constraint, with the unit in which its violation is written, and the factor that converts to this unit.
+
+    For the unit "transmission" the factor is the least transmission angle (rad).
+    """
 
     name: str
     factor: float
@@ -57,7 +60,7 @@ class Label(NamedTuple):
     linkage: type[Linkage] = Linkage
 
     def measured(self, violation: float, q: FloatArray) -> str:
-        """Format a violation with its unit; for a transmission angle by its effect on the angle at the limit."""
+        """Format a violation with its unit; that of a transmission angle as degrees below its limit, for the unknowns q."""
         if self.unit == "transmission":
             least = self.factor
             cosine = cos(least) + violation / float(self.linkage.excess_slope(q[4], q[5], cos(least)))
@@ -75,17 +78,17 @@ class Statement:
     pivot : PivotUnknown, optional
         Unknown motion of the pivot, with lengths in m like the task; None for a fixed pivot.
     objective : "squares", "worst", "transmission", "curve", "least" or "least curve"
-        "squares": minimise the weighted squared errors. "worst": minimise the greatest weighted error, as the least bound of
-        all. "transmission": meet the stations exactly and maximise the least transmission angle. "curve": only the
-        constraints of a path, for `refine`, whose measure needs no stations; unknown rotations are those at the ends of
-        an open path and of its straight part. "least" and "least curve": the objective of the limits instead of an error,
-        with and without stations.
+        "squares": minimise the weighted squared errors. "worst": minimise the greatest weighted error, an unknown that bounds
+        all errors. "transmission": meet the stations exactly and maximise the least transmission angle. "curve": only the
+        constraints of a path, for `refine`, whose measure needs no stations; only the rotations at the ends of an open path
+        and of its straight part are unknown. "least" and "least curve": minimise the objective of the limits instead of an
+        error, with and without stations.
     exact : bool
         Whether bounds can be imposed at the extremes of the pivot's motion, see `Program.exact`; False makes a first search
         quicker.
     judged : bool
-        Whether linkages are only judged. For a search the transmission angle is bounded at few rotations between two
-        stations, with a margin that guarantees the bound between them; judged it is at its extremes, without one, or under a
+        Whether linkages are only judged. A search bounds the transmission angle at few rotations between two stations, with a
+        margin that guarantees the bound between them. A judgement bounds it at its extremes, without a margin, or with a
         moving pivot at many rotations.
     """
 
@@ -101,18 +104,18 @@ class Statement:
     ) -> None:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
         self._judged, self._parts = judged, max(PARTS, -(-JUDGED // normal.n)) if judged else PARTS
-        #: Turns of the crank, and of a second one, while the rotation searched makes one.
+        #: Turns of the crank, and of a second crank, per turn of the input shaft.
         self._turns = geared(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
         casadi = self._casadi = symbolic.library()
         SX = casadi.SX
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
         self._initial: list[Any] = []
-        #: Order of a derivative of the pivot's motion that is bounded, where its extremes are, and how they are curved; its
-        #: own first two derivatives there.
+        #: For each bounded motion of the pivot, or derivative of it: the order of the derivative, and parameters for the
+        #: rotations of its extremes and for the curvature there; in `_bent` the first two derivatives of the motion there.
         self._peaks: list[tuple[int, Any, Any]] = []
         self._held = 2 * pivot.harmonics if pivot is not None and exact else 0
         self._bent: list[Any] = []
-        #: What holds all along the crank's rotation, and the further rotations at which it is held.
+        #: Functions bounded along the crank's rotation, and parameters for the further rotations at which they are bounded.
         self._along: list[tuple[Along, Any]] = []
         self._constraints: list[tuple[Any, float, float, Label]] = []
         self.knots: list[int] = list(range(normal.n))
@@ -179,7 +182,7 @@ class Statement:
         return symbol
 
     def _extra(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
-        """Add an auxiliary unknown, a greatest value or the middle of a range, with its starting value."""
+        """Add an auxiliary unknown, such as a greatest value or the middle of a range, with its starting value."""
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
 
@@ -190,7 +193,7 @@ class Statement:
         return self.limits.least
 
     def _traced(self, require: Require, p: Any) -> Any:
-        """Trace a required function; an `Along` also at the rotations given by parameters."""
+        """Return a required function in CasADi symbols; an `Along` also at the rotations given by parameters."""
         casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
         if not isinstance(require, Along):
             return traced(require, values)
@@ -201,7 +204,7 @@ class Statement:
         further = traced(require, values, places)
         bends = casadi.SX.sym(f"bends{len(self._along)}", *further.shape)
         self._along.append((require, casadi.horzcat(places, bends)))
-        # to second order the height of the peak next to each place, wherever it moves
+        # height of the peak near each place to second order, which follows the peak as it moves
         ones = casadi.DM.ones(FURTHER)
         slope = casadi.horzcat(*(casadi.jtimes(column, places, ones) for column in casadi.horzsplit(further)))
         return casadi.vertcat(casadi.vec(held), casadi.vec(further + bends * slope**2))
@@ -209,7 +212,7 @@ class Statement:
     # Objective
 
     def _closed(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
-        """Close the loop: directions of the links and the coupler point (x, y) at rotations, by the plant's equations."""
+        """Return the directions of the links and the coupler point (x, y) at rotations, by the plant's loop closure."""
         casadi = self._casadi
         th2 = self._turns[0] * phi + p.crank_phase
         c2, s2 = casadi.cos(th2), casadi.sin(th2)
@@ -241,7 +244,7 @@ class Statement:
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
     def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
-        """State the quality function, with the constraints that belong to it."""
+        """Return the objective, and add the constraints that belong to it."""
         casadi, normal = self._casadi, self.normal
         g, point = self._closed(p, v, phi, branch)
         ex: Any = None
@@ -283,7 +286,7 @@ class Statement:
         return quality + self._straight_part(p, v, phi, branch, ex, ey)
 
     def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
-        """Constrain a straight part; return the term of the quality if its flatness is only favoured."""
+        """Constrain a straight part; return the term of the quality that favours flatness, 0 if flatness is bounded."""
         casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
         if straight is None or points is None:
             return 0.0
@@ -293,7 +296,7 @@ class Statement:
         spent = phi[straight.end] - phi[straight.start]
         self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part", "deg")
         if self._whole:
-            # its ends lie across from where the target's are
+            # the ends may be off the target's only across the line
             for k in (straight.start, straight.end):
                 self._within(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
         if straight.flatness is None:
@@ -311,7 +314,7 @@ class Statement:
     # Constraints
 
     def _in_words(self, share: float) -> float:
-        """Return the factor that converts an error, relative to a length in units, to mm or degrees."""
+        """Return the factor that converts an error, relative to ``share`` (units), to mm or, of a rocker, degrees."""
         return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
 
     def excess(self, violation: float) -> dict[str, Any]:
@@ -331,7 +334,7 @@ class Statement:
         self._within(value, -inf, 0.0, name, unit, factor)
 
     def _ordered(self, phi: Any, direction: Any) -> None:
-        """Constrain the stations to be in order, within a turn."""
+        """Constrain the rotations of the stations to be in order and within a turn."""
         n = self.normal.n
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
@@ -342,7 +345,7 @@ class Statement:
         self._within(total, *closing, "stations within a turn", "deg")
 
     def _way_of_path(self, direction: Any) -> tuple[Any, Any]:
-        """Place the stations of a path at equal steps between the few with unknown rotations; return these rotations, too."""
+        """Return the rotations of a path's stations, at equal steps between a few unknown ones; return those, too."""
         casadi, normal = self._casadi, self.normal
         ends = set() if normal.closed else {0, normal.n - 1}
         part = () if normal.straight is None else (normal.straight.start, normal.straight.end)
@@ -354,7 +357,7 @@ class Statement:
         self._within(steps, LEAST_WAY, 2.0 * pi, "order of the stations", "deg")
         most = 2.0 * pi - (LEAST_WAY if normal.closed else 0.0)
         self._within(direction * (knots[-1] - knots[0]), LEAST_WAY, most, "stations within a turn", "deg")
-        # hat functions, and a turn after the first knot the first one again
+        # hat functions interpolate between the knots; in a closed path the first knot follows the last, a turn later
         at = [*fixed, fixed[0] + normal.n] if normal.closed else fixed
         where = np.arange(fixed[0], fixed[0] + normal.n)
         hats = np.array([np.interp(where, at, row) for row in np.eye(len(at))])
@@ -367,7 +370,7 @@ class Statement:
         return phi, knots
 
     def _shaped(self, p: Any, grashof: Any, planes: Sequence[Any]) -> None:
-        """Constrain the Grashof type of the links, and the fixed pivots to their regions."""
+        """Constrain the links to the Grashof type, and the fixed pivots to their regions."""
         casadi, limits = self._casadi, self.limits
         if limits.grashof:
             links = casadi.vertcat(p.ground_length, p.crank_length, p.coupler_length, p.rocker_length)
@@ -388,24 +391,24 @@ class Statement:
             # with a fixed pivot its extremes are where the crank lies along the ground link
             self._transmitting(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
         elif limits.turn is not None:
-            # of gears closer, since the cranks turn as often
+            # closer rotations for gears whose cranks turn several times
             d2 = self._reach(p, v, casadi.DM(turn(GRID * max(1, max(map(abs, self._turns)) // 2))))
             self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
         if limits.way is not None or (tilt is not None and limits.turn is None):
             x, step = self._way(phi)
             slack = limits.linkage.slack(l1, l2, casadi.cos(0.5 * step))
             if self._judged and self.pivot is None:
-                # the rotation nearest to where the crank lies along the ground link in each step, too; none beyond the end
+                # in each step also the rotation nearest to the crank along the ground link; none beyond the end
                 step[self.normal.n - 1] = 0.0
                 turned = casadi.sign(step) * (x + p.crank_phase) / pi
                 nearest = casadi.fmin(pi * (casadi.floor(turned) + 1.0 - turned), casadi.fabs(step))
                 x, slack = casadi.vertcat(x, x + casadi.sign(step) * nearest), 0.0
             d2 = self._reach(p, v, x)
-            # an extreme between two of these rotations is no more than the slack off
+            # an extreme between two of these rotations differs from the values there by no more than the slack
             self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
-        """Constrain |cos mu| below cos(least), and below the tilt, from squares of the distance BD and without division."""
+        """Constrain |cos mu| below cos(least) and, if given, below ``tilt``, from squares of the least and greatest BD."""
         least = least if self._judged else max(least, TURNING)
         for cosine in (cos(least), *([] if tilt is None else [tilt])):
             links = p.coupler_length, p.rocker_length
@@ -424,7 +427,7 @@ class Statement:
         return self.limits.linkage.square(bx, by)
 
     def _way(self, phi: Any) -> tuple[Any, Any]:
-        """Return the stations' rotations with some in between, and the step from each to the next."""
+        """Return the rotations of the stations, followed by rotations between them, and the step from each to the next."""
         steps = (phi[1:] - phi[:-1]) / self._parts
         between = [phi[:-1] + k * steps for k in range(1, self._parts)]
         casadi = self._casadi
@@ -448,7 +451,7 @@ class Statement:
         if isfinite(pivot.stroke):
             centre = self._extra("middle", 0.0)
             reach = 0.5 * pivot.stroke / unit
-            # of both ends: the stroke is off by twice as much
+            # the bound is violated at both ends: the stroke is too long by twice as much
             self._bounded(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke, reach)
             u = position(casadi.vertcat(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))), self._peaks[-1][1]))
             self._initial[-1] = 0.5 * (casadi.mmin(u) + casadi.mmax(u))
@@ -460,7 +463,7 @@ class Statement:
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
 
     def _rate(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
-        """Constrain a derivative of the slider's position by a bound (m)."""
+        """Bound the magnitude of a derivative of the slider's position (m/rad, m/rad2)."""
         if isfinite(bound):
             scale = self.normal.unit / bound
             self._bounded(
@@ -480,7 +483,7 @@ class Statement:
         It is bounded at grid points over the turn and at rotations given by parameters, with a margin. In a first solution the
         margin guarantees the bound between the grid points: there a trigonometric polynomial is at most its greatest value at
         the points divided by a cosine (Ehlich and Zeller 1964). Later the margin is almost zero, since the extremes of the
-        solution before are among the rotations (`Program.exact`).
+        previous solution are among the rotations (`Program.exact`).
         """
         casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
         number = len(self._peaks)
@@ -493,7 +496,7 @@ class Statement:
         held, ones = value(places), casadi.DM.ones(self._held)
         slope = casadi.jtimes(held, places, ones)
         self._bent.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
-        # to second order the height of the peak next to each place, wherever it moves
+        # height of the peak near each place to second order, which follows the peak as it moves
         every = casadi.vertcat(grid, held + bends * slope**2)
         self._within(size * every / self._share, -size, size, name, unit, factor / size)
 
