@@ -1,7 +1,7 @@
-"""The figures of two theses with verdicts on what they state: a module for each chapter of Youssef's, a package for Rahman's.
+"""Studies that reproduce the figures of two theses and judge the theses' statements.
 
-``linkwork figures 3.2 R5`` makes Youssef's figure 3.2 and Rahman's figure 5. `STUDIES` lists them in order with their titles;
-`load` imports one, `make` runs it and writes its files.
+Youssef's thesis has a module for each chapter, Rahman's a package. ``linkwork figures 3.2 R5`` makes Youssef's figure 3.2 and
+Rahman's figure 5. `STUDIES` lists the studies' titles in order; `load` imports a study, `make` runs it and writes its files.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .youssef import FIGURES as _YOUSSEF
 if TYPE_CHECKING:
     from .study import Study, StudyResult
 
-#: Each figure of both theses in order, those that only show a mechanism or an apparatus among them.
+#: All figures of both theses by number, in order, including those that only show a mechanism or an apparatus.
 ENTRIES: Mapping[str, Entry] = MappingProxyType({**_YOUSSEF, **_RAHMAN})
 
 #: Title of each study of Youssef's thesis by its number there, and of the pictures of the linkage.
@@ -41,12 +41,12 @@ def is_figure(number: str) -> bool:
 
 
 def file_stem(number: str) -> str:
-    """Return the name of a study's files without suffix."""
+    """Return the name of a study's files without suffix, such as fig_3_2 for study 3.2."""
     return f"fig_{number.replace('.', '_')}" if is_figure(number) else number
 
 
 def load(number: str) -> Study:
-    """Import the study of a figure.
+    """Import the study of a figure, given its number, and return it.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def load(number: str) -> Study:
 def make(
     number: str, out: str | Path = "out", changes: Mapping[str, Any] | None = None
 ) -> tuple[StudyResult, tuple[Path, ...]]:
-    """Run a study and write its plot and table, and an animation if it has one, into a folder; returns result and paths.
+    """Run a study and write its plot, its table and its animation, if any, into a folder; return the result and the paths.
 
     ``changes`` are values of its mechanism's parameters by name, numbers in SI or texts with their units.
     """

@@ -1,4 +1,4 @@
-"""The entries of the lists of figures."""
+"""Entries of the lists of the theses' figures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-#: What the statements of each study are about, from the pages of the theses; written by docs/generate.py.
+#: File of the statements of each study, shortened, from the pages of the theses; docs/generate.py writes it.
 SENTENCES = Path(__file__).with_name("sentences.json")
 
 
@@ -24,6 +24,6 @@ class Entry(NamedTuple):
 
 
 def sentences() -> Mapping[str, list[str]]:
-    """Return the statements that each study judges, shortened, with their places, by its number."""
+    """Return for each study, by its number, the statements that it judges, shortened, with their places in the thesis."""
     found: dict[str, list[str]] = json.loads(SENTENCES.read_text(encoding="utf-8"))
     return found

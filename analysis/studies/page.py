@@ -12,11 +12,11 @@ from ..figures import Figure, resize
 from . import ENTRIES, STUDIES, file_stem, load
 from .statements import FAILS, HOLDS, IN_PART, OUTCOMES, TEXT, UNJUDGED, Statement, shortened
 
-#: Folder of the plots beside the page, their width (in, px) and most bytes.
+#: Folder of the plots beside the page, width of a plot (in and px), and greatest size of its file (bytes).
 PLOTS, WIDTH_IN, WIDTH_PX, MOST_BYTES = "theses", 6.4, 480, 30_000
-#: Least width of three panels beside each other (in).
+#: A plot at least this wide (in) has three panels side by side.
 THREE_PANELS = 11.0
-#: What a page has of a statement: its quote, kind of source and place, measure and tolerance, verdict.
+#: Pattern of a statement on a page; its groups are the quote, the kind of source, the place in the thesis and the verdict.
 _STATEMENT = re.compile(
     rf"^> (.*)\n> \((text|program), (.*)\)\n\n(?:Measured: .*\n\n)?\*\*({'|'.join(OUTCOMES)})\*\*",
     flags=re.MULTILINE | re.IGNORECASE,
@@ -26,8 +26,8 @@ _STATEMENT = re.compile(
 def figures(numbers: Iterable[str], folder: Path) -> str:
     """Compute the figures of these numbers and return them in Markdown; the plots go into ``folder``.
 
-    A chapter's findings come before its first figure. A figure that only shows a mechanism or an apparatus has its title
-    alone. An assignment shared by several figures is printed with the first.
+    A chapter's findings come before its first figure. A figure that only shows a mechanism or an apparatus has only its title
+    and place. An assignment shared by several figures is printed with the first.
     """
     numbers = tuple(numbers)
     modules = dict.fromkeys(f"{__package__}.{ENTRIES[n].module}" for n in numbers if n in STUDIES)
@@ -56,7 +56,7 @@ def figures(numbers: Iterable[str], folder: Path) -> str:
 
 
 def block(statement: Statement) -> Iterator[str]:
-    """Yield the lines of a statement: quote and place, measure and tolerance, verdict, and its cases if there are several."""
+    """Yield a statement's lines in Markdown: quote, place, measure, tolerance, verdict, and a table if it has several cases."""
     source, cases = statement.source, statement.cases
     kind = "text" if source.kind == TEXT else "program"
     yield from (f"> {statement.quote}", f"> ({kind}, {source.place})", "")
@@ -74,14 +74,14 @@ def block(statement: Statement) -> Iterator[str]:
 
 
 def _escaped(text: str) -> str:
-    """Escape the bars of a text, which would end a cell of a table."""
+    """Escape the vertical bars of a text, which would end a cell of a Markdown table."""
     return text.replace("|", "\\|")
 
 
 def save_small(figure: Figure, path: Path) -> None:
-    """Write a plot of `WIDTH_PX`, laid out anew, in the quality that keeps it below `MOST_BYTES`.
+    """Resize a plot to the page's width and save it in the best quality that keeps the file within `MOST_BYTES`.
 
-    Three panels beside each other keep their size, which is wider, for they would be too narrow to read.
+    A plot with three panels side by side keeps its greater width, because narrower panels could not be read.
     """
     path.parent.mkdir(exist_ok=True)
     width, height = figure.get_size_inches()
@@ -95,12 +95,12 @@ def save_small(figure: Figure, path: Path) -> None:
 
 
 def quotes(page: str) -> list[tuple[str, str]]:
-    """Return quote and verdict of each statement on a page."""
+    """Return the quote and the verdict of each statement on a page."""
     return [(quote, outcome.lower()) for quote, _, _, outcome in _STATEMENT.findall(page)]
 
 
 def sentences(page: str) -> dict[str, list[str]]:
-    """Return what each study on a page is about: its statements, shortened, with their places, and where others are judged."""
+    """Return for each study on a page, by number, its statements, shortened, with places, and where others are judged."""
     _, *parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
     return {
         number: [f"judged at {see}" for see in re.findall(r"are judged at Figs? (.+)\.$", part, flags=re.MULTILINE)]

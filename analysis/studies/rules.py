@@ -1,11 +1,11 @@
-"""The rule for the thesis's words of degree, the same in every study."""
+"""Rule by which all studies convert the theses' words of degree, such as "about" and "slightly", to numbers."""
 
 from __future__ import annotations
 
 #: "About", "approximately", "nearly", "almost", "near", "around", "similar", "in the region of" a number: largest
 #: departure relative to it.
 ABOUT = 0.15
-#: The same of an angle, which has no natural zero (deg).
+#: Largest departure from "about" an angle, which has no natural zero (deg).
 ABOUT_DEG = 10.0
 #: "Slightly", "a little": a change by no more than this, relative to what changes, and by more than `ALIKE`.
 SLIGHTLY = 0.15
@@ -13,9 +13,9 @@ SLIGHTLY = 0.15
 SMALL = 0.05
 #: "The same", "constant", "linear", "straight", "steady": what a reader cannot tell from it on a graph, relative to its scale.
 ALIKE = 0.05
-#: A fall that is not only there but seen, as studies print it: what is more than "the same".
+#: Words that studies print for a fall that can be seen on a graph: one by more than "the same".
 SEEN_FALL = f"below {1.0 - ALIKE:g}, a fall that is seen by the rule for *the same*"
-#: What a place on a graph can be read to: relative to the scale, and for a crank angle (deg).
+#: Accuracy to which a place on a graph can be read: relative to the scale, and for a crank angle (deg).
 READ, READ_DEG = 0.02, 3.0
 
 #: "Very close" to an angle (deg), and "abnormally" high: how many times what it is compared with.

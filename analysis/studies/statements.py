@@ -1,4 +1,4 @@
-"""A sentence of a thesis with its verdict: where it stands, what is measured, to which tolerance, and its cases."""
+"""Statement of a thesis with its verdict: its place, what is measured, the tolerance, and its cases."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 
 #: Kinds of sources: the thesis's text, and its program when run.
 TEXT, LISTING = "text", "listing"
-#: What a verdict may be.
+#: Possible verdicts.
 HOLDS, IN_PART, FAILS, UNJUDGED = OUTCOMES = ("holds", "holds in part", "does not hold", "cannot be judged")
 
 
 def shortened(quote: str) -> str:
-    """Return a quote that a line of a terminal can hold, cut at the end of a word."""
+    """Cut a quote at the end of a word to fit a line of a terminal."""
     return quote if len(quote) <= 120 else f"{quote[:100].rsplit(' ', 1)[0]} ..."
 
 
@@ -28,7 +28,7 @@ class Source(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The source as a reader without the documentation understands it."""
+        """The source in words that need no documentation, such as "the thesis, 3.2.1, line 1905"."""
         place = re.sub(r"\bL(?=\d)", "line ", self.place)
         return f"{'the thesis' if self.kind == TEXT else 'the program of the thesis'}, {place}"
 
@@ -39,7 +39,7 @@ def text(place: str) -> Source:
 
 
 def listing(place: str) -> Source:
-    """Return the thesis's program when run as a source."""
+    """Return a place in the thesis's program, which is run, as a source."""
     return Source(LISTING, place)
 
 
@@ -50,8 +50,9 @@ class Case:
     Attributes
     ----------
     label : str
+        Name of the case within the statement.
     stated : str
-        Number as the thesis prints it; empty if it says it in words. Never a tolerance of ours.
+        Number as the thesis prints it; empty if the thesis gives it in words. Never a tolerance of ours.
     computed : float or None
         None where the case cannot be judged.
     lower, upper : float
@@ -115,7 +116,11 @@ def near(
     *,
     why: str = "",
 ) -> Case:
-    """Judge a value: a number as printed (a text), by default to half a unit of its last digit, or one said in words."""
+    """Return a case that holds if the computed value is the stated one within a tolerance.
+
+    ``stated`` is a text if the thesis prints the number, and a number if the thesis gives it in words. The tolerance is by
+    default half a unit of its last digit.
+    """
     value = float(stated)
     if tolerance is None:
         tolerance = 0.5 * 10.0 ** int(Decimal(str(stated)).as_tuple().exponent)
@@ -123,12 +128,12 @@ def near(
 
 
 def at_least(label: str, stated: str | float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
-    """Judge a lower bound: a number as printed (a text), or one that is said in words."""
+    """Return a case that holds if the computed value is at least the stated one; for ``stated`` see `near`."""
     return _case(label, stated, computed, unit, why, lower=float(stated))
 
 
 def at_most(label: str, stated: str | float, computed: SupportsFloat, unit: str = "", *, why: str = "") -> Case:
-    """Judge an upper bound: a number as printed (a text), or one that is said in words."""
+    """Return a case that holds if the computed value is at most the stated one; for ``stated`` see `near`."""
     return _case(label, stated, computed, unit, why, upper=float(stated))
 
 
@@ -149,7 +154,7 @@ class Statement:
     measure, tolerance : str
         What is measured; the tolerance and where it comes from. Empty where the statement cannot be judged.
     cases : tuple of Case
-        None where the statement cannot be judged.
+        Empty where the statement cannot be judged.
     why : str
         Reason for the verdict; the statement needs one unless it holds, or its cases have their own.
     """

@@ -1,4 +1,4 @@
-"""The parts of a study (claim, computed columns, picture, verdicts) and how one is run."""
+"""Study of a figure or of statements of a thesis: its result (claim, computed columns, verdicts), and how it is run."""
 
 from __future__ import annotations
 
@@ -52,16 +52,16 @@ class StudyResult:
 
     @property
     def heading(self) -> str:
-        """Heading of the plot: the figure's number and title, and what its reader has changed."""
+        """Heading of the plot: the figure's number and title, and the parameters that the reader has changed."""
         changes = f"; {words()}" if words() else ""
         return (f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title) + changes
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Figure of a thesis, or statements without one: functions that compute, draw and, for some, animate it.
+    """Study of a figure of a thesis, or of statements without a figure: functions that compute, draw and may animate it.
 
-    ``sweeps`` are the parameters whose values the study compares, so that its reader cannot set them.
+    ``sweeps`` are the parameters whose values the study compares itself; the reader cannot set them.
     """
 
     number: str
@@ -73,7 +73,7 @@ class Study:
     def make(
         self, out: str | Path = "out", changes: Mapping[str, Any] | None = None
     ) -> tuple[StudyResult, tuple[Path, ...]]:
-        """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths.
+        """Compute the study and write ``fig_<number>.png`` and ``.csv`` into a folder; return the result and the paths.
 
         A study without a plot writes nothing. ``changes`` are values of its mechanism's parameters by name, numbers in SI or
         texts with their units; the names of its files then end in ``_varied``.

@@ -1,7 +1,7 @@
-"""Parameters of a study's mechanism that its reader varies: ``linkwork figures R5 --set rod.length='45 in'``.
+"""Changes that a reader makes to the parameters of a study's mechanism: ``linkwork figures R5 --set rod.length='45 in'``.
 
-A chapter hands the mechanisms that it builds to `vary`, and takes `cache` from here. A study names in `Study.sweeps` the
-parameters whose values it compares itself.
+A chapter passes the mechanisms that it builds to `vary`, and uses the `cache` of this module. A study names in `Study.sweeps`
+the parameters whose values it compares itself.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _current() -> _Variation:
 
 @contextmanager
 def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
-    """Vary parameters of the studies that are computed inside; yields the names of those that their mechanisms have."""
+    """Change parameters in the studies computed inside the context; yield a set that collects the names they can change."""
     variation = _Variation(tuple(changes.items()), set())
     token = _CURRENT.set(variation)
     try:
@@ -48,7 +48,7 @@ def varied(changes: Mapping[str, Any]) -> Iterator[set[str]]:
 
 
 def vary(parameters: T) -> T:
-    """Return the parameters of a study's mechanism with the reader's changes."""
+    """Return the parameters of a study's mechanism with the reader's changes made."""
     changes, known = _current()
     variables = mechanism_of(parameters).mechanism_variables
     known.update(variables)
@@ -61,7 +61,10 @@ def vary(parameters: T) -> T:
 
 
 def compared(name: str, values: tuple[float, ...], unit: str, per: float) -> tuple[float, ...]:
-    """Return the values of a parameter that a study compares, or the reader's alone, ``per`` of whose units are one in SI."""
+    """Return the values of a parameter that a study compares, or only the reader's value if the reader has changed it.
+
+    ``unit`` is the parameter's SI unit; ``per`` of the units of the values are one ``unit``.
+    """
     return next(
         ((per * quantity(value, unit, name),) for changed, value in _current().changes if changed == name), values
     )
@@ -73,7 +76,7 @@ def words() -> str:
 
 
 def cache(function: Callable[P, T]) -> Callable[P, T]:
-    """Keep the results of a function by its arguments and the reader's changes."""
+    """Cache the results of a function, by its arguments and the reader's changes."""
     kept: dict[Any, tuple[T, set[str]]] = {}
 
     @wraps(function)
@@ -91,7 +94,7 @@ def cache(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def unvaried(compute: Callable[[], T]) -> Callable[[], T]:
-    """Return a study's function for which the reader's changes have no meaning, such as one of numbers in printed equations."""
+    """Wrap a study's function so that it ignores the reader's changes, for instance if it evaluates printed equations."""
 
     @wraps(compute)
     def computed() -> T:

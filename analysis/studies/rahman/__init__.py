@@ -1,7 +1,7 @@
 """List of the figures of Rahman's thesis.
 
-`table` assigns quantities to figures and `figures` computes them; `printed` has the thesis's equations to the letter and
-`method` judges them.
+`table` assigns quantities to figures and `figures` computes them; `printed` has the thesis's equations to the letter, and
+`closure`, `rates`, `forces` and `conclusions` judge them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The loop closure and its iteration judged, sections 2.2 to 2.6, 3.2 and 3.3."""
+"""Verdicts on the loop closure and its iteration, sections 2.2 to 2.6, 3.2 and 3.3."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ from .printed import (
 )
 from .table import TWISTS_REACHED_DEG, Case
 
-#: The operator of a rotation about k, eqs 2a and 3a.
+#: Differential operator of a rotation about k, eqs 2a and 3a.
 _ABOUT = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
-def _tilting(th: float) -> FloatArray:
-    """Return the operator of eta at an angle theta, eqs 2b and 3b."""
+def _eta_operator(th: float) -> FloatArray:
+    """Return the differential operator of the rotation eta at an angle theta, eqs 2b and 3b."""
     return np.array([[0.0, 0.0, np.cos(th)], [0.0, 0.0, np.sin(th)], [-np.cos(th), -np.sin(th), 0.0]])
 
 
-def _operators() -> float:
-    """Return the greatest difference of eqs 2a to 4a, times the matrices, from difference quotients of the matrices."""
+def _operator_error() -> float:
+    """Return the greatest error of the operators of eqs 2a to 4a: operator times matrix minus the matrix's derivative."""
     th, eta = float(GENERAL.th2), float(GENERAL.eta2)
 
     def ball(beyond: Dual, change: FloatArray) -> Dual:
@@ -69,14 +69,17 @@ def _operators() -> float:
 
     left = [Dual(0.0 * _ABOUT, _ABOUT) @ guide(0.0) - (guide(H) - guide(-H)) / (2.0 * H)]
     for beyond in (Dual(0.0, ROD), Dual(0.5 * np.pi, 0.0)):
-        for operator, change in zip((_ABOUT, _tilting(th)), H * np.eye(2)):
+        for operator, change in zip((_ABOUT, _eta_operator(th)), H * np.eye(2)):
             quotient = (ball(beyond, change) - ball(beyond, -change)) / (2.0 * H)
             left.append(Dual(operator) @ ball(beyond, 0.0 * change) - quotient)
     return max(float(np.abs([lack.real, lack.dual / ROD]).max()) for lack in left)
 
 
 def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the nine dual equations 19a by eqs 12 to 18: coefficients (9, 10), real and dual parts, right sides (3, 3, 2)."""
+    """Return the coefficients (9, 10) and the right sides (3, 3, 2) of the nine dual equations 19a, by eqs 12 to 18.
+
+    Each of the five unknowns has a column of real and one of dual parts; so have the right sides on their last axis.
+    """
     p, (th2, eta2, th3, eta3, s4) = parameters(case.offset_in, case.twist_deg), q.tolist()
     m1 = about_k(Dual(angle, case.shift_in * INCH)) @ about_i(Dual(0.0, p.crank_length))
     l2 = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, p.rod_length))
@@ -87,9 +90,9 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
         frame @ operator @ frame.T
         for frame, operator in (
             (m1, Dual(_ABOUT)),
-            (m1, Dual(_tilting(th2))),
+            (m1, Dual(_eta_operator(th2))),
             (rod, Dual(_ABOUT)),
-            (rod, Dual(_tilting(th3))),
+            (rod, Dual(_eta_operator(th3))),
             (guide, slide),
         )
     ]
@@ -99,11 +102,11 @@ def _nine_equations(case: Case, angle: float, q: FloatArray) -> tuple[FloatArray
 
 
 def _independent() -> tuple[int, float, float]:
-    """Return how many of eqs 19a are independent, and of what order and size the others are at odds with them.
+    """Return how many of eqs 19a are independent, and the order and the size by which the others contradict them.
 
-    The first is the rank of the left sides in a general position. Their sums with the transposed vanish; those of the right
-    sides fall with a power of the angles (lengths in inches) by which a closed loop, in the plane, is opened, and have a
-    greatest entry where the iteration ends in the first case out of the plane.
+    The number is the rank of the left sides in a general position. Opposite left sides add up to zero, so that opposite right
+    sides should too. The order is the power with which the sums of right sides fall as a closed planar loop is opened by less
+    (rad, in). The size is their greatest value where the iteration ends in the first case out of the plane.
     """
 
     def odds(case: Case, angle: float, q: FloatArray) -> float:
@@ -120,7 +123,7 @@ def _independent() -> tuple[int, float, float]:
 
 
 def _joint_freedoms() -> tuple[int, ...]:
-    """Return the freedoms that eqs 1 to 4 give joints 1 to 4: the ranks of their matrices' slopes in a general position."""
+    """Return the numbers of freedoms that eqs 1 to 4 give joints 1 to 4: the ranks of the derivatives of their matrices."""
 
     def ball(th: float, eta: float) -> Dual:
         return cast(Dual, about_k(th) @ about_j(eta))
@@ -139,13 +142,16 @@ def _joint_freedoms() -> tuple[int, ...]:
 
 
 def _settled(a4: float, shifts: FloatArray, off: float) -> NDArray[np.bool_]:
-    """Return (n, 3) whether the printed iteration settles at every angle at the shifts (in) less an amount, as is, and more."""
+    """Return whether the printed iteration settles at every angle for n shifts (in) less ``off``, as given, and plus ``off``.
+
+    The shape is (n, 3).
+    """
     each = shifts[:, None] + off * np.array([-1.0, 0.0, 1.0])
     return turn(parameters(a4), each.ravel()).settled.reshape(each.shape)
 
 
 def _limits() -> tuple[Statement, ...]:
-    """Judge the stated limits of the iteration, and what is inferred from them for the mechanism."""
+    """Judge the stated limits of the iteration, and what the thesis infers from them for the mechanism."""
     place = text("section 3.2, L1121")
     tried = np.arange(1.0, 3.5, 0.5)
     reached = {0.0: float(np.max(tried[_settled(0.0, tried, 1e-9).any(-1)], initial=0.0))}
@@ -241,11 +247,12 @@ def _limits() -> tuple[Statement, ...]:
     )
 
 
-def _detected() -> tuple[float, float]:
-    """Return the shares of shifts at a4 = 0, 10, 20, 30 in, 0 to 50 in by 2 in, at which the iteration misses or errs.
+def _detection_errors() -> tuple[float, float]:
+    """Return the shares of shifts at which the iteration fails although the crank turns fully, or accepts an open loop.
 
-    It runs at every 30 deg from the planar estimate. It misses a mechanism that turns fully where it does not settle at one of
-    them, and errs where it settles at all on a loop that is open at one.
+    The shifts go by 2 in from 0 to the greatest at which the crank turns fully, at a4 = 0, 10, 20, 30 in. The iteration runs
+    at every 30 deg from the planar estimate. It fails if it does not settle at one of these angles; it accepts an open loop if
+    it settles at all of them and the loop is open at one.
     """
     missed: list[bool] = []
     wrong: list[bool] = []
@@ -262,7 +269,10 @@ def _detected() -> tuple[float, float]:
 
 
 def endings(off: float, cases: tuple[Case, ...], step: int = 1) -> list[Settled]:
-    """Run the iteration from planar estimates of theta2 and theta3 that are off by an angle (deg), one way and the other."""
+    """Run the iteration for each case from planar estimates, theta2 increased and theta3 decreased by ``off`` (deg).
+
+    It runs at every ``step``-th angle of the grid.
+    """
     grid, away = np.radians(GRID_DEG[::step]), np.radians([off, 0.0, -off, 0.0, 0.0])
     ended = []
     for case in cases:
@@ -272,8 +282,11 @@ def endings(off: float, cases: tuple[Case, ...], step: int = 1) -> list[Settled]
     return ended
 
 
-def _far_off(cases: tuple[Case, ...]) -> tuple[float, float]:
-    """Return the shares of crank angles, by 30 deg, at which the iteration settles from far off, and on the closed loop."""
+def _poor_starts(cases: tuple[Case, ...]) -> tuple[float, float]:
+    """Return the shares of crank angles at which the iteration settles from poor estimates, and ends on the closed loop.
+
+    The estimates are off by 60 and 120 deg either way and by 180 deg (see `endings`), at every 30 deg.
+    """
     ended = [found for off in (-120.0, -60.0, 60.0, 120.0, 180.0) for found in endings(off, cases, 6)]
     closed = [(found.rotation_residual < NOTHING) & (found.position_error < NOTHING) for found in ended]
     return float(np.mean([found.settled for found in ended])), float(np.mean(closed))
@@ -282,7 +295,7 @@ def _far_off(cases: tuple[Case, ...]) -> tuple[float, float]:
 def _estimate_error(case: Case) -> float:
     """Return the greatest difference (deg) of the planar estimate at theta1 = 0 from the angles of the closed loop.
 
-    The closed loop has a third rotation in each ball joint, about i beyond theta and eta.
+    In the closed loop each ball joint has a third rotation, about i, after theta and eta.
     """
     p, zero = parameters(case.offset_in, case.twist_deg), np.zeros(1)
     closed = close(p, zero, case.shift_in * INCH)
@@ -294,8 +307,8 @@ def _estimate_error(case: Case) -> float:
     return float(np.abs((apart + 180.0) % 360.0 - 180.0).max())
 
 
-def _estimates() -> float:
-    """Return by how much the loop is open at the estimates of section 2.6.2, greatest of four offsets."""
+def _opening_of_estimates() -> float:
+    """Return the greatest rotation (rad) or length (m) by which the loop is open at the estimates of section 2.6.2."""
     zero, worst = np.zeros(1), 0.0
     for a4 in (0.0, 10.0, 20.0, 30.0):
         s4 = np.sqrt(ROD**2 - (CRANK + a4) ** 2)
@@ -306,22 +319,22 @@ def _estimates() -> float:
 
 
 def _system(case: Case, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return A and V of eq 23 at the angles of the grid."""
+    """Return the matrix A and the right side V of eq 23 at each angle of the grid, for the unknowns (n, 5) there."""
     angle, shift = np.radians(GRID_DEG), np.full(GRID_DEG.size, case.shift_in * INCH)
     unknowns = unknowns * [1.0, 1.0, 1.0, 1.0, INCH]
     return equations(*chain(parameters(case.offset_in, case.twist_deg), angle, shift, unknowns), INCH, "printed")
 
 
 def _condition(case: Case) -> float:
-    """Return A's least singular value relative to its greatest where the iteration ends."""
+    """Return A's least singular value relative to its greatest where the iteration ends, least over the turn."""
     singular = np.linalg.svd(_system(case, followed(case).unknowns[:, 0])[0], compute_uv=False)
     return float(np.min(singular[:, -1] / singular[:, 0]))
 
 
 def _first_correction(case: Case) -> tuple[float, float]:
-    """Return the greatest entries of A Delta - V and of Delta - A^-1 V, A^-1 by L457, for Delta = (A'A)^-1 A'V.
+    """Return the greatest entries of A Delta - V and of Delta - A^-1 V, for Delta = (A'A)^-1 A'V.
 
-    They are those at the first correction from the angle before.
+    A^-1 is the name that L457 gives to (A'A)^-1 A'. The entries are those of the first correction from the previous angle.
     """
     matrix, right = _system(case, np.roll(followed(case).unknowns[:, 0], 1, axis=0))
     transposed = np.swapaxes(matrix, -1, -2)
@@ -333,7 +346,7 @@ def _first_correction(case: Case) -> tuple[float, float]:
     )
 
 
-def _at_right_angles() -> float:
+def _right_angle_condition() -> float:
     """Return A's least singular value relative to its greatest with the rod at right angles to the guide, a4 = a2 - a1."""
     p, zero = parameters(ROD - CRANK), np.zeros(1)
     matrix, _ = equations(*chain(p, zero, zero, planar(p, zero)), INCH, "printed")
@@ -342,7 +355,7 @@ def _at_right_angles() -> float:
 
 
 def closure() -> StudyResult:
-    """Compute the iteration and the closure error at which it ends."""
+    """Compute the closure error at which the iteration ends over a turn, and judge the loop closure."""
     columns = {ANGLE: GRID_DEG}
     (first, *_), sparse = OPEN, GRID_DEG[::2]
     p, unknowns = parameters(first.offset_in), followed(first).unknowns[4, 0] * [1.0, 1.0, 1.0, 1.0, INCH]
@@ -366,12 +379,12 @@ def closure() -> StudyResult:
             columns[f"error of S4 with Davidon Fletcher Powell; {case.name} [in]"] = np.interp(GRID_DEG, sparse, error)
     singular = [_condition(case) for case in (PLANE, *OPEN)]
     unmet, by_name = np.transpose([_first_correction(case) for case in (PLANE, *OPEN)])
-    missed, wrong = _detected()
+    missed, wrong = _detection_errors()
     rank, order, odds = _independent()
     planes = tuple(Case("", a4, 0.0, 270.0) for a4 in (0.0, 10.0, 20.0, 30.0))
     close_by = np.concatenate([found.steps for found in endings(20.0, planes)])
     outside = np.concatenate([followed(case).steps[:, 0] for case in OPEN])
-    (settled, on_it), (settled_out, _) = _far_off(planes), _far_off(OPEN)
+    (settled, on_it), (settled_out, _) = _poor_starts(planes), _poor_starts(OPEN)
     within = "; ".join(case.name for case in OPEN)
     conclusions = text("section 3.3, L1131")
     statements = (
@@ -411,7 +424,7 @@ def closure() -> StudyResult:
             text("section 2.5, eqs 2a to 4a, L320-352"),
             "difference of the operators times the matrices from difference quotients of the matrices",
             f"{ROUGH:g}, the error of the quotients",
-            (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operators()),),
+            (at_most("eqs 2a, 2b, 3a, 3b, 4a", ROUGH, _operator_error()),),
         ),
         Statement(
             "The numerical method being used to determine the displacements is based on the algorithm (12) introduced "
@@ -469,7 +482,7 @@ def closure() -> StudyResult:
             text("section 2.6.2, L483-491"),
             "rotation (rad) and length (m) by which the planar loop is open at theta1 = 0, a4 = 0, 10, 20, 30 in",
             "1e-12, the rounding",
-            (at_most("open", 1e-12, _estimates()),),
+            (at_most("open", 1e-12, _opening_of_estimates()),),
         ),
         *_limits(),
         Statement(
@@ -516,7 +529,8 @@ def closure() -> StudyResult:
             ROUNDING,
             (
                 nothing(
-                    "may: rod at right angles to the guide, which it reaches from a4 = 38 in on", _at_right_angles()
+                    "may: rod at right angles to the guide, which it reaches from a4 = 38 in on",
+                    _right_angle_condition(),
                 ),
                 *(
                     at_least(f"never: over the turn, {case.name}", NOTHING, least)

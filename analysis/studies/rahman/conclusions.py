@@ -1,4 +1,4 @@
-"""What section 3.3 concludes of the method, judged."""
+"""Verdicts on the conclusions of section 3.3 on the method."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .table import COMPONENTS
 
 
 def conclusions() -> StudyResult:
-    """Judge what section 3.3 says of the method as a whole."""
+    """Judge the statements of section 3.3 on the method as a whole."""
     ended = endings(0.0, OUT, 6)
     cases = (
         f"the {len(ended)} cases of the figures that are out of the plane whose loop the printed iteration closes, from the "
@@ -29,7 +29,7 @@ def conclusions() -> StudyResult:
     printed, mended = (planar_forces(erratum_5=both, erratum_6=both) for both in (False, True))
 
     def error(found: dict[str, FloatArray], of: dict[str, FloatArray]) -> float:
-        """Return the greatest error of the components in ``of``, relative to the greatest value there, of those that vary."""
+        """Return the greatest error of ``found``, each component relative to its greatest size in ``of``, unless that is 0."""
         sizes = {s: np.abs(x)[clear(PLANE)].max() for s, x in of.items()}
         return max(
             float(np.abs(found[s] - right[s])[clear(PLANE)].max() / size) for s, size in sizes.items() if size > NOTHING

@@ -58,7 +58,7 @@ from .table import (
 
 FloatArray = NDArray[np.float64]
 
-#: What stands at the head of the figures.
+#: Text at the head of the figures.
 FINDINGS = """**Findings.** The thesis closes the loop of a slider-crank with an offset, a shift and a twist by 3x3 dual
 matrices, and finds from it all velocities, accelerations and joint forces under a torque of 100 lb.in at 50 rpm. Read as
 algebra, most of it is right: the operators, the accelerations but for 38a, the momenta but for two symbols, their rates, the
@@ -105,13 +105,13 @@ _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
 
 
 def mechanism(case: Case) -> SliderCrankParameters:
-    """Return the mechanism of a case, with what the reader varies."""
+    """Return the parameters of a case's mechanism, with the reader's changes."""
     return vary(parameters(case.offset_in, case.twist_deg))
 
 
 @cache
 def turn(case: Case, load_lb: float | None = None) -> ForceTurn:
-    """Compute a turn of the crank with a load on the slider (lb, away from the crank), or with the torque given."""
+    """Compute a turn of the crank with a load on the slider (lb, away from the crank), or without one with the given torque."""
     return force_turn(
         mechanism(case),
         crank_speed=CRANK_SPEED,
@@ -148,7 +148,7 @@ def position(case: Case) -> FloatArray:
 
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
-    """Return a mask of the whole degrees that are clear of the dead centres."""
+    """Return a mask over `ANGLES_DEG`, True at the whole degrees that are `CLEAR_DEG` or more from a dead centre."""
     # an angle at exactly this distance is clear, whatever its rounding
     return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG - 1e-6))
 
@@ -229,7 +229,7 @@ def _motion() -> tuple[Statement, ...]:
 
 
 def full_name(case: Case) -> str:
-    """Return what distinguishes a case among those of all families."""
+    """Return a name that distinguishes a case from those of all families."""
     return f"{case.name}, S1 = {case.shift_in:g} in" if case.name.startswith("a4") else case.name
 
 
@@ -463,7 +463,7 @@ def _constant() -> tuple[Statement, ...]:
 
 
 def _equations() -> FloatArray:
-    """Return eqs 62a to 64f without 63b in seventeen unknown components, in the general position, one a row."""
+    """Return the coefficients of eqs 62a to 64f without 63b in the general position: a row each, seventeen unknowns."""
     th2, eta2, th3, eta3, _ = (float(value) for value in GENERAL)
     crank = about_k(Dual(0.9, 3.5)) @ about_i(Dual(0.0, CRANK_AT_SPEED.a1))
     rod = about_k(th2) @ about_j(eta2) @ about_i(Dual(0.0, CRANK_AT_SPEED.a2))
@@ -526,12 +526,12 @@ def compute(number: str) -> StudyResult:
         assignment=assignment,
         columns=padded(columns),
         statements=_JUDGED[number]() if number in _JUDGED else (),
-        see="" if number in ("R5", "R8", CONSTANT) else _judged_at(number, symbols),
+        see="" if number in ("R5", "R8", CONSTANT) else _judging_figures(number, symbols),
     )
 
 
-def _judged_at(number: str, symbols: tuple[str, ...]) -> str:
-    """Return the figures at which the statements on a figure without its own, or on a torque, are judged."""
+def _judging_figures(number: str, symbols: tuple[str, ...]) -> str:
+    """Return the figures that judge the statements on this figure, if it has none of its own or shows a torque."""
     if not symbols:
         return "R5"
     return "R8" if "T" not in symbols[0] else "R8 and below" if number in _JUDGED else "R8 and R14"
@@ -548,8 +548,8 @@ def printed_symbol(symbol: str) -> str:
     return re.sub(r"^(\d)([FT])(\d)([ijk])$", r"$^\1\2_{\3\4}$", symbol)
 
 
-def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return a curve that is interrupted at its dead centres."""
+def _interrupted_curve(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return angles and values of a curve with a NaN at each of its dead centres, where the drawn line is interrupted."""
     centres = result.columns[_dead_centre_name(case)]
     centres = centres[np.isfinite(centres)]
     where = np.searchsorted(ANGLES_DEG, centres)
@@ -557,7 +557,7 @@ def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, Flo
 
 
 def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
-    """Return a range with all values clear of the dead centres, at least 1 lb or 1 lb.in each way."""
+    """Return a range of y with all values of the curves and a margin, of 1 lb or 1 lb.in if they are constant."""
     joined = np.concatenate(list(curves))
     low, high = float(joined.min()), float(joined.max())
     room = max(0.08 * (high - low), 1.0 if high - low < NOTHING else 0.0)
@@ -579,7 +579,7 @@ def draw(result: StudyResult) -> Figure:
         low, high = _y_range(result.columns[name][clear(case)] for case, name in names.items())
         curves = []
         for case, legend, colour, line in looks:
-            x, y = _broken(result, case, names[case])
+            x, y = _interrupted_curve(result, case, names[case])
             # one legend serves all panels
             curves.append(Curve(x=x, y=y, label="" if panels else legend, colour=colour, line=line))
             curves += [

@@ -1,4 +1,4 @@
-"""The force equations judged: momenta, in the plane and out of it, sections 2.8 and 3.1."""
+"""Verdicts on the force equations: momenta and joint forces, in the plane and out of it, sections 2.8 and 3.1."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ PLANAR = ("1F1i", "1F1j", "2F2i", "2F2j", "3F3i", "3F3j", "4F4i", "4F4k")
 def planar_forces(*, erratum_5: bool, erratum_6: bool, share: float = 1.0) -> dict[str, FloatArray]:
     """Return the forces (lb) of the planar mechanism at a4 = 10 in by the printed equations, with errata mended or not.
 
-    ``share`` is that of the masses which is taken: 0 leaves the inertia out.
+    ``share`` multiplies the masses: 0 leaves the inertia out.
     """
     p, angle = parameters(PLANE.offset_in), np.radians(ANGLES_DEG)
     q = joints(planar(p, angle) / [1.0, 1.0, 1.0, 1.0, INCH])
@@ -129,7 +129,7 @@ def _balances() -> tuple[float, ...]:
 
 
 def _clear_joints(case: Case) -> Joints:
-    """Return the joints where the printed iteration ends, at the angles where theta2 is not near 0 or half a turn."""
+    """Return the joint values where the printed iteration ends, at the angles where theta2 is not near 0 or half a turn."""
     q = joints(followed(case).unknowns[:, 0])
     return Joints(*(x[np.abs(np.sin(q.th2)) > CLEAR_SINE] for x in q))
 
@@ -184,7 +184,7 @@ def _roundoffs() -> list[Judged]:
     return judged
 
 
-def _apart(a: Dual, b: Dual) -> float:
+def _difference(a: Dual, b: Dual) -> float:
     """Return the greatest difference of two dual vectors."""
     return float(max(np.abs(a.real - b.real).max(), np.abs(a.dual - b.dual).max()))
 
@@ -200,7 +200,7 @@ def _momenta() -> tuple[Statement, ...]:
     slider = forward_slider_momentum(MOVING, b, GENERAL, r, G3, slip=True)
     wrong = slider - at_g3.momentum(forward_slider_velocity(MOVING, GENERAL, r))
     as_printed = momenta(MOVING, b, GENERAL, r, slip=True)
-    # the rates of eqs 54 to 56, and what they are the rates of, a moment later
+    # the rates of eqs 54 to 56, and the momenta whose rates they should be, a moment later
     seconds = joint_accelerations(MOVING, GENERAL, r)
     of_rates = Crank(CRANK, ROD, MOVING.acceleration, MOVING.shift_acceleration)
     to_come = later(MOVING, GENERAL, r, seconds)
@@ -216,7 +216,7 @@ def _momenta() -> tuple[Statement, ...]:
     steady, momentum = velocities(still, GENERAL, unmoved), momenta(still, b, GENERAL, unmoved)
     accelerations = [Dual(v.real.imag / 1e-20, v.dual.imag / 1e-20) for v in velocities(still, *moved)]
     inertia = [
-        _apart(inertia_force(v, h, rate), binor.rate(v, acceleration))
+        _difference(inertia_force(v, h, rate), binor.rate(v, acceleration))
         for v, h, rate, binor, acceleration in zip(steady, momentum, printed_rates, _binors(), accelerations)
     ]
 
@@ -234,10 +234,10 @@ def _momenta() -> tuple[Statement, ...]:
             f"S1' = 1.3 in/s and g3 = {G3:g} in",
             ROUNDING,
             (
-                nothing("eq 49a", _apart(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
+                nothing("eq 49a", _difference(crank_momentum(MOVING, b), of_crank.momentum(moving[0])), "lb.s"),
                 nothing(
                     "eq 50a",
-                    _apart(rod * b.masses[1], of_rod.momentum(forward_rod_velocity(MOVING, GENERAL, r))),
+                    _difference(rod * b.masses[1], of_rod.momentum(forward_rod_velocity(MOVING, GENERAL, r))),
                     "lb.s",
                 ),
                 nothing("eq 51a, components i and k", [wrong.real[[0, 2]], wrong.dual[[0, 2]]], "lb.s"),
@@ -251,8 +251,8 @@ def _momenta() -> tuple[Statement, ...]:
             "difference from the binors times the velocities of eqs 36 and 32a, in a general position",
             ROUNDING,
             (
-                nothing("eq 52a", _apart(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
-                nothing("eq 53a", _apart(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
+                nothing("eq 52a", _difference(as_printed[1], of_rod.momentum(moving[1])), "lb.s"),
+                nothing("eq 53a", _difference(as_printed[2], of_slider.momentum(moving[2])), "lb.s"),
             ),
             f"erratum 9: g3, which is 0, for g2 in 52a, {MAYBE}",
         ),
@@ -275,7 +275,7 @@ def _momenta() -> tuple[Statement, ...]:
             "difference from the rates of eqs 49a to 51a, the last with cos eta3 for cos theta3, in a general position "
             f"{AT_RATES}, g3 = {G3:g} in; {DOTS}, as are one bracket inside 56d and one inside 56e, and the last of 56c to 56f",
             ROUNDING,
-            tuple(nothing(label, _apart(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
+            tuple(nothing(label, _difference(rate, turned(h)), "lb") for label, (rate, h) in forward.items()),
             "56 has cos eta3 where 51a has cos theta3 (erratum 9)",
         ),
         Statement(
@@ -287,7 +287,7 @@ def _momenta() -> tuple[Statement, ...]:
             ROUNDING,
             (
                 *(
-                    nothing(label, _apart(rate, turned(h)), "lb")
+                    nothing(label, _difference(rate, turned(h)), "lb")
                     for label, rate, h in zip(("eq 57", "eq 58"), printed_rates[1:], momenta(still, b, *moved)[1:])
                 ),
                 *replacements(),
@@ -319,7 +319,7 @@ def _momenta() -> tuple[Statement, ...]:
 
 
 def _expanded() -> dict[str, FloatArray]:
-    """Return by how much the joint forces in eqs 62a to 64f differ from those in eqs 62 to 64."""
+    """Return the differences of the joint forces in eqs 62a to 64f from those in eqs 62 to 64, by the equations' names."""
     th1, shift, (th2, eta2, th3, eta3, _) = 0.9, 3.5, (float(value) for value in GENERAL)
     (s, s2, se, s3, sh), (c, c2, ce, c3, ch) = (f([th1, th2, eta2, th3, eta3]) for f in (np.sin, np.cos))
     i, j, k = force = np.array([30.0, -50.0, 70.0])
@@ -448,7 +448,7 @@ def _slips(right: dict[str, FloatArray]) -> tuple[Statement, ...]:
 
 
 def forces() -> StudyResult:
-    """Compute the force equations in the plane, as printed and mended."""
+    """Compute the joint forces in the plane by the equations as printed and mended, and judge the force equations."""
     columns, at = {ANGLE: ANGLES_DEG}, clear(PLANE)
     right = {symbol: values(PLANE, COMPONENTS[symbol]) for symbol in PLANAR}
     columns["4F4k right [lb]"] = right["4F4k"]

@@ -1,4 +1,4 @@
-"""What the studies of Rahman's method share: cases, the iteration over a turn, the plot.
+"""Cases, iteration over a turn and plot that the studies of Rahman's method share.
 
 `printed` has the equations to the letter. The studies compare them with other formulations: dual matrices, difference
 quotients, the model by Newton and Euler. The errata are numbered as in docs/rahman.md.
@@ -27,21 +27,21 @@ ROD = CRANK_AT_SPEED.a2
 #: The planar mechanism, and the cases out of the plane.
 PLANE = Case("in the plane, a4 = 10 in", 10.0, 0.0, 270.0)
 OUT = tuple(case for case in ALL if case.shift_in or case.twist_deg != IDEAL.twist_deg)
-#: Cases whose loops are followed.
+#: Cases out of the plane whose loops the iteration follows over a turn.
 OPEN = (
     Case("a4 = 10 in at S1 = 3.5 in", 10.0, 3.5, 270.0),
     Case("alpha4 = 232 deg", 20.0, 0.0, 232.0),
     Case("alpha4 = 310 deg", 20.0, 0.0, 310.0),
 )
-#: Cases for row 37f, which is judged where |sin theta2| is above `CLEAR_SINE`, since eq 41 divides by it.
+#: Cases for row 37f, which is judged where |sin theta2| is above `CLEAR_SINE`, since eq 41 divides by sin theta2.
 ROW_F = (Case("a4 = 30 in at S1 = 9 in", 30.0, 9.0, 270.0), OPEN[2])
 CLEAR_SINE = float(np.sin(np.radians(ABOUT_DEG)))
 AWAY = f"where theta2 is over {ABOUT_DEG:g} deg from 0 and half a turn, the rule for *near*, since eq 41 divides by its sine"
-#: What a second rate is compared with: the crank's acceleration (rad/s2) and that of the shift (in/s2), its rate (in/s).
+#: Motion in which second rates are judged: the crank accelerates (rad/s2), the shift has a rate (in/s) and accelerates (in/s2).
 MOVING = CRANK_AT_SPEED._replace(shift_rate=1.3, acceleration=3.0, shift_acceleration=0.7)
 AT_RATES = "with S1' = 1.3 in/s, theta1'' = 3 rad/s2 and S1'' = 0.7 in/s2"
 DOTS = "second dots lost in the scan are restored"
-#: What is said of a slip of one character.
+#: Words on a slip of one character.
 MAYBE = "so in our scan; the print may be right"
 #: Step of difference quotients, and their largest relative error.
 H, ROUGH = 1e-6, 1e-7
@@ -49,7 +49,7 @@ H, ROUGH = 1e-6, 1e-7
 
 @cache
 def followed(case: Case, rows: Rows = "printed", from_before: bool = True) -> Turn:
-    """Run the iteration over a turn in a case."""
+    """Run the iteration over a turn for a case; see `turn`."""
     return turn(parameters(case.offset_in, case.twist_deg), case.shift_in, rows, from_before=from_before)
 
 

@@ -26,18 +26,18 @@ FloatArray = NDArray[np.float64]
 STEP_DEG, MAX_STEPS = 5.0, 200
 #: Largest change of an angle (rad) or of S4 (in) in a step that counts as small: our choice too.
 STEP = 1e-6
-#: K2x2 of the rod (in2), of effect in eqs 50a and 55 alone, and the squares of the slider, in 51a and 56 alone.
+#: Squared radii of gyration (in2): K2x2 of the rod, used in eqs 50a and 55 only, and those of the slider, in 51a and 56 only.
 ROD_X_SQUARE, SLIDER_SQUARE = 0.5, 3.0**2 / 6.0
 #: Crank angles of the continuation (deg).
 GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
 
 
 class Turn(NamedTuple):
-    """Result of the iteration at the angles `GRID_DEG` (m) for n shifts.
+    """Result of the iteration at the m angles of `GRID_DEG` for n shifts.
 
     ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in). ``rotation_deg`` and ``error_in`` (m, n) are the
-    closure error and the error of S4; ``steps`` (m, n) the numbers of corrections; ``settled`` (n,) whether the last correction
-    was small at every angle. The turn ends where no shift settles; the rest is NaN.
+    rotation by which the loop is open and the error of S4; ``steps`` (m, n) the numbers of corrections; ``settled`` (n,)
+    whether the last correction was small at every angle. A shift has NaN from the first angle at which it does not settle.
     """
 
     unknowns: FloatArray
@@ -48,7 +48,10 @@ class Turn(NamedTuple):
 
 
 def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", *, from_before: bool = True) -> Turn:
-    """Iterate over a turn, from the planar estimate at theta1 = 0 and then from the previous angle or from that estimate."""
+    """Run the iteration over a turn for given shifts (in), from the planar estimate at theta1 = 0.
+
+    At later angles it starts from the solution at the previous angle (``from_before``), otherwise from the planar estimate.
+    """
     shifts = np.atleast_1d(np.asarray(shift_in, dtype=float))
     shape = (GRID_DEG.size, shifts.size)
     blank = np.full(shape, np.nan)
@@ -71,12 +74,12 @@ def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", 
 
 
 def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, FloatArray, bool]:
-    """Iterate at every other angle by Newton and Raphson with Davidon, Fletcher and Powell, as in the thesis's reference 12.
+    """Close the loop at every other angle by Newton-Raphson and Davidon-Fletcher-Powell steps, as in reference 12.
 
-    The thesis prints the first alone (eqs 7 to 26). As we read the reference, a step by eq 23a is taken where it halves the sum
-    of squares of eq 25, lengths in inches, and a step of Davidon, Fletcher and Powell down that sum where it does not. The
-    start is the planar estimate, then the previous angle. Returns the rotation left (deg), the error of S4 (in), and whether
-    the last step was small at every angle.
+    The thesis prints the Newton-Raphson steps only (eqs 7 to 26). As we read the reference, a step by eq 23a is taken if it
+    halves the sum of squares of eq 25, lengths in inches; otherwise a Davidon-Fletcher-Powell step reduces that sum. The start
+    is the planar estimate, then the solution at the previous angle. Returns the rotation by which the loop is open (deg) and
+    the error of S4 (in) at each angle, and whether the last step was small at every angle.
     """
     unit, angles = np.array([1.0, 1.0, 1.0, 1.0, INCH]), np.radians(GRID_DEG[::2])
     away = 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5), -np.eye(5)])
@@ -84,7 +87,7 @@ def dependable(p: SliderCrankParameters, shift_in: float) -> tuple[FloatArray, F
     for angle in angles:
 
         def at(q: FloatArray, angle: float = angle) -> tuple[FloatArray, FloatArray, float, FloatArray]:
-            """Return A and V of eqs 24 and 25, the sum of squares of V, and its slope."""
+            """Return A and V of eqs 24 and 25, the sum of squares of V, and its gradient."""
             th, s1 = np.full(len(away), angle), np.full(len(away), shift_in * INCH)
             matrix, right = equations(*chain(p, th, s1, (q + away) * unit), INCH, "printed")
             sums = np.sum(right**2, -1)
@@ -147,7 +150,10 @@ GENERAL = Joints(*(np.array(value) for value in (2.1, 0.35, -1.3, 0.2, 40.0)))
 
 
 def later(c: Crank, q: Joints, r: Joints, a: Joints) -> tuple[Crank, Joints, Joints]:
-    """Return crank, joints and their rates moved along the motion by 1e-20j s: derivatives without rounding error."""
+    """Return crank, joints and their rates after an imaginary time of 1e-20j s.
+
+    The imaginary part of a function of them, divided by 1e-20, is its time derivative without rounding error.
+    """
     speeds = (c.speed + 1e-20j * c.acceleration, c.shift_rate + 1e-20j * c.shift_acceleration)
     moved = [Joints(*(x + 1e-20j * y for x, y in zip(*pair))) for pair in ((q, r), (r, a))]
     return Crank(c.a1, c.a2, *cast("tuple[float, float]", speeds)), moved[0], moved[1]
@@ -172,7 +178,7 @@ def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
 def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
     """Return the second rates by eqs 38a to 42a.
 
-    The bracket shared by 40 to 42 and its rate have names here.
+    ``bracket`` is the bracket that eqs 40 to 42 share, ``bracket_t`` its rate.
     """
     (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
     w, v, a1, a2 = c.speed, c.shift_rate, c.a1, c.a2
@@ -251,9 +257,9 @@ def separated_rates(c: Crank, q: Joints) -> FloatArray:
 
 
 def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
-    """Return the residual of the last of rows 37 (in/s) with erratum 2 mended, when the others are solved.
+    """Return the residual of row 37f (in/s) with erratum 2 mended, when rows 37a to 37e are solved for the joint rates.
 
-    The mended row takes the rate of eta about the axis j as turned by theta.
+    With the erratum mended, the rate of eta acts about the axis j that theta has turned.
     """
     _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
     zero = np.zeros_like(angle)
@@ -289,13 +295,13 @@ def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
 
 def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
     """Build a dual vector (..., 3) of components that are numbers or arrays."""
-    # numbers among arrays of single precision leave them so
+    # arrays of single precision stay in single precision beside plain numbers
     joined = np.stack(np.broadcast_arrays(*real, *dual), -1, dtype=np.result_type(*real, *dual))
     return Dual(joined[..., :3], joined[..., 3:])
 
 
 def velocities(c: Crank, q: Joints, r: Joints) -> tuple[Dual, Dual, Dual]:
-    """Return the dual velocities by eqs 33, 36 and 32a, the mixed path."""
+    """Return the dual velocities of crank, rod and slider by eqs 33, 36 and 32a, the mixed path."""
     s3, c3 = np.sin(q.th3), np.cos(q.th3)
     return (
         _dual([0.0, 0.0, c.speed], [0.0, c.a1 * c.speed, c.shift_rate]),
@@ -317,7 +323,7 @@ def forward_rod_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
     )
 
 
-def _forward_rates(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
+def _forward_rod_rate(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
     """Return the rate of eq 35, whose terms eqs 55 and 56 share."""
     (s2, se), (c2, ce), turning = np.sin([q.th2, q.eta2]), np.cos([q.th2, q.eta2]), c.speed + r.th2
     w, v, wt, vt = c.speed, c.shift_rate, c.acceleration, c.shift_acceleration
@@ -346,21 +352,21 @@ def _forward_rates(c: Crank, q: Joints, r: Joints, a: Joints) -> Dual:
     )
 
 
-def _to_slider(q: Joints) -> FloatArray:
-    """Return the rotation of eq 45 from frame 3 to frame 4, that of eq 3 transposed."""
+def _slider_rotation(q: Joints) -> FloatArray:
+    """Return the rotation matrix of eq 45 from frame 3 to frame 4, the transpose of that of eq 3."""
     (s3, sh), (c3, ch) = np.sin([q.th3, q.eta3]), np.cos([q.th3, q.eta3])
     return np.array([[c3 * ch, s3 * ch, -sh], [c3 * sh, s3 * sh, ch], [s3, -c3, 0.0 * s3]])
 
 
 def forward_slider_velocity(c: Crank, q: Joints, r: Joints) -> Dual:
     """Return the slider's dual velocity by eq 45."""
-    rod, rotation = forward_rod_velocity(c, q, r), _to_slider(q)
+    rod, rotation = forward_rod_velocity(c, q, r), _slider_rotation(q)
     joint = np.stack([0.0 * r.th3, r.eta3, r.th3], -1)
     return Dual(*(np.einsum("ij...,...j->...i", rotation, x) for x in (rod.real + joint, rod.dual)))
 
 
-def _of_slider(v: Dual, mass: float, g3: float) -> Dual:
-    """Return the slider's dual momentum, or its rate, by the terms of eqs 51a and 56 in the components of eq 45."""
+def _slider_momentum(v: Dual, mass: float, g3: float) -> Dual:
+    """Return the slider's dual momentum from the velocity ``v`` of eq 45, or its rate from that of ``v``; eqs 51a and 56."""
     (x, y, z), (xd, yd, zd) = np.moveaxis(v.real, -1, 0), np.moveaxis(v.dual, -1, 0)
     square = SLIDER_SQUARE
     found = _dual([xd, yd + g3 * z, zd - g3 * y], [square * x, square * y - g3 * zd, square * z + g3 * yd])
@@ -371,13 +377,13 @@ def forward_slider_momentum(c: Crank, b: Bodies, q: Joints, r: Joints, g3: float
     """Return the slider's dual momentum by eq 51a; ``slip`` keeps its cos theta3 for cos eta3 (erratum 9)."""
     mass, across = b.masses[2], forward_rod_velocity(c, q, r).dual[..., 2]
     wrong = mass * (np.cos(q.th3) - np.cos(q.eta3)) * across if slip else 0.0
-    found = _of_slider(forward_slider_velocity(c, q, r), mass, g3) + _dual([0.0, wrong, 0.0], [0.0, 0.0, 0.0])
+    found = _slider_momentum(forward_slider_velocity(c, q, r), mass, g3) + _dual([0.0, wrong, 0.0], [0.0, 0.0, 0.0])
     return cast(Dual, found)
 
 
 def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, g3: float) -> tuple[Dual, Dual]:
-    """Return the rates of the dual momenta of rod and slider by eqs 55 and 56, terms gathered; the latter has cos eta3."""
-    (_, m2, m3), square, rod = b.masses, b.rod_square, _forward_rates(c, q, r, a)
+    """Return the rates of the dual momenta of rod and slider by eqs 55 and 56, terms collected; eq 56 has cos eta3."""
+    (_, m2, m3), square, rod = b.masses, b.rod_square, _forward_rod_rate(c, q, r, a)
     (x, y, z), (xd, yd, zd) = rod.real, rod.dual
     of_rod = _dual(
         [xd, yd + b.g2 * z, zd - b.g2 * y], [ROD_X_SQUARE * x, square * y - b.g2 * zd, square * z + b.g2 * yd]
@@ -390,13 +396,13 @@ def forward_momentum_rates(c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints,
             [r.th3 * c3, r.th3 * s3, 0.0 * s3],
         ]
     )
-    now, rotation = forward_rod_velocity(c, q, r), _to_slider(q)
+    now, rotation = forward_rod_velocity(c, q, r), _slider_rotation(q)
     real = rotation @ (rod.real + np.array([0.0, a.eta3, a.th3])) + turned @ (now.real + np.array([0.0, r.eta3, r.th3]))
-    return m2 * of_rod, _of_slider(Dual(real, rotation @ rod.dual + turned @ now.dual), m3, g3)
+    return m2 * of_rod, _slider_momentum(Dual(real, rotation @ rod.dual + turned @ now.dual), m3, g3)
 
 
 def crank_momentum(c: Crank, b: Bodies) -> Dual:
-    """Return the crank's dual momentum by eq 49a; with second rates in ``c`` its rate by eq 54, which has the same terms."""
+    """Return the crank's dual momentum by eq 49a, or its rate by eq 54 if ``c`` has accelerations in place of the speeds."""
     m1, w, v = b.masses[0], c.speed, c.shift_rate
     return _dual(
         [0.0, m1 * w * (c.a1 + b.g1), m1 * v], [0.0, -m1 * b.g1 * v, m1 * (b.crank_square * w + b.g1 * c.a1 * w)]
@@ -468,7 +474,7 @@ def joint_forces(
 ) -> dict[str, FloatArray]:
     """Return all joint forces (lb) and moments (lb.in) by eqs 49a, 52a, 53a, 54, 57 to 61 and 69a to 69q.
 
-    The shift is constant. The equations hold in the plane, and otherwise but for the slip of 52a (g3 for g2), which is mended.
+    The shift is constant. The equations are as printed, but for the slip of 52a (g3 for g2), which is mended.
     ``erratum_5`` mends the signs of f1 and f3 in eqs 62 and 64. 1F1k is 0, as in the thesis.
     """
     (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))

@@ -1,4 +1,4 @@
-"""Velocities and accelerations of the joints judged, sections 2.7 and 2.8."""
+"""Verdicts on the velocities and accelerations of the joints, sections 2.7 and 2.8."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ from .table import FAMILIES, IDEAL, Case
 
 
 def row_f(case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return the residual of row 37f (in/s) on the grid: as printed, NaN where eq 41 is unbounded, and by erratum 2."""
+    """Return the residuals of row 37f (in/s), as printed (NaN where eq 41 is unbounded) and with erratum 2 mended."""
     p, q = parameters(case.offset_in, case.twist_deg), joints(followed(case).unknowns[:, 0])
     lacking = loop_rates(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))[5]
     shift = np.full(GRID_DEG.size, case.shift_in * INCH)
@@ -76,7 +76,7 @@ def _angular_velocity() -> float:
 
 
 def _sinusoidal(ratio: float) -> tuple[float, float]:
-    """Return the errors of eq 28a (in/s) and of eq 28b (in/s2) as rates of eqs 28 and 28a mended, at an alpha."""
+    """Return the errors of eq 28a (in/s), as the rate of 28, and of 28b (in/s2), as that of 28a mended; ``ratio`` is alpha."""
     amplitude, angle, speed, acceleration, h = 2.0, 0.9, CRANK_SPEED, 3.0, 1e-20
     # derivatives along the motion by a complex step, which has no rounding error
     moved, quicker = angle + 1j * h * speed, speed + 1j * h * acceleration
@@ -90,7 +90,7 @@ def _sinusoidal(ratio: float) -> tuple[float, float]:
 
 
 def _rows(crank: Crank, q: Joints) -> tuple[FloatArray, FloatArray]:
-    """Return coefficients and constant part of eqs 37a to 37f in the rates of the joints."""
+    """Return the coefficients of the joint rates in eqs 37a to 37f, shape (6, 5), and the constant parts, shape (6,)."""
     right = loop_rates(crank, q, Joints(*np.zeros(5)))
     return np.stack([loop_rates(crank, q, Joints(*unit)) - right for unit in np.eye(5)], -1), right
 
@@ -201,7 +201,7 @@ def _printed_rates() -> tuple[Statement, ...]:
 
 #: How far from a zero of sin theta2 accelerations are taken (deg).
 BESIDE_DEG = 1e-3
-#: What the printed equations of the accelerations give.
+#: Labels of the accelerations with the printed equations that give them, by the joint's name.
 EQUATIONS = {
     "th2": "theta2'' by 38a",
     "th3": "theta3'' by 39a",
@@ -212,7 +212,7 @@ EQUATIONS = {
 
 
 def _near_dead_centres(case: Case, q: Joints, angles_deg: FloatArray) -> dict[str, float]:
-    """Return the greatest second rates within 10 deg of a dead centre, relative to those elsewhere, by eqs 38a to 42a."""
+    """Return the greatest second rates, eqs 38a to 42a, within 10 deg of a dead centre relative to elsewhere, by joint name."""
     found = joint_accelerations(CRANK_AT_SPEED, q, joint_rates(CRANK_AT_SPEED, q))
     close_by = np.min([np.abs(angles_deg - at) for at in dead_centres_deg(case)], axis=0) < ABOUT_DEG
     sizes = {name: np.abs(second) for name, second in found._asdict().items()}
@@ -256,7 +256,7 @@ def _beside_zeros(case: Case, angles_deg: FloatArray, unknowns: FloatArray) -> t
 
 
 def _roundoff(q: Joints) -> float:
-    """Return the greatest roundoff of an acceleration by eqs 38a to 42a, relative to the greatest one of its equation."""
+    """Return the greatest roundoff of eqs 38a to 42a, relative to the greatest acceleration by the same equation."""
     digit = np.spacing(2.0 * np.pi)
     short, long = (
         joint_accelerations(CRANK_AT_SPEED, at, joint_rates(CRANK_AT_SPEED, at))

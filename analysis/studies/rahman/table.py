@@ -50,7 +50,7 @@ class Component(NamedTuple):
     """Component of a force or moment: symbol, meaning, printed unit, and source.
 
     ``source`` is a vector of `analysis.slider_crank.ForceTurn`, of which this is the component along ``axis`` of ``frame``, or
-    one of the two axial forces, "axial_force" and "slider_force". ``sign`` converts its sense to the thesis's.
+    one of the two axial forces, "axial_force" and "slider_force". ``sign`` converts the sense of the source to the thesis's.
     """
 
     symbol: str
@@ -88,7 +88,7 @@ COMPONENTS: Mapping[str, Component] = MappingProxyType({component.symbol: compon
 
 
 class Figure(NamedTuple):
-    """Figure: the family of its cases, its components (none for the slider displacement), its place."""
+    """Figure: the family of its cases, its components (none for the slider displacement), its title, its place."""
 
     family: str
     symbols: tuple[str, ...]
@@ -96,7 +96,7 @@ class Figure(NamedTuple):
     place: str
 
 
-#: The case that stands beside the others in every figure.
+#: The case that every figure shows beside the others.
 IDEAL = Case("ideal", 0.0, 0.0, 270.0)
 
 _OFFSETS = tuple(Case(f"a4 = {a4} in", float(a4), 3.5, 270.0) for a4 in (10, 20, 30))
