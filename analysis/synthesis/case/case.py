@@ -101,14 +101,14 @@ def _error(value: Any, name: str) -> Any:
     try:
         quantity(value, "m", name)
     except ParameterError:
-        # of a function of the rocker
+        # for a rocker function
         quantity(value, "rad", name)
     return value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """The table ``[constraints]``; a least transmission angle of None is no constraint.
+    """The table ``[constraints]``; a least transmission angle of None does not constrain it.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class Constraints:
     dead_centre_stretched, dead_centre_folded : (float, float)
         Crank rotation, or range of it, at which crank and coupler are in line.
     toggle_stretched, toggle_folded : (float, float)
-        The same for coupler and rocker.
+        Crank rotation, or range of it, at which coupler and rocker are in line.
     no_toggle : (float, float)
         Crank rotations between which there is no toggle.
     max_pin_force : float
@@ -203,7 +203,7 @@ BOUNDS = Table(
     dict,
     {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in (*UNKNOWNS, SECOND_LENGTH)},
 )
-#: The tables of a case beside the task's, for `linkwork new`.
+#: The tables of a case file besides ``[task]``, for `linkwork new`.
 TABLES: Mapping[str, type] = {
     "constraints": Constraints,
     "search": SearchTable,
@@ -249,12 +249,12 @@ class SynthesisCase:
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
     def violated(self, solution: Solution) -> str:
-        """Say which constraint a linkage violates most, and by how much; empty if it meets all, or is in closed form."""
+        """Return, as text, which constraint a linkage violates most and by how much; empty for none, or in closed form."""
         closed = isinstance(self.task, QuickReturn | QuickSwing)
         return "" if closed else violated(solution, self.bounds, self.constraints)
 
     def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
-        """Run the plant for the pin forces of solutions; None if no constraint involves pin forces."""
+        """Return the pin forces of solutions from runs of the plant; None if no constraint involves pin forces."""
         if not any(isinstance(c, FORCES) for c in self.constraints):
             return None
         return [pin_forces(s.linkage, self.make, s.way) for s in solutions]

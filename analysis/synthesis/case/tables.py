@@ -45,7 +45,7 @@ def read_plane_points(value: Any, name: str, bare: str | None = None) -> FloatAr
 
 
 def _unit(value: Any, name: str, kind: str, si: str, example: str) -> str:
-    """Read the unit for numbers without a unit."""
+    """Check the unit of numbers that are written without one, and return it."""
     try:
         quantity(f"1 {value}", si, name)
     except ParameterError:
@@ -70,7 +70,7 @@ def _end(value: Any, name: str) -> float | str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
-    """Crank rotations in equal steps."""
+    """Crank rotations at equal steps between two ends (rad)."""
 
     begin: float = entry(Quantity("rad"), key="from")
     end: float = entry(Quantity("rad"), key="to")
@@ -118,14 +118,14 @@ def _steps_or_list(value: Any, name: str) -> Any:
 
 
 def _rotation(value: Any, n: int) -> FloatArray | None:
-    """Return the crank rotations of n targets."""
+    """Return the crank rotations of n targets (rad) from `Steps` or a list; None if they are not given."""
     if value is None:
         return None
     return np.linspace(value.begin, value.end, n) if isinstance(value, Steps) else np.array(value)
 
 
 def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray | None:
-    """Read weights, as a list or as windows of crank rotation; for an untimed task as windows of point numbers, inclusive."""
+    """Read weights: a list, or windows of crank rotations; for an untimed task windows of point numbers, ends included."""
     if value is None:
         return None
     name = "task.weights"
@@ -148,7 +148,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
 
 
 def _source(table: Any, sources: tuple[str, ...]) -> str:
-    """Return the entry that gives the target, of several alternatives."""
+    """Return the name of the one entry among ``sources`` that gives the target; raise InputError unless there is just one."""
     there = [name for name in sources if getattr(table, name) is not None]
     if len(there) != 1:
         ways = " or ".join(f"task.{name}" for name in sources)
@@ -165,7 +165,7 @@ def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Formula:
-    """Objective of a task, and the range and number of points of a formula's parameter."""
+    """Entries for the objective of a task, and for range and number of values of a formula's parameter."""
 
     objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
@@ -181,7 +181,7 @@ class _Formula:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Curve(_Formula):
-    """Points of a target as a list, from a file, or by formulas; they can be scaled, rotated and shifted."""
+    """Entries for the points of a target: a list, a file or formulas, which can be scaled, rotated and shifted."""
 
     points: Any = entry(unchanged, None)
     file: str | None = entry(text, None)
