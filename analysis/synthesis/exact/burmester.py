@@ -8,8 +8,8 @@ be at p_j and the body be rotated by e_j = exp(i theta_j) from the first pose. T
 which is linear in (1, z, m, w). Five poses leave a plane of solutions, in which w = conj(m) z represents two conics. These meet
 in four points, so that there are four dyads, real or complex (L. Burmester, Lehrbuch der Kinematik, 1888; J. M. McCarthy and
 G. S. Soh, Geometric Design of Linkages, 2nd ed., 2011, chapter 5). Two real dyads make a four-bar: there are at most six, each
-driven from either side. All are checked for defects, so that the answer "none is sound" is a proof for these poses. Four poses
-leave a cubic curve of points z, each with its pivot m.
+driven from either side. All are checked for defects: if none is sound, this proves that no sound four-bar exists for the poses.
+Four poses leave a cubic curve of points z, each with its pivot m.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ Poses = PrecisionPoints | Motion
 INDEPENDENT = 1e-10
 #: Imaginary part, in units of the poses' size, up to which a dyad is real.
 REAL = 1e-7
-#: Points of the curve of four poses on each of its two branches, which a line through its pole meets.
+#: Number of lines through a pole that sample the curve of four poses: each meets the curve in two further points.
 CURVE_POINTS = 180
-#: Greatest length of links, in sizes of the poses, in the map of four poses, as in a search without bounds.
+#: Greatest length of links in the map of four poses, in sizes of the poses; the same as in a search without bounds.
 LONGEST = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dyad:
-    """A link on a fixed pivot that guides a body.
+    """A link that turns about a fixed pivot and guides a point of a body.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Exact(Shown):
         return tuple(s for s in self.solutions if s.verdicts.sound)
 
     def describe(self) -> str:
-        """Say in a sentence how many linkages there are."""
+        """Return a sentence that says how many linkages there are."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -107,7 +107,7 @@ class Guidance(Exact):
     solutions: tuple[Solution, ...]
 
     def describe(self) -> str:
-        """Say in a sentence how many linkages there are."""
+        """Return a sentence that says how many linkages there are."""
         possible = len(self.dyads) + self.complex_dyads
         there = f"{len(self.dyads)} of {possible} possible links guide the body"
         if not self.solutions:
@@ -120,21 +120,21 @@ class Guidance(Exact):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GuidanceMap(Shown):
-    """Four-bars that carry a body exactly through four poses: each consists of two dyads of a curve.
+    """Four-bars that carry a body exactly through four poses: each consists of two dyads from a curve of dyads.
 
     Attributes
     ----------
     task : PrecisionPoints or Motion
     pivots, points : ndarray of complex, shape (n,)
-        Samples of the centre-point and the circle-point curve, a dyad at each index (m). Lines through a pole of two poses give
-        the samples: each meets the curve in two further points.
+        Samples of the centre-point and the circle-point curve, one dyad per index (m). They lie on lines through a pole of two
+        poses: each line meets the circle-point curve in two further points.
     sound : ndarray of bool, shape (n, n)
-        Whether the linkage with the crank of a row and the rocker of a column is free of defects.
+        Whether the linkage whose crank is the dyad of the row, and whose rocker that of the column, is free of defects.
     transmission : ndarray, shape (n, n)
         Least deviation of its transmission angle from 0 and pi between the first pose and the last (rad); 0 if the linkage
         has a defect.
     solutions : tuple of Solution
-        The best different linkages by that angle.
+        The best linkages by this angle that differ clearly.
     """
 
     task: Poses
@@ -145,7 +145,7 @@ class GuidanceMap(Shown):
     solutions: tuple[Solution, ...]
 
     def describe(self) -> str:
-        """Say in a sentence how many linkages there are."""
+        """Return a sentence that says how many linkages there are."""
         n = len(self.points)
         return (
             f"{n} links sampled of those that can guide the body: {int(self.sound.sum())} of {n * (n - 1)} pairs make a sound "
@@ -190,7 +190,7 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
 
 
 def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
-    """Return the positions and angles of the four or five poses; raises InputError as `guidance` does."""
+    """Return the task, and positions and angles of its four or five poses; raises InputError as `guidance` does."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
         raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
     if task.rotation is not None:
@@ -219,7 +219,8 @@ def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     Returns
     -------
     z, m : ndarray of complex, shape (4, 2)
-        Cartesian coordinates of point and pivot relative to the first position; real for a dyad that can be built.
+        Cartesian coordinates of point and pivot relative to the first position, in the same units; real for a dyad that can be
+        built.
 
     Raises
     ------
@@ -228,7 +229,7 @@ def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     """
     rows = _conditions(p, angle)
     plane = _kernel(rows, 3)
-    # no root may lie at infinity of the plane's coordinates: turned at random, always in the same way
+    # a random rotation, always the same, so that no root lies at infinity of the plane's coordinates
     turned, _ = np.linalg.qr(np.random.default_rng(1888).standard_normal((3, 3)))
     plane = plane @ turned
     first, second = (plane.T @ form @ plane for form in _FORMS)
@@ -238,7 +239,7 @@ def dyads_of_five(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
-    """Return the linear conditions of the second and later poses on (1, zx, zy, mx, my, wx, wy), shape (n - 1, 7)."""
+    """Return the coefficients of (1, zx, zy, mx, my, wx, wy) in the conditions of all poses but the first, shape (n - 1, 7)."""
     p, e = p[1:] - p[0], np.exp(1j * (angle[1:] - angle[0]))
     seen = np.conj(p) * e
     return np.column_stack(
@@ -247,7 +248,7 @@ def _conditions(p: ComplexArray, angle: FloatArray) -> FloatArray:
 
 
 def _forms() -> tuple[FloatArray, FloatArray]:
-    """Return the quadratic forms in (1, zx, zy, mx, my, wx, wy) that are zero if w = conj(m) z."""
+    """Return the matrices of two quadratic forms in (1, zx, zy, mx, my, wx, wy) that are both zero if w = conj(m) z."""
     real, imaginary = np.zeros((7, 7)), np.zeros((7, 7))
     real[0, 5], real[3, 1], real[4, 2] = -1.0, 1.0, 1.0
     imaginary[0, 6], imaginary[3, 2], imaginary[4, 1] = -1.0, 1.0, -1.0
@@ -258,9 +259,9 @@ _FORMS = _forms()
 
 
 def _kernel(rows: FloatArray, size: int) -> FloatArray:
-    """Return a basis of the null space of the rows, in columns.
+    """Return a basis of the null space of the rows, in ``size`` columns.
 
-    Raises InputError if there are more than ``size`` of them.
+    Raises InputError if the rows are dependent, so that the null space is larger.
     """
     _, values, right = np.linalg.svd(rows)
     if values[-1] < INDEPENDENT * values[0]:
@@ -291,14 +292,14 @@ def _meeting(first: FloatArray, second: FloatArray) -> ComplexArray:
     places = []
     for y in roots:
         (a, b, c), (d, e, f) = quadratics(y)
-        # the common root of both
+        # the common root of both quadratics
         x = -(a * f - c * d) / (a * e - b * d)
         places.append([x, y, 1.0])
     return np.array(places)
 
 
 def _polished(rows: FloatArray, v: ComplexArray) -> ComplexArray:
-    """Refine a solution (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
+    """Refine a solution v = (zx, zy, mx, my) of the conditions of five poses by Newton's method."""
     for _ in range(8):
         zx, zy, mx, my = v
         full = np.array([1.0, zx, zy, mx, my, mx * zx + my * zy, mx * zy - my * zx])
@@ -325,7 +326,7 @@ def _guide_five_poses(task: Poses, p: ComplexArray, angle: FloatArray) -> Guidan
         )
         for (zx, zy), (mx, my) in zip(z[real], m[real])
     )
-    # two dyads on one pivot, or at one point of the body, hold it as a single one does
+    # two dyads with the same pivot, or the same point of the body, guide it no better than one
     made = [
         four_bar(task, a, b)
         for a, b in permutations(dyads, 2)
@@ -379,9 +380,9 @@ def exact_solution(task: Task, linkage: Linkage, rotation: FloatArray, sides: Fl
 
 
 def in_order(turned: FloatArray) -> FloatArray:
-    """Return angles, known up to whole turns, as rotations from the first one, monotonic if that is possible."""
+    """Return angles that are known up to whole turns as rotations from the first angle, monotonic if possible (rad)."""
     forward = turned % (2.0 * pi)
-    # the first is 0, also where rounding made it a whole turn
+    # the first is 0, even if rounding made it a whole turn
     forward[0] = 0.0
     if (np.diff(forward) > 0.0).all():
         return forward
@@ -392,8 +393,9 @@ def in_order(turned: FloatArray) -> FloatArray:
 def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Compute points of the circle-point curve of four poses, relative to the first position, and their pivots.
 
-    Each pose gives a line for the pivot m. The condition that the three lines meet is a cubic in z, which is zero at the pole
-    of two poses: a line through the pole meets the curve in two further points. Points with an infinite pivot are left out.
+    For a point z, each pose after the first gives a line on which the pivot m lies. The condition that the three lines meet is
+    a cubic in z, which is zero at the pole of two poses: a line through the pole meets the cubic in two further points. Points
+    with an infinite pivot are left out.
 
     Raises InputError if the poses are not independent.
     """
@@ -406,7 +408,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     nearer: list[complex] = []
     farther: list[complex] = []
     for direction in np.exp(1j * pi * (np.arange(CURVE_POINTS) + 0.5) / CURVE_POINTS):
-        # the row of the pole is zero there, and so proportional to the way from it
+        # the line of the chosen pose vanishes at the pole, so that it is proportional to the distance from there
         along = _lines(rows[chosen], pole + direction)
 
         def cubic(way: float, direction: complex = direction, along: FloatArray = along) -> float:
@@ -426,7 +428,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
 
 
 def _lines(row: FloatArray, z: complex) -> FloatArray:
-    """Return the coefficients of a pose's condition a mx + b my + c = 0 on the pivot of a point z; each is linear in z."""
+    """Return (a, b, c) of a pose's condition a mx + b my + c = 0 on the pivot m of a point z; each is linear in z."""
     turned = complex(-row[5], row[6]) * z
     constant = row[0] + row[1] * z.real + row[2] * z.imag
     return np.array([row[3] - turned.real, row[4] - turned.imag, constant])
@@ -440,7 +442,7 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
     chosen: list[tuple[int, int]] = []
     for place in np.argsort(-transmission, axis=None)[: int(sound.sum())]:
         i, k = (int(n) for n in np.unravel_index(place, sound.shape))
-        # neighbours on the curve are much the same linkage
+        # neighbours on the curve give almost the same linkage
         if all(abs(z[i] - z[a]) + abs(z[k] - z[b]) > 0.1 for a, b in chosen):
             chosen.append((i, k))
         if len(chosen) == count:
@@ -457,7 +459,7 @@ def _guide_four_poses(task: Poses, p: ComplexArray, angle: FloatArray, count: in
 
 
 def _pairs(p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Check every pair of crank (row) and rocker (column): ``sound`` and ``transmission`` of `GuidanceMap`."""
+    """Check every pair of crank (row) and rocker (column); return ``sound`` and ``transmission`` of `GuidanceMap`."""
     places = p[:, None] + e[:, None] * z
     arms = places - m
     turned = np.array([in_order(np.angle(column / column[0])) for column in arms.T])
@@ -473,7 +475,7 @@ def _pairs(p: ComplexArray, e: ComplexArray, z: ComplexArray, m: ComplexArray) -
         begin = np.angle(arms[0][:, None] / ground)
         end = begin + turned[:, -1:]
         low, high = np.minimum(begin, end) / pi, np.maximum(begin, end) / pi
-        # the distance from crank pin to rocker pivot at the ends, and with the crank along the ground link where it comes there
+        # distance from crank pin to rocker pivot at both ends, and where the crank passes the direction of the ground link
         even, odd = 2.0 * np.ceil(0.5 * low), 2.0 * np.ceil(0.5 * (low - 1.0)) + 1.0
         distances = [np.abs(m[None, :] - b[:, None]) for b in (places[0], places[-1])]
         distances += [np.where(even <= high, np.abs(l1 - l2), distances[0])]

@@ -36,7 +36,7 @@ from ..task.task import RockerFunction, SliderFunction
 FloatArray = NDArray[np.float64]
 #: Number of couplers that are tried before the best one is found exactly.
 COUPLERS = 2001
-#: Dimensions of a slider-crank that bounds may be of.
+#: Dimensions of a slider-crank that may have bounds.
 BOUNDED = ("ground_length", "crank_length", "coupler_length")
 
 
@@ -48,11 +48,11 @@ class QuickReturn(SliderFunction):
     Attributes
     ----------
     stroke : float
-        m.
+        Distance between the ends of the slider's travel (m).
     time_ratio : float
-        Duration of the slow stroke divided by that of the quick one, at constant crank speed: 1 at least.
+        Duration of the slow stroke divided by that of the quick one, at constant crank speed: at least 1.
     position, rotation : ndarray, shape (3,)
-        Computed from these: 0, the stroke, and 0 again.
+        Computed from stroke and time ratio: the positions 0, stroke and 0, and the crank rotations there.
     """
 
     stroke: Amount
@@ -84,11 +84,12 @@ class QuickSwing(RockerFunction):
     ----------
     swing : float
         Swing of the rocker, counter-clockwise while the crank turns counter-clockwise (rad), less than half a turn. If it is
-        negative both turn clockwise, which is the same linkage seen from behind.
+        negative, both turn clockwise, which is the same linkage seen from behind.
     time_ratio : float
         See `QuickReturn`.
     angle, rotation : ndarray, shape (3,)
-        Computed from these: 0, the swing, and 0 again, from any mounting angle.
+        Computed from swing and time ratio: the angles 0, swing and 0, relative to a free mounting angle, and the crank
+        rotations there.
     """
 
     swing: Amount
@@ -122,8 +123,8 @@ def quick_returns(
 ) -> tuple[Solution, ...]:
     """Find the linkage whose least transmission angle is greatest, in either assembly.
 
-    Raises InputError if a bound or a constraint is not supported here; InfeasibleError if there is no linkage, with the
-    greatest transmission angle that is possible.
+    Raises InputError or ParameterError if a bound or a constraint is not supported here; InfeasibleError if there is no
+    linkage, or none with the transmission angle that is asked for: the message names the greatest one.
     """
     for c in constraints:
         if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):
@@ -173,7 +174,7 @@ def _best_coupler(cosine: Callable[[float], float], ends: tuple[float, float]) -
 
 
 class _Swing:
-    """Crank-rockers with a given swing and time ratio: l3 is the ratio of coupler to rocker, the bounds determine the size."""
+    """Crank-rockers with a given swing and time ratio; ``l3`` is the ratio of coupler to rocker, bounds determine the size."""
 
     def __init__(self, task: QuickSwing, bounds: Any, constraints: Sequence[Any]) -> None:
         self.task, self.advance = task, _advance(task.time_ratio)
@@ -189,11 +190,11 @@ class _Swing:
         self.chord = chord
 
     def links(self, l3: float) -> tuple[float, float, float, float] | None:
-        """Return l1 ... l4 (m); None if the dead centres need both assemblies, or a bound is violated."""
+        """Return l1 ... l4 (m) for a ratio l3; None if the dead centres need both assemblies, or a bound is violated."""
         e, l2 = _lengths(l3, self.advance, self.chord)
         far = sqrt(max((l3 + l2) ** 2 - e * e, 0.0))
         x, y = far - 0.5 * self.chord, sqrt(max(1.0 - 0.25 * self.chord**2, 0.0)) - e
-        # D from A to the same side of both places of C
+        # side of A -> C on which D lies, for both positions of C
         sides = [x * -e - y * reach for reach in (far, far - self.chord)]
         if l2 <= 0.0 or sides[0] * sides[1] <= 0.0:
             return None
@@ -217,11 +218,11 @@ class _Swing:
         return min(1.0, max(both))
 
     def linkage(self, l3: float, branch: int) -> Linkage:
-        """Build the crank-rocker; its rotation is 0 in the dead centre at which the slow part begins."""
+        """Build the crank-rocker for a ratio l3; its rotation is 0 in the dead centre at which the slow part begins."""
         links = self.links(l3)
         assert links is not None
         l1, l2, l3, l4 = links
-        # a swing to the right is one to the left seen from behind
+        # a clockwise swing is a counter-clockwise one seen from behind
         side = 1 if float(self.task.swing) > 0.0 else -1
         made = Linkage(ground_length=l1, crank_length=l2, coupler_length=l3, rocker_length=l4, branch=side * branch)
         first, second = dead_centres(made)
@@ -235,7 +236,7 @@ class _Swing:
 
 
 def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[str, tuple[float, float]]:
-    """Return the least and greatest offset, crank and coupler (m)."""
+    """Return the least and greatest length of offset, crank and coupler, by name (m)."""
     cap = min(
         (float(c.length) for c in constraints if isinstance(c, LargestLink)), default=LARGEST * float(task.stroke)
     )
@@ -244,7 +245,7 @@ def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[st
         if name not in BOUNDED:
             raise ParameterError(name, (low, high), f"be one of {', '.join(BOUNDED)}: the others follow")
         ends[name] = max(low or 0.0, 0.0), min(cap, inf if high is None else high)
-    # the crank has a length, and l3 is at least that of an even stroke
+    # the coupler is at least half the stroke, as with a time ratio of 1 and no offset
     low, high = ends["coupler_length"]
     turned = task.advance
     most = float(task.stroke) / (2.0 * sin(0.5 * turned)) if turned > 0.0 else inf
@@ -259,7 +260,7 @@ def _ends(task: QuickReturn, bounds: Any, constraints: Sequence[Any]) -> dict[st
 
 
 def _lengths(l3: float, turned: float, h: float) -> tuple[float, float]:
-    """Return the offset and crank for a coupler, an advance and a stroke (m)."""
+    """Return offset and crank length for a coupler l3, a crank advance ``turned`` (rad) and a stroke h (m)."""
     l2 = sqrt(max(0.5 * h * h - l3 * l3 * (1.0 - cos(turned)), 0.0) / (1.0 + cos(turned)))
     return max(l3 * l3 - l2 * l2, 0.0) * sin(turned) / h, l2
 
@@ -275,10 +276,10 @@ def _cosine(l3: float, task: QuickReturn, ends: Mapping[str, tuple[float, float]
 
 
 def _linkage(task: QuickReturn, l3: float, branch: int) -> SliderCrank:
-    """Build the slider-crank with its guide below the shaft: a crank that turns counter-clockwise is slow to the right."""
+    """Build the slider-crank with its guide below the shaft: with a counter-clockwise crank the stroke to the right is slow."""
     l1, l2 = _lengths(l3, task.advance, float(task.stroke))
     far, near = (sqrt(max((l3 + side * l2) ** 2 - l1 * l1, 0.0)) for side in (1.0, -1.0))
-    # crank angle where the slider is at 0: folded, or on the other side of the shaft in line
+    # crank angle with the slider at 0: crank and coupler folded, or stretched on the other side of the shaft
     phase = pi + acos(l1 / (l3 - l2)) if branch > 0 else -acos(l1 / (l3 + l2))
     return SliderCrank(
         pivot_x=-near if branch > 0 else far,
