@@ -19,10 +19,10 @@ SHARE, RATIO = 0.03, 1.25
 
 
 def grouped(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Return one solution of each group of similar ones, in their order; the others become its ``variants``.
+    """Return the first solution of each group of similar ones, with the others of the group as its ``variants``.
 
     Position in the plane, sense of rotation and start of the crank do not count, nor does the size for a function of the
-    rocker. Linkages with a commanded pivot are all kept.
+    rocker. Linkages with a commanded pivot are never grouped.
     """
     groups: list[list[Solution]] = []
     for solution in solutions:
@@ -80,7 +80,7 @@ def _shape(linkage: Linkage, side: int) -> NDArray[np.float64]:
     point = linkage.point_distance * np.exp(1j * side * linkage.point_angle)
     second, pivot = 0j, linkage.pivot
     if isinstance(pivot, SecondCrank):
-        # its direction while the first crank lies along the ground link, times the turns of the gears
+        # from its angle while the first crank lies along the ground link, times the turns k so that whole turns do not count
         k, m = geared(pivot.ratio)
         second = pivot.length * np.exp(1j * side * (k * pivot.phase - m * linkage.crank_phase))
     links = (abs(getattr(linkage, name)) for name in LINKS)

@@ -110,7 +110,7 @@ class LinkageScene:
 
     @cached_property
     def curves(self) -> tuple[FloatArray, ...]:
-        """Return the coupler curve over a whole turn in pieces, each shape (n, 2); none without target points."""
+        """Return the coupler curve over a whole turn in pieces, each shape (n, 2); empty without target points."""
         if self.target is None:
             return ()
         points = self.linkage.path(self.turn)
@@ -147,17 +147,17 @@ class LinkageScene:
 
     @property
     def lettered(self) -> str:
-        """Return the pins that are drawn with their letters."""
+        """Return the letters of the pins that are labelled."""
         return self.linkage.letters + ("" if self.linkage.point_is_pin else "P")
 
     @cached_property
     def transmission(self) -> FloatArray:
-        """Return crank rotations over a turn and the angle between coupler and rocker, NaN where not joined, shape (2, n)."""
+        """Return crank rotations over a turn and the angle between coupler and rocker, NaN if unjoined, shape (2, n)."""
         return np.vstack([self.turn, angle_at_c(self.linkage, self.turn)])
 
     @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """Return heading and values of the motion of a second crank or a slider over a turn; None without either."""
+        """Return heading and values of the motion of a second crank or a slider over a turn; None if there is neither."""
         if isinstance(self.linkage, FiveBar):
             return "second crank [rad]", self.linkage.pivot.angle(self.turn)
         slider = self.linkage.slider(self.turn)
@@ -170,7 +170,7 @@ PIN, LETTER = 0.008, 0.022
 
 
 def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
-    """Draw links with their lengths, pins, guide, coupler curve and target in the plane's own coordinates (m).
+    """Draw links with their lengths, pins, guide, coupler curve and target, in the coordinates of the plane (m).
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def _links(
     placed: list[Dimension] = []
 
     def covered(one: Dimension) -> tuple[int, int]:
-        """Count the overlaps of a dimension with links, once each, and with other dimensions, thrice; and with other lines."""
+        """Count the overlaps of a dimension with links and, three times each, other dimensions; then those with lines."""
         room, strokes = _room(one), _strokes(one)
         count = sum(room.intersects(link) for link in links)
         count += 3 * sum(room.intersects(shape(other)) for other in placed for shape in (_room, _strokes))
@@ -278,7 +278,7 @@ def _links(
                 for rank in (2.0, 3.5, 5.0, 6.5, 8.0, 9.5, 11.0, 12.5)
                 for side in (1.0, -1.0)
             ]
-            # the nearest of those that cover least
+            # the nearest place with the fewest overlaps
             placed.append(min(choices, key=covered))
     yield from placed
 
@@ -289,7 +289,7 @@ def _strokes(dimension: Dimension) -> Any:
 
 
 def _room(dimension: Dimension) -> Any:
-    """Return the box that a dimension's number takes, with the gaps around it, on either side of its line."""
+    """Return the box that the number of a dimension needs, with gaps around it, on either side of the dimension line."""
     (x0, y0), (x1, y1) = dimension.line
     middle, way = np.array([x0 + x1, y0 + y1]) / 2.0, np.array([x1 - x0, y1 - y0]) / hypot(x1 - x0, y1 - y0)
     return LineString([middle - 2.2 * dimension.height * way, middle + 2.2 * dimension.height * way]).buffer(
@@ -298,7 +298,7 @@ def _room(dimension: Dimension) -> Any:
 
 
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
-    """Draw the links as plates with round ends and holes for the pins, one above the other, with dimensions.
+    """Draw the links as plates with round ends and holes for the pins, one below the other, with dimensions.
 
     The ground link is drawn if both its ends are pivots, but not the guide of a slider. The coupler includes the coupler point
     if the task has one.
@@ -308,7 +308,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
     width, thickness : float
         Width and thickness of each plate (m).
     pin : float
-        Diameter of the holes (m), below the width.
+        Diameter of the holes (m), less than the width.
     title : str
 
     Raises
@@ -372,7 +372,10 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
 
 
 def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
-    """Yield each pair of distinct holes with the offset of its dimension: outside the plate, none over another."""
+    """Yield the ends and the offset (m) of the dimension between each two distinct holes.
+
+    The dimensions lie outside the plate and not over one another.
+    """
     for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
         way = places[k] - places[i]
         if abs(way) <= 1e-9:
@@ -385,7 +388,7 @@ def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Poin
 
 
 def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
-    """Return the outline of edges and arcs around two or three points: points, and bulges as in `files.Polyline`."""
+    """Return an outline at a radius (m) around two or three points: its points, and bulges of arcs as in `files.Polyline`."""
     farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
     ends = places[list(farthest)]
     if len(places) == 3:
@@ -396,7 +399,7 @@ def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatAr
     edges = np.roll(ends, -1) - ends
     normals = -1j * edges / np.abs(edges)
     before = np.roll(normals, 1)
-    # about each corner an arc from the edge before to the edge after, then that edge
+    # about each corner an arc from the edge before it to the edge after it, then the edge after it
     points = np.column_stack([ends + radius * before, ends + radius * normals]).ravel()
     turns = np.angle(normals / before) % (2.0 * pi)
     bulges = np.column_stack([np.minimum(np.tan(0.25 * turns), 1.0), np.zeros(len(ends))]).ravel()

@@ -25,16 +25,16 @@ from .solution import CURVE, Solution, Verdicts, evaluate, nearest_rotations, pa
 FloatArray = NDArray[np.float64]
 #: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
 LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
-#: Angles of a moving pivot, besides the coefficients of its motion.
+#: Names of the dimensions of a moving pivot that are angles.
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
-#: Error relative to the target above which a solution is called poor, and the improvements to suggest by kind of linkage.
+#: Error relative to the target above which a solution is called poor; improvement to suggest for each kind of linkage.
 POOR = 0.05
 _BETTER = {
     "four-bar": "a geared five-bar (search.kinds) or a moved rocker pivot has more dimensions for it",
     "slider-crank": "a four-bar or a geared five-bar (search.kinds) has more dimensions for it",
     "geared-five-bar": "other ratios of its gears (search.gears), or a smoother or smaller target, may do better",
 }
-#: Step of the differences of exact derivatives, in rad or relative to the longest link.
+#: Step of the finite differences of exact derivatives, in rad or relative to the longest link.
 DIFFERENCE = 1e-5
 
 
@@ -49,8 +49,8 @@ class Sensitivity:
     value : float
         m or rad.
     slope : float
-        Derivative of the sum of weighted squared errors with respect to the dimension; it is zero at an optimum of that sum
-        inside the bounds. The sum is the quality function, or replaces it for a path whose quality is an area.
+        Derivative of the sum of weighted squared errors with respect to the dimension; it is zero at an optimum of the sum
+        inside the bounds. The sum is the quality function, or replaces it for a path whose quality function is an area.
     shift : float
         Root mean square displacement of the traced point, or change of angle, per unit of the dimension.
     """
@@ -68,14 +68,14 @@ class Rounding:
     Attributes
     ----------
     linkage : Linkage
-        The rounded linkage: a link is at least one step long; the coefficients of a commanded motion, of a slider or a second
-        crank, are not rounded.
+        The rounded linkage, in which a link is at least one step long. The coefficients of a commanded motion, of a slider or
+        a second crank, are not rounded.
     error : float
         Quality function of the rounded linkage.
     expected : float
-        Mean quality function if the dimensions have random errors, uniform within half a step. A sum of squares is computed to
-        second order, by exact derivatives of the errors and their differences; an area by the standard deviation of the
-        distances, taken as normal variables. Infinite if there are no derivatives.
+        Mean quality function if the dimensions have random errors, uniform within half a step. For a sum of squares it is
+        computed to second order, from exact first and finite-difference second derivatives of the errors; for an area the
+        distances are taken as normal variables. Infinite if there are no derivatives.
     """
 
     linkage: Linkage
@@ -90,7 +90,7 @@ def length_step(linkage: Linkage) -> float:
 
 
 def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-    """Return names of the dimensions, derivatives (m, k) of the residuals with respect to them, residuals (m,), weights (m,).
+    """Return names of the k dimensions, derivatives (m, k) of the residuals with respect to them, residuals (m,), weights (m,).
 
     The residuals are those of the quality function; for an untimed path, the distances along the target's normals.
     """
@@ -107,7 +107,10 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
 
 
 def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute derivatives (m, k) and values (m,) of the residuals: of points, ``across`` the curve or in x and y; of angles."""
+    """Compute derivatives (m, k) and values (m,) of the residuals at crank rotations ``at``: of points, then of angles.
+
+    The residuals of points are those in x and y or, if ``across``, those along the normals of the curve.
+    """
     columns = [column for _, _, column in _pivot(linkage, at)]
     angular = normal.angle is not None
     parts, blocks = [], []
@@ -119,7 +122,7 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
         still = [np.zeros(len(at), dtype=complex)] if angular else []
         whole = np.vstack([both[: len(PLACES)], *still, *[bx * both[10] + by * both[11] for bx, by in columns]]).T
         if linkage.point_is_pin:
-            # the pin and the point are one
+            # the coupler point is the pin C: the coupler's length moves it
             whole[:, PLACES.index("coupler_length")] += whole[:, PLACES.index("point_distance")]
         if across:
             rate = path_rate(linkage, at, both)
@@ -150,14 +153,14 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
 def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     """Compute the effect of each dimension on the error by exact derivatives.
 
-    For an untimed path these are the squared distances to the curve at its stations, with the crank rotations adapted.
+    For an untimed path the error is the sum of squared distances from the stations to the curve, with adapted crank rotations.
     """
     names, jacobian, residual, weights = derivatives(solution)
     slopes = 2.0 * jacobian.T @ (weights * residual)
     stations = len(normal_form(solution.task).weights)
     shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
     values = _values(solution.linkage)
-    # a rocker's angle has nothing to do with where the linkage stands, nor with its coupler point
+    # a rocker's angle depends neither on the position of the linkage nor on its coupler point
     idle = (
         set(PLACES) - {*LINKS, "crank_phase"}
         if isinstance(solution.task, RockerFunction)
@@ -192,7 +195,7 @@ def rounded(solution: Solution, length: float | None = None, angle: float = ANGL
     rounded_to = linkage
     for name, value in _made(linkage).items():
         whole = round(value / steps[name])
-        # a link is not rounded away
+        # a link is not rounded to zero
         rounded_to = _with(rounded_to, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole))
     error = evaluate(solution.task, rounded_to, solution.evaluation.rotation).error
     return Rounding(linkage=rounded_to, error=error, expected=_expected(solution, steps))
@@ -203,7 +206,7 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
     task, linkage = solution.task, solution.linkage
     area = isinstance(task, UntimedPath) and task.measure == "area"
     if isinstance(task, UntimedPath) and area:
-        # as many stations as it is evaluated at
+        # at least as many stations as the evaluation has points
         task = replace(task, samples=max(task.samples, CURVE))
     normal = normal_form(task)
     given = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
@@ -212,7 +215,7 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
     def residuals(made: Linkage) -> tuple[FloatArray, FloatArray]:
         at = given
         if isinstance(task, UntimedPath):
-            # the crank rotations follow
+            # the crank rotations adapt to the changed dimension
             assert normal.points is not None
             ends = () if normal.closed or given is None else (float(given.min()), float(given.max()))
             at = nearest_rotations(made, normal.places, *ends)
@@ -235,7 +238,7 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
         ahead, behind = (residuals(_with(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0))
         shift += 0.5 * variance * (ahead - behind) / (2.0 * small)
     if area:
-        # an area: the mean of the distances, as of a normal variable of that spread about what is there
+        # an area: each distance is a normal variable, with its value as the mean and its spread as the standard deviation
         grown = normal.weights * normal.arc * normal.unit @ (_mean_absolute(left, np.sqrt(square)) - np.abs(left))
     else:
         weights = np.tile(normal.weights, len(left) // normal.n)
@@ -256,14 +259,14 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
     Returns
     -------
     dict
-        Growth by the name of the dimension, without the coefficients of a slider's motion.
+        Growth of the quality function by name of the dimension, without those of a slider's motion.
     """
     linkage, grown = solution.linkage, {}
     for name, value in _made(linkage).items():
         if name == "guide_angle":
             continue
         step = angle if name in (*ANGLES, *PIVOT_ANGLES) else length
-        # a link cannot be shorter than nothing
+        # a link must stay longer than zero
         link = _is_link(linkage, name)
         ends = [value + side * step for side in (-1.0, 1.0) if not link or value + side * step > 0.0]
         grown[name] = max(
@@ -278,7 +281,7 @@ def _is_link(linkage: Linkage, name: str) -> bool:
 
 
 def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
-    """Return the mean of |x| of a normal variable."""
+    """Return the mean of |x| for normal variables x with these means and standard deviations."""
     from scipy.special import erf
 
     safe = np.maximum(spread, 1e-300)
@@ -288,13 +291,13 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 
 
 def _names(linkage: Linkage, normal: Normal) -> list[str]:
-    """Return the dimensions with respect to which derivatives are computed, in their order."""
+    """Return the names of the dimensions with respect to which derivatives are computed, in order."""
     mounted = [] if normal.angle is None else ["output_angle"]
     return [*PLACES, *mounted, *(name for name, _, _ in _pivot(linkage, np.zeros(1)))]
 
 
 def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
-    """List the dimensions of a moved pivot: name, value, and derivatives of its displacement at crank rotations."""
+    """Return, for each dimension of a moving pivot, name, value, and derivatives of D's displacement at crank rotations."""
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
         c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
@@ -302,7 +305,7 @@ def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[Flo
         found = [("guide_angle", pivot.guide_angle, (-s * u, c * u))]
     elif isinstance(pivot, SecondCrank):
         c, s = np.cos(pivot.angle(at)), np.sin(pivot.angle(at))
-        # the mean of the series is the phase's
+        # the mean of the series is part of the phase
         own, first, along = "second_crank", 1, (-pivot.length * s, pivot.length * c)
         found = [(SECOND_LENGTH, pivot.length, (c, s)), ("second_crank_phase", pivot.phase, along)]
     else:
@@ -319,7 +322,7 @@ def _values(linkage: Linkage) -> dict[str, float]:
 
 
 def _made(linkage: Linkage) -> dict[str, float]:
-    """Return the dimensions that are manufactured and therefore have errors, without those of a commanded motion."""
+    """Return, by name, the dimensions that are manufactured and can have errors, without those of a commanded motion."""
     values = _values(linkage)
     made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
     return {name: values[name] for name in made if name in values and name not in linkage.absent}
@@ -357,20 +360,20 @@ def quality_name(task: Task) -> str:
 
 
 def _met(solution: Solution) -> bool:
-    """Return whether a solution meets its task but for rounding."""
+    """Return whether a solution meets its task exactly, apart from rounding."""
     return error_unit(solution.task)[0] * solution.evaluation.worst < ROUNDING
 
 
 def format_dimension(name: str, value: float) -> str:
     """Format a dimension with its unit."""
     if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
-        # + 0.0: no minus before a zero
+        # + 0.0 removes the minus sign of a zero
         return f"{round(degrees(value), 3) + 0.0:.3f} deg"
     return f"{value * 1e3:.6g} mm"
 
 
 def headline(solution: Solution) -> str:
-    """Return error, size, transmission angle and defects in two or three lines."""
+    """Return error, size, transmission angle and defects, in three to six lines."""
     factor, unit = quality_unit(solution.task)
     scale, length = error_unit(solution.task)
     v = solution.verdicts
@@ -421,13 +424,14 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Assessment:
-    """A solution with the cost of errors in its dimensions, computed once for the shell, the report and the sheet.
+    """A solution with the cost of errors in its dimensions, computed once for the shell, the report and the drawing sheet.
 
     Attributes
     ----------
     solution : Solution
     dimensions : list of tuple
-        Headings, then a row for each dimension: name, value, error, and its effect on output and quality function.
+        Headings, then a row for each dimension: name, value, an error in it, and the effect of the error on output and
+        quality function.
     rounding : str
         The cost of rounding the dimensions, in one line.
     poor : str
@@ -441,7 +445,7 @@ class Assessment:
 
     @property
     def report(self) -> str:
-        """Return the report: verdicts, dimensions with the cost of an error in each, rounding, errors target by target."""
+        """Return the report: verdicts, dimensions with the cost of an error in each, rounding, and the error at each target."""
         solution, linkage = self.solution, self.solution.linkage
         task, pivot = solution.task, linkage.pivot
         error, rms, worst = quality_cells(solution, digits=6)
@@ -472,7 +476,7 @@ class Assessment:
 def assess(solution: Solution, violated: Callable[[Solution], str] | None = None) -> Assessment:
     """Compute the cost of errors in the dimensions of a solution.
 
-    ``violated`` returns the constraint that the rounded linkage violates; empty if it meets all.
+    ``violated`` is a function that names the constraint that a solution violates, and returns "" if it meets all.
     """
     factor, unit = quality_unit(solution.task)
     step = length_step(solution.linkage)
@@ -501,7 +505,7 @@ def quality_headings(task: Task) -> tuple[str, str, str]:
 
 
 def quality_cells(solution: Solution, digits: int = 5) -> tuple[str, str, str]:
-    """Return quality function, rms error and greatest error of a solution as text; zero if the task is met but for rounding."""
+    """Return quality function, rms error and greatest error of a solution as text; "0" if only rounding is left."""
     factor, scale = quality_unit(solution.task)[0], error_unit(solution.task)[0]
     found = solution.evaluation
     if _met(solution):
@@ -518,7 +522,10 @@ def _slider_line(linkage: Linkage) -> str:
 
 
 def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
-    """Return the dead centres, toggles, time ratio and mechanical advantage of a four-bar or a slider-crank, a line each."""
+    """Return lines with dead centres, toggles, time ratio and mechanical advantage of a four-bar or slider-crank.
+
+    The mechanical advantage is the least one over the crank rotations.
+    """
     last, motions, what = linkage.driven
     lines = _places(f"{last} at rest", dead_centres(linkage)) + _places("toggles", toggles(linkage))
     ratio = time_ratio(linkage)
@@ -531,7 +538,7 @@ def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
 
 
 def _places(what: str, places: Sequence[float]) -> str:
-    """Format crank rotations as a line, if there are any."""
+    """Return a line with crank rotations in degrees; empty if there are none."""
     return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
 
 
@@ -541,7 +548,7 @@ def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str
     scale, length = error_unit(solution.task)
     dear = costs(solution, step, ANGLE_STEP)
     rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
-    # where the crank's rotation is free, so is where it starts
+    # an untimed path leaves the crank's rotation free, and its start, too
     left_out = ("crank_phase",) if isinstance(solution.task, UntimedPath) else ()
     for s in sensitivities(solution):
         if s.name in left_out:
@@ -558,12 +565,12 @@ def _dimension_rows(solution: Solution, step: float) -> list[tuple[str, str, str
 
 
 def format_transmission(verdicts: Verdicts) -> str:
-    """Format the range of the transmission angle."""
+    """Format the range of the transmission angle in degrees, without the unit."""
     return f"{degrees(verdicts.least_transmission):.1f} to {degrees(verdicts.greatest_transmission):.1f}"
 
 
 def _stations(solution: Solution) -> list[list[str]]:
-    """Return the table of errors target by target, in mm and degrees."""
+    """Return the rows of the table of errors, one for each target, in mm and degrees."""
     columns = solution.columns()
     heads = [name.replace("[m]", "[mm]").replace("[rad]", "[deg]") for name in columns]
     factors = [1e3 if name.endswith("[m]") else 180.0 / pi for name in columns]
@@ -573,7 +580,7 @@ def _stations(solution: Solution) -> list[list[str]]:
 
 
 def solution_columns(solutions: Sequence[Solution]) -> dict[str, list[float]]:
-    """Return the columns of `Synthesis.columns` for any solutions; a length of 0 stands for a missing link."""
+    """Return the columns of `Synthesis.columns` for any solutions; a missing link has the length 0."""
     columns: dict[str, list[float]] = {}
 
     def put(name: str, value: float) -> None:
