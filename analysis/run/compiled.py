@@ -1,10 +1,10 @@
 """The compiled solver: integration of a run, its inputs, events and outputs.
 
-The integrator is DOP853 (`linkwork.tableau`) with its interpolant of order 7, the same method as the FMU's, written again
-for arrays; inputs are evaluated inside the loop. It knows no mechanism: the equations are functions of machine code that it
-calls by their addresses (`equations.machine`), so that it is compiled once for all. A run goes from one interval of smooth
-inputs to the next, ends of intervals being breaks of the inputs, points at which they are sampled and held, and the release
-of the torsion bar.
+The integrator is DOP853 (`linkwork.tableau`) with its interpolant of order 7, the same method as the FMU's, written for arrays;
+inputs are evaluated inside the loop. The solver knows no mechanism: it calls the equations, which are machine code, by their
+addresses (`equations.machine`), and so is compiled only once for all mechanisms. A run is integrated over one interval of
+smooth inputs after the other. An interval ends at a break of the inputs, at a point at which they are sampled and held, or at
+the release of the torsion bar.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from .records import (
 from .sources import SOURCE, Source, channels_at, find, hold, unwound, wound
 from .stepping import EXPONENT, STAGES, Flow, attempt, following, interpolate, shorter
 
-#: Share of the kinetic energy up to which the residual of the energy balance is taken out of it: a mechanism at rest has none.
+#: Largest residual of the energy balance, as a fraction of the kinetic energy, that is corrected: near rest it may be larger.
 GREATEST_SHARE = 1e-3
 
 
@@ -68,13 +68,13 @@ def begin_interval(motion):
         ahead = carry.stop if t < problem.end else t + problem.hold
         hold(t, ahead, x, source, problem.commands, u, motion.room.inside)
         for n in range(problem.commands.shape[0]):
-            # a rate is then the secant of a command
+            # the derivative of a held command is the slope of its secant
             if not isfinite(u[problem.commands[n, 2]]):
                 lost = problem.commands[n, 0]
     if lost >= 0:
         carry.lost = lost
         return BAD_INPUT
-    # at the start the state has the commanded rates; after that a jump of them is an impulse
+    # at the start the state already has the commanded rates; later a jump of a commanded rate is an impulse
     jumps = False
     for n in range(problem.commands.shape[0]):
         jumps |= x[problem.commands[n, 1]] != u[problem.commands[n, 0]]
@@ -89,7 +89,7 @@ def begin_interval(motion):
 
 @inner
 def _end_of_interval(piece, motion):
-    """Return the time until which the inputs are smooth, or held."""
+    """Return the time up to which the inputs are smooth, or held."""
     end, breaks = motion.problem.end, motion.source.breaks
     if motion.problem.hold > 0.0:
         later = motion.carry.interval + 1
@@ -140,7 +140,7 @@ def next_size(carry):
 
 @inner
 def _attempt(h, motion):
-    """Try a step of size h from x and return its error relative to the tolerance."""
+    """Compute a step of size h and return its error relative to the tolerance."""
     problem, carry, room = motion.problem, motion.carry, motion.room
     carry.steps += 1
     carry.evaluations += STAGES - 1
@@ -163,9 +163,9 @@ def _accept(h, last, t_new, motion):
         or (carry.sample < samples.times.shape[0] and samples.times[carry.sample] < t_new)
         or watch.table.shape[0] > 0
     )
-    # a NaN, beyond the limit of assembly
+    # the clearance is NaN beyond the limit of assembly
     good = not isnan(clearance)
-    # the interpolant and the next step begin with the right-hand side at the end; after the last nobody asks for it
+    # the interpolant and the next step need the derivative at the end; after the last step it is not needed
     if inside or not last:
         equation(DERIVATIVE, t_new, y, u, motion.room.k[12], motion)
         carry.evaluations += 1
@@ -175,7 +175,7 @@ def _accept(h, last, t_new, motion):
 
 @inner
 def _keep_balance(motion):
-    """Scale the rates at the end of a step to close the energy balance, unless the mechanism is nearly at rest."""
+    """Scale the rates at the end of a step so that the energy balance holds, unless the mechanism is nearly at rest."""
     y, outputs, balance = motion.room.y, motion.room.outputs, motion.watch.balance
     equation(OUTPUTS, 0.0, y, motion.u, outputs, motion)
     share = outputs[balance[0]] / outputs[balance[1]]
@@ -187,11 +187,11 @@ def _keep_balance(motion):
 
 @inner
 def refused(h, motion):
-    """Return the status of a run whose step has become too short."""
+    """Return the status of a run whose step size h has become too short: LIMIT, BAD_INPUT or NO_STEP."""
     carry, room, x, u = motion.carry, motion.room, motion.x, motion.u
     status = LIMIT if abs(clearance_at(x, u, motion)) < NEAR_LIMIT else NO_STEP
     if carry.piece >= 0:
-        # an input may be what stops it
+        # an input that is not finite may be the cause
         for i in range(x.shape[0]):
             room.z[i] = x[i] + h * room.k[0, i]
         copy(u, room.inside)
@@ -219,7 +219,7 @@ def _sample_beginning(motion):
 
 @inner
 def sample_step(t_new, h, motion):
-    """Record the samples inside a step; one at its end waits for the next, or for the next interval's inputs."""
+    """Record the samples inside a step, before ``t_new``; a sample at its end is recorded with the next step or interval."""
     carry, samples = motion.carry, motion.samples
     while carry.sample < samples.times.shape[0] and samples.times[carry.sample] < t_new:
         n = carry.sample
@@ -235,9 +235,9 @@ def sample_step(t_new, h, motion):
 
 @inner
 def _cross_interval(motion, most):
-    """Integrate to the end of the interval, or pause after ``most`` steps or at a full event table; return the status.
+    """Integrate to the end of the interval, or pause after ``most`` steps or when the event table is full; return the status.
 
-    Where it pauses it leaves ``carry.midway`` set.
+    If it pauses, ``carry.midway`` is 1.
     """
     carry, room, watch, x = motion.carry, motion.room, motion.watch, motion.x
     least = LEAST_STEP * (motion.problem.end - motion.samples.times[0])
@@ -247,7 +247,7 @@ def _cross_interval(motion, most):
     while True:
         if carry.steps >= most or carry.found > full:
             carry.midway = 1
-            # after a step that was refused they are those of one of its stages
+            # after a rejected step the inputs are those of one of its stages
             renew(carry.elapsed, x, motion.u, motion)
             return RUNNING
         h, last = next_size(carry)
@@ -282,7 +282,7 @@ def _cross_interval(motion, most):
 
 @part
 def make_room(states, outputs, inputs):
-    """Allocate work arrays for given numbers of states, outputs and inputs."""
+    """Allocate the work arrays `Room` for given numbers of states, outputs and inputs."""
     return Room(
         np.empty((16, states)),
         np.empty(states),
@@ -311,8 +311,12 @@ def _advance(motion, most):
 
 
 class Batch(NamedTuple):
-    """Data that differ between runs: constants with the energy at the start, scales, whether the inputs are steady, pieces and
-    harmonics of each, and the inputs themselves, one row each."""
+    """Data that differ between runs, one row for each run.
+
+    ``p`` are the constants and the energy at the start, ``scales`` the magnitudes for the error, ``steady`` whether the inputs
+    are constant between breaks, ``sizes`` the numbers of polynomial pieces and of harmonics. The other fields are those of
+    `signals.Source`.
+    """
 
     p: NDArray[np.float64]
     scales: NDArray[np.float64]
@@ -330,7 +334,7 @@ BATCH = types.NamedTuple(
 
 
 def of_one(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], steady: bool) -> Batch:
-    """Return a single run as a batch, with the torque laws of the source."""
+    """Return a single run as a batch of one; it shares the torque laws with the source."""
     sizes = [[len(source.coefficients), len(source.harmonics)]]
     inputs = (source.breaks, source.coefficients, source.harmonics, source.laws)
     return Batch(p[None], scale[None], np.array([steady]), np.array(sizes), *(values[None] for values in inputs))
@@ -338,7 +342,7 @@ def of_one(source: Source, p: NDArray[np.float64], scale: NDArray[np.float64], s
 
 @part
 def _own(i, source, batch):
-    """Return the inputs of one run of a batch; ``source`` holds the data common to all runs."""
+    """Return the inputs of run i of a batch; ``source`` has the data common to all runs."""
     pieces, waves = batch.sizes[i]
     return Source(
         batch.breaks[i, : pieces + 1],
@@ -353,7 +357,7 @@ def _own(i, source, batch):
 
 @inline
 def motion_of(i, problem, source, batch, watch, samples, room, state):
-    """Return a reference to one run of a batch."""
+    """Return a reference to run i of a batch as a `Motion`."""
     return refer(Motion(
         problem, batch.p[i], batch.scales[i], batch.steady[i], _own(i, source, batch), watch,
         Samples(samples.times, samples.states[i], samples.forces[i]), room, state.carries[i], state.x[i], state.u[i],
@@ -362,7 +366,7 @@ def motion_of(i, problem, source, batch, watch, samples, room, state):
 
 @kernel(types.void(float64, SOURCE, BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
 def channels_of_many(t, source, batch, x, u):
-    """Write the channels of each run of a batch at time t and at its state into the rows of u."""
+    """Write the channels of each run of a batch, at time t and its state in x, into its row of u."""
     for i in range(x.shape[0]):
         own = _own(i, source, batch)
         channels_at(t, 0.0, find(t, own.breaks), x[i], own, u[i])
@@ -376,27 +380,28 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
     """Integrate the runs of a batch whose status is RUNNING, one after the other, each until its end, a stopping event,
     ``most`` steps in all, or a full table of events.
 
-    After ``budget`` steps over all of them it returns. Called again with what it left behind it goes on, with the same result
-    as in one call.
+    The function returns after ``budget`` steps of all runs together. Called again with the same arrays it continues, with the
+    same result as in one call.
 
     Parameters
     ----------
     problem : Problem
-        What all have in common.
+        Data common to all runs.
     source : Source
-        The places and functions of the inputs, which all have in common; the rest is of no account.
+        Only ``places``, ``law_places`` and ``functions`` are used, which all runs have in common.
     batch : Batch
-        What each has of its own; its ``laws`` are overwritten when a torsion bar is released.
+        Data of each run; its ``laws`` are overwritten when a torsion bar is released.
     watch : Watch
-        Values and table of the events, of one run or of none; overwritten.
+        Table and values of the events if the batch is a single run, else empty; overwritten.
     state : State
-        Overwritten. Of ``carries`` all is zero but the time in ``begin`` at the start; the caller sets ``found`` to zero when
-        it has taken the events.
+        Overwritten. At the start all fields of ``carries`` are zero except ``begin``, the start time; the caller sets
+        ``found`` to zero after reading the events.
     samples : Samples
-        Of each run; written.
+        Samples of each run; written.
     status : ndarray, shape (runs,)
-        Written: RUNNING, FINISHED, BAD_INPUT, LIMIT, NO_STEP or EVENT.
+        Status of each run; written: RUNNING, FINISHED, BAD_INPUT, LIMIT, NO_STEP or EVENT.
     most, budget : int
+        Largest number of steps of a run in all, and of all runs in this call.
     """
     room = make_room(state.x.shape[1], problem.outputs, state.u.shape[1])
     for i in range(state.x.shape[0]):
@@ -413,23 +418,23 @@ def run(problem, source, batch, watch, state, samples, status, most, budget):
 
 @inner
 def put(lane, lanes, values, many):
-    """Write values into one of several lanes."""
+    """Write values into one lane of the array ``many``, which is in lanes."""
     for i in range(values.shape[0]):
         many[lanes * i + lane] = values[i]
 
 
 @inner
 def take(lane, lanes, many, values):
-    """Read the values of one of several lanes."""
+    """Read the values of one lane of the array ``many``, which is in lanes."""
     for i in range(values.shape[0]):
         values[i] = many[lanes * i + lane]
 
 
 @kernel(types.void(int64, int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
 def rows(equation, lanes, modes, p, states, forces, out):
-    """Evaluate one of the equations for rows of states and inputs, shapes (n, states), (n, inputs), into ``out``.
+    """Evaluate an equation, by its address, for rows of states (n, states) and inputs (n, inputs) into the rows of ``out``.
 
-    The equation takes so many rows at once as it has ``lanes``, and writes them one after the other.
+    The machine code of the equation evaluates ``lanes`` rows at once, and writes their results one row after the other.
     """
     modes_of, p_of = np.empty(lanes * modes.shape[0]), np.empty(lanes * p.shape[0])
     x, u = np.empty(lanes * states.shape[1]), np.empty(lanes * forces.shape[1])
@@ -440,7 +445,7 @@ def rows(equation, lanes, modes, p, states, forces, out):
     for first in range(0, states.shape[0], lanes):
         count = min(lanes, states.shape[0] - first)
         for lane in range(lanes):
-            # the last row fills what remains
+            # the last row also fills lanes without a row
             row = first + min(lane, count - 1)
             put(lane, lanes, states[row], x)
             put(lane, lanes, forces[row], u)

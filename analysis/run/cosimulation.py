@@ -29,8 +29,8 @@ from .sampling import named, release, sample
 from .simulation import sample_times
 from .trajectory import Trajectory
 
-#: Ways of running an FMU: co-simulation with inputs held over each step, the same with inputs that go linearly over it, model
-#: exchange under CVode.
+#: Ways of running an FMU: co-simulation with inputs held over each step, co-simulation with inputs that change linearly over
+#: each step, model exchange with CVode.
 INTERFACES = ("co-simulation", "linear-co-simulation", "model-exchange")
 
 
@@ -49,7 +49,7 @@ def cosimulate(
     interface: str = "co-simulation",
     progress: bool = False,
 ) -> Trajectory:
-    """Run an FMU of Linkwork of any kind through FMPy.
+    """Run an FMU of Linkwork, of any kind, with FMPy.
 
     Parameters
     ----------
@@ -57,25 +57,26 @@ def cosimulate(
     parameters, inputs, initial, stop_time, start_time, tolerance, progress
         As for `simulate`.
     step : float or str, optional
-        Communication step; every one is recorded.
+        Communication step; the outputs at every communication point are recorded.
     interface : str
-        ``co-simulation``: the inputs are sampled at each communication point and held over the step, commanded speeds go along
-        the secant; ``simulate(..., hold=step)`` does the same in process. ``linear-co-simulation``: over a step they go
-        linearly to what they will be at its end, as predicted where they depend on the motion; commanded speeds go along a
-        parabola. ``model-exchange``: FMPy's CVode integrates the FMU's derivatives, and the inputs act continuously, as in
-        process without ``hold``. The Python FMU has the first, native FMUs of FMI 2.0 all, of FMI 3.0 the first and the last.
+        ``co-simulation``: the inputs are sampled at each communication point and held over the step, commanded speeds change
+        linearly; ``simulate(..., hold=step)`` does the same in process. ``linear-co-simulation``: the inputs change linearly
+        over a step to their values at its end, which are predicted if they depend on the motion; commanded speeds change
+        along a parabola. ``model-exchange``: FMPy's CVode integrates the FMU's derivatives, and the inputs act continuously,
+        as in process without ``hold``. The Python FMU has only co-simulation, native FMUs of FMI 2.0 have all interfaces, of
+        FMI 3.0 all but the linear one.
 
     Returns
     -------
     Trajectory
-        A refused step ends the run with the FMU's solver.status and solver.message and all data up to it.
+        If the FMU refuses a step, the run ends with the FMU's solver.status and solver.message and all data up to there.
 
     Raises
     ------
     CosimulationError
         If the FMU cannot be loaded, has no such interface, or refuses to initialise.
     InputError
-        If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
+        If the times are not usable, or an input is not a finite number; the message names the input and the time.
 
     Examples
     --------
@@ -91,7 +92,7 @@ def cosimulate(
     begun = clock.perf_counter()
     stop_time, step = usual_times(parameters, inputs, stop_time, step)
     times = sample_times(stop_time, step, start_time)
-    # the FMU itself judges the tolerance
+    # the FMU itself checks the tolerance
     prepared = Run(parameters, inputs, initial, Settings(times=times, hold=step, tolerance=tolerance, max_steps=1))
     march = (
         _Continuous(prepared) if interface == "model-exchange" else _Stepwise(prepared, interface != "co-simulation")
@@ -128,9 +129,10 @@ def cosimulate(
 
 
 def held_inputs(case: Case, steps: int) -> Callable[[int, Sequence[float] | None], dict[str, float]]:
-    """Return the function that samples the inputs of a case for co-simulation in equal steps.
+    """Return a function that samples the inputs of a case, over ``case.stop_time`` in equal steps, for co-simulation.
 
-    It takes the number of a step and the outputs at its start, None at the start of the run, and must be called step by step.
+    The function takes the number of a step and the outputs at its start, None at the start of the run; it must be called for
+    the steps in order, and returns the inputs by name.
     """
     times = np.linspace(0.0, case.stop_time, steps + 1)
     settings = Settings(times=times, hold=float(times[1]), tolerance=case.tolerance, max_steps=1)
@@ -143,7 +145,7 @@ def held_inputs(case: Case, steps: int) -> Callable[[int, Sequence[float] | None
 
 
 class _Stepwise:
-    """Communication steps over which inputs are held or linear."""
+    """Co-simulation in communication steps over which inputs are held or linear."""
 
     instance = FmuRun
 
@@ -166,7 +168,7 @@ class _Stepwise:
         return self.inputs(0, self.start)
 
     def inputs(self, number: int, x: NDArray[np.float64]) -> dict[str, float]:
-        """Return the inputs from a communication point to the next, for a state."""
+        """Return the inputs over the step from the communication point with this number, at the state x."""
         times, t = self.times, float(self.times[number])
         if self.linear:
             release(self.encoded, x, self.laws)
@@ -176,7 +178,7 @@ class _Stepwise:
         return named(self.encoded, sample(self.encoded, t, x, self.laws, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
-        """Return the slopes of the inputs over the next step, with the state predicted from the outputs."""
+        """Return the slopes of the inputs over the next step; the state at its end is predicted from the outputs ``row``."""
         t, ahead = float(self.times[number]), float(self.times[number + 1])
         h, x = ahead - t, self.state(row)
         n, laws = len(self.rates), self.laws.copy()
@@ -190,11 +192,11 @@ class _Stepwise:
         return named(self.encoded, change / h)
 
     def state(self, row: list[float]) -> NDArray[np.float64]:
-        """Return the state from a row of outputs, without the work done."""
+        """Return the state from a row of outputs; dissipated and supplied work are set to zero."""
         return np.array([*(row[n] for n in self.coordinates), *(row[n] for n in self.rates), 0.0, 0.0])
 
     def rows(self, run: Any) -> Iterator[tuple[float, list[float]]]:
-        """Yield times and outputs until the end or a refused step."""
+        """Run the FMU and yield times and outputs until the end or a step that the FMU refuses."""
         if self.linear and not run.interpolates:
             raise CosimulationError(
                 f"{run.name} does not take inputs that are linear over a step: it can only hold them"
@@ -207,14 +209,14 @@ class _Stepwise:
             self.status, self.message = run.step(float(t), float(t_next - t))
             if self.status:
                 return
-            # the outputs belong to the inputs that begin here: read the state, sample, set, read all
+            # recorded outputs belong to the inputs that begin here: read the state, sample and set the inputs, read again
             run.set_inputs(self.inputs(number + 1, self.state(run.outputs())))
             row = run.outputs()
             yield float(t_next), row
 
 
 class _Continuous:
-    """Model exchange, in which inputs act continuously."""
+    """Model exchange with inputs that act continuously."""
 
     instance = FmuModel
     title = ", model exchange"
@@ -231,7 +233,7 @@ class _Continuous:
         return named(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, laws))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
-        """Yield times and outputs until the end or the limit of assembly, with the last configuration there."""
+        """Run the FMU and yield times and outputs until the end or the limit of assembly, the outputs at the limit included."""
         from .exchange import Exchange, ExchangeError
 
         times = self.prepared.settings.times
@@ -257,7 +259,7 @@ class _Continuous:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputDifference:
-    """Difference of one output between two runs: largest and rms, in its unit, and relative to ``scale``."""
+    """Difference of one output between two runs: largest and root mean square, in its unit, and the output's ``scale``."""
 
     name: str
     unit: str
@@ -267,7 +269,7 @@ class OutputDifference:
 
     @property
     def relative(self) -> float:
-        """Return the largest difference over the scale; zero if both runs are zero throughout."""
+        """Return the largest difference divided by the scale; zero if there is no difference."""
         return 0.0 if self.largest == 0.0 else self.largest / self.scale
 
 
@@ -305,12 +307,12 @@ class Comparison:
 def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:
     """Compare two runs output by output.
 
-    The scale of an output is its largest magnitude in ``a``; but a quantity that is small beside its like (a force at one
-    pin, the displacement of a stiff slider) is not asked for more digits than a thousandth of the largest like one
-    carries, and residuals are measured against what they are the residual of.
+    Differences are relative to the scale of an output: its largest magnitude in ``a``, but at least a thousandth of that of
+    outputs of the same kind, so that small ones (a force at one pin, the displacement of a stiff slider) need not have as many
+    digits. The scale of a residual is the size of its terms.
 
-    Two runs that ended early for the same reason at the same sample are compared on the samples they share: a solver in
-    process keeps the last configuration, an FMU the last communication point.
+    If both runs ended early with the same status after the same sample, only the samples that both have are compared: a run in
+    process also has its last configuration, that of an FMU ends at the last communication point.
 
     Raises
     ------
@@ -340,7 +342,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
             difference = np.abs(a[name] - b[name])
             if name in wrapped:
                 difference = np.abs(np.remainder(difference + pi, 2.0 * pi) - pi)
-        # what is not a number differs from everything
+        # NaN differs from everything
         difference[np.isnan(difference)] = np.inf
         differences.append(
             OutputDifference(
@@ -355,7 +357,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
 
 
 def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float:
-    """Return the smallest scale of an output, from the largest magnitudes of outputs of the same kind."""
+    """Return a lower limit of an output's scale, from the largest magnitudes of outputs of the same kind."""
 
     residuals = residual_outputs()
 
@@ -368,7 +370,7 @@ def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float
     if name in residuals and units[name] == "m":
         return lengths
     if name in residuals and units[name] == "J":
-        # where there are no energies among the outputs, those of what turns and what is pushed
+        # without energies among the outputs, a torque is of the same dimension
         return like("J") or like("N.m") or 1.0
     scales = {
         "m": lengths,

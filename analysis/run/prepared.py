@@ -25,13 +25,13 @@ from .inputs import Encoded, Inputs, align, compile_function, compiled_source, e
 from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
-#: Steps of one compiled call, between which progress is shown and an interrupt is heard: about a tenth of a second.
+#: Steps in one compiled call, about a tenth of a second; between calls progress is shown and Ctrl-C is checked.
 STEPS_PER_CALL = 50_000
-#: Events of one kind that one compiled call can report before it hands them over.
+#: Room for events in one compiled call, for each event of the user; if the table is full the call returns.
 EVENTS_PER_CALL = 1_000
-#: Energy (J) and inputs from which on energy and accelerations at the start are looked at.
+#: Energy (J) and magnitude of inputs above which energy and accelerations at the start are checked for overflow.
 _GREAT = 1e100
-#: Harmonics of a drive that a usual motion shows.
+#: Highest harmonic of the drive that is expected in a motion: a faster vibration is reported.
 _HARMONICS = 30.0
 
 
@@ -61,7 +61,7 @@ class Run:
     Raises
     ------
     InputError
-        If inputs or state at the start are another mechanism's.
+        If inputs or initial state belong to another mechanism.
     """
 
     parameters: Parameters
@@ -87,7 +87,7 @@ class Run:
         Raises
         ------
         AssemblyError
-            If the links cannot be joined there.
+            If the links cannot be joined at the start.
         InputError
             If an input is not a finite number, or energy or accelerations are not.
         """
@@ -99,7 +99,7 @@ class Run:
         self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         energy = self.mechanism.equations.energy(state, self.p)
-        # only what is as great as this may overflow
+        # only such large values may overflow
         great = not (abs(energy) < _GREAT and np.abs(u).max(initial=0.0) < _GREAT)
         if (
             great
@@ -119,12 +119,15 @@ class Run:
         return self.mechanism.equations.applied(self.modes, tuple(u.tolist()), self.p)
 
     def limit(self, x: NDArray[np.float64]) -> str:
-        """Return the message of a motion that ended at its limit."""
+        """Return the message for a run that ended at a limit of the motion, at the state x."""
         idle = np.zeros(len(self.mechanism.channels))
         return self.mechanism.limit(x.tolist(), self.applied(idle), self.p)
 
     def stiff(self, x: NDArray[np.float64], u: NDArray[np.float64], steps: float, passed: float) -> str:
-        """Return the sentence on a stiff or fast vibrating run, by state and channels after a time (s); or nothing."""
+        """Return a caution that the run is stiff or vibrates fast, or an empty text.
+
+        ``x`` and ``u`` are state and channels after ``steps`` steps, which covered the time ``passed`` (s).
+        """
         if steps < MANY_STEPS:
             return ""
         times, mechanism = self.settings.times, self.mechanism
@@ -133,11 +136,11 @@ class Run:
         return stiffness(disturbance_rates(mechanism, x, self.applied(u), self.p), steps, passed, usual)
 
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
-        """Return the error for an input that is not finite, by the number of its channel."""
+        """Return the error for an input, by the number of its channel, that is not finite at the time t and the state x."""
         return NotFiniteError(self.encoded, channel, t, x)
 
     def _records(self, times: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
-        """Return empty samples at times, and the state from which the compiled solver goes on."""
+        """Return arrays for samples at the given times, and the solver's records at the start of the run from the state x."""
         from . import records as k
 
         size, channels = self.mechanism.size, len(self.mechanism.channels)
@@ -152,7 +155,7 @@ class Run:
         Raises
         ------
         InputError
-            As `start`; or if the balance cannot be kept.
+            As for `start`; or if ``balanced`` is not possible.
         """
         from . import compiled
         from . import records as k
@@ -162,7 +165,7 @@ class Run:
         start, laws = self.start(), self.encoded.source.laws
         if turns.too_many(start.x):
             turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, laws), laws, 0)
-            # the balance of energy begins with the angles as they are now
+            # the energy at the start must be that of the reduced angles
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = problem_of(self.encoded, self.settings, self.mechanism.switched(self.p))
         source, kept = compiled_source(self.encoded)
@@ -232,7 +235,7 @@ class Run:
         return trajectory
 
     def undefined(self, x: NDArray[np.float64]) -> str:
-        """Say which springs exert no finite force a microsecond or a millisecond after a state, or nothing."""
+        """Return a text that names springs without a finite force 1 us or 1 ms after the state x; empty if there are none."""
         springs = {v.name: v.of for v in self.mechanism.variables if v.role == "spring force"}
         if not springs:
             return ""
@@ -241,7 +244,7 @@ class Run:
         names, idle = self.mechanism.output_names, np.zeros((2, len(self.mechanism.channels)))
         values = outputs_of(self.mechanism, np.array(self.modes), np.array([*self.p, 0.0]), states, idle)
         if "assembly.clearance" in names:
-            # beyond the limit of assembly nothing has a value
+            # beyond the limit of assembly no output has a value
             values = values[np.isfinite(values[:, names.index("assembly.clearance")])]
         finite = dict(zip(names, map(np.all, np.isfinite(values).T)))
         lost = [spring for name, spring in springs.items() if not finite[name]]
@@ -265,7 +268,7 @@ class Run:
         return names.index(wanted[0]), names.index(wanted[1])
 
     def _watch(self, balance: tuple[int, ...]) -> tuple[Any, list[Any]]:
-        """Return events and energy balance for the compiled code, and the objects to keep alive."""
+        """Return the `Watch` of the compiled code (events and energy balance), and the objects to keep while it is used."""
         from .records import Watch
 
         n = len(self.events)
@@ -282,7 +285,7 @@ class Run:
 
 
 def problem_of(encoded: Encoded, settings: Settings, switched: bool) -> Any:
-    """Return the data that runs with the same kind of inputs share, for the compiled code."""
+    """Return the `Problem` of the compiled code: data that runs with the same kind of inputs have in common."""
     from .records import Problem
 
     return Problem(
@@ -305,9 +308,10 @@ def verdict(
     limit: Callable[[NDArray[np.float64]], str] | None = None,
     needed: float = 0.0,
 ) -> tuple[int, str]:
-    """Return the solver.status and solver.message for a status of the compiled code.
+    """Return the solver.status and solver.message for a status of the compiled code at the time t and the state x.
 
-    ``limit`` says what a limit is; without it, it is that of assembly. ``needed`` are the steps for which a run was given up.
+    ``limit`` returns the message for a limit of the motion; by default it is the limit of assembly. ``needed`` is the number of
+    steps that a run would have needed if it was given up, else 0.
     """
     from . import records as k
 
@@ -337,12 +341,12 @@ def outputs_of(
     Parameters
     ----------
     modes : ndarray
-        Values of the modes.
+        Values of the mechanism's modes.
     p : ndarray
-        Constants, and after them the mechanical energy at the start (J).
+        Constants of the equations, and as last element the mechanical energy at the start (J).
     states, inputs : ndarray, shapes (n, states) and (n, channels)
     columns : tuple of int, optional
-        Numbers of the outputs to compute, in the order of the columns; by default all.
+        Indices of the outputs to compute, in this order; by default all.
     """
     from ..numerics.lanes import width
     from .compiled import rows

@@ -1,4 +1,4 @@
-"""The in-process solver: runs of a mechanism."""
+"""Run a mechanism in process: `simulate`, and the sample times and settings of runs."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 
 #: Default of the largest number of steps of a run.
 MOST_STEPS = 100_000_000
-#: Default of the largest number of samples of a run: more are probably a mistaken unit and would not fit into memory.
+#: Default of the largest number of samples of a run: more probably come from a wrong unit and would not fit into memory.
 _SAMPLES = 20_000_000
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
 @in_si(stop_time="s", step="s", start_time="s")
 def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> NDArray[np.float64]:
-    """Return the times start, start + step, ... up to and including the stop time, each computed as start + k step.
+    """Return the times from start to stop (s), each computed as start + k step; the last is the stop time.
 
-    The last step is shorter where the run is not a whole number of steps long.
+    The last step is shorter if the run is not a whole number of steps long.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
             "twice that"
         )
     whole = round(ratio)
-    # what is left over, but for rounding, at a late time that of the times, makes a last, shorter step
+    # a remainder larger than rounding errors, which at late times are those of the times, makes a last, shorter step
     count = whole if whole > 0 and abs(ratio - whole) <= max(1e-6, apart / step) else int(ratio) + 1
     times: NDArray[np.float64] = start_time + step * np.arange(count + 1, dtype=float)
     times[-1] = stop_time
@@ -109,31 +109,32 @@ def simulate(
     Parameters
     ----------
     parameters
-        Of a mechanism, such as FiveBarParameters or SliderCrankParameters; or a published set or its name, such as
-        "table-3.1", which brings its start, and its crank speed unless the inputs drive the crank. See `variant` too.
+        Parameters of a mechanism, such as FiveBarParameters or SliderCrankParameters; or a published set or its name, such as
+        "table-3.1". A published set also gives the initial state, and the crank speed unless the inputs drive the crank. See
+        also `variant`.
     inputs : Inputs
-        What acts on it; by default nothing does: a crank is free, the slider-crank's shift is held, and a freedom of a
-        described linkage that has a speed in its file is held at rest. A published set brings that speed; ``torque=0.0``
-        frees it.
+        What acts on the mechanism; by default nothing: a crank is free, the slider-crank's shift is held, and a freedom of a
+        described linkage that has a speed in its file is held at rest. With a published set it has that speed;
+        ``torque=0.0`` frees it.
     initial
-        That of the mechanism, or a mapping such as {"crank_speed": "420 rpm"}; by default at rest with all coordinates zero.
-        Commanded speeds take the place of the rates.
+        Initial state of the mechanism, or a mapping such as {"crank_speed": "420 rpm"}; by default at rest with all
+        coordinates zero. Commanded speeds replace the rates in it.
     stop_time : float or str, optional
-        End of the run, in s or as text with its unit, such as "0.5 s"; so are all times. At a constant speed three turns by
-        default.
+        End of the run, in s or as text with its unit, such as "0.5 s", like all times. By default three turns, if the crank has
+        a constant speed.
     step : float or str, optional
-        Distance of the recorded samples: by default 1 ms, and where there is no stop_time the 360th part of a turn.
+        Time between recorded samples: by default 1 ms, or without ``stop_time`` 1/360 of a turn.
     samples : array_like, shape (n,), optional
-        Times to record instead (s), increasing; the first is the start of the run, the last its end.
+        Times to record (s) in place of ``step``, increasing; the run starts at the first and ends at the last.
     hold : float or str, optional
-        Sample and hold the inputs at multiples of this step (s), as a co-simulation master does; the crank speed then
-        goes along the secant between two samples. Must be the sampling step of the recorded times.
+        Sample and hold the inputs at multiples of this step (s), as a co-simulation master does; a commanded speed then
+        changes linearly between two samples. It must be the step of the recorded times.
     method : str or OdeSolver class
-        ``compiled`` (DOP853 under Numba, the default), ``balanced`` (the same, each step brought back to the balance of
-        energy by its rates, for long runs without commanded speeds), one of SciPy's (``RK23 RK45 DOP853 Radau BDF LSODA``),
-        ``Hamming`` (the thesis's predictor-corrector), or a class of your own.
+        ``compiled`` (DOP853 under Numba, the default), ``balanced`` (the same, but after each step the rates are scaled to
+        restore the energy balance, for long runs without commanded speeds), one of SciPy's (``RK23 RK45 DOP853 Radau BDF
+        LSODA``), ``Hamming`` (the thesis's predictor-corrector), or a class of your own.
     tolerance : float
-        Bound of the local error relative to state and size of the mechanism.
+        Bound of the local error, relative to the state and the size of the mechanism.
     events : sequence of Event
 
     Other Parameters
@@ -141,26 +142,26 @@ def simulate(
     start_time : float or str
         Start of the run; 0 by default.
     max_steps : int
-        Steps after which a compiled run ends with solver.status 4; 1e8 by default. A stiff run ends after 1e6 steps if it is
-        going to need more than a tenth of them.
+        Number of steps after which a compiled run ends with solver.status 4; 1e8 by default. A stiff run ends already after
+        1e6 steps if it would need more than a tenth of ``max_steps``.
     progress : bool
         Show a progress bar.
     first_step, max_step, min_step, jac, jac_sparsity, lband, uband, vectorized
-        For SciPy's ``solve_ivp``, as far as the method has them. A class of your own has options of its own.
+        Options of SciPy's ``solve_ivp``, if the method has them. A class of your own may have other options.
 
     Returns
     -------
     Trajectory
-        A run that reaches the limit of assembly, or whose step size underflows, ends there with a status, a message and
-        all data up to it.
+        A run that reaches the limit of assembly, or whose step size underflows, ends there with a status, a message and all data
+        up to there.
 
     Raises
     ------
     ParameterError, InputError, AssemblyError
-        If parameters or inputs are not usable, or the links cannot be joined at the start. An input that turns out not to
-        be a finite number in the course of the run is named with the time.
+        If parameters or inputs are not usable, or the links cannot be joined at the start. If an input is not a finite number
+        later in the run, the message names the input and the time.
     RunInterrupted
-        On Ctrl-C; carries what was computed.
+        On Ctrl-C; it has the results so far.
 
     Examples
     --------
@@ -188,7 +189,7 @@ def simulate(
 
 
 def settings_of(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: int) -> Settings:
-    """Check the settings of a run and return them.
+    """Check the settings of a run and return them as `Settings`.
 
     Raises
     ------
@@ -214,7 +215,7 @@ def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:
 
 
 def _check_samples(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    # between finite ends, what increases is finite
+    # increasing numbers between finite ends are finite
     increasing = times.ndim == 1 and len(times) > 1 and (times[1:] > times[:-1]).all()
     if not (increasing and isfinite(times[0]) and isfinite(times[-1])):
         raise InputError("the recorded times must be at least two finite numbers, increasing")
